@@ -1,0 +1,126 @@
+"""What every folder raises: one tree of errors, worded for the user.
+
+An error says what is wrong, where, what was expected and what to do. The command turns each into
+one clear message and exit code 2; none of them is ever shown as a traceback.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a text a fault stands.
+
+    Attributes:
+        file: Name of the file, as the user gave it.
+        line: Line, counted from 1.
+        column: Column, counted from 1.
+        text: The line itself, for the caret.
+        length: How many characters the caret marks.
+    """
+
+    file: str
+    line: int
+    column: int
+    text: str = ""
+    length: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+    def caret(self) -> str:
+        """The faulty line with carets under the fault; tabs are kept so that the carets line up."""
+        lead = "".join("\t" if c == "\t" else " " for c in self.text[: self.column - 1])
+        return f"    {self.text}\n    {lead}{'^' * max(1, self.length)}"
+
+
+class VisupError(Exception):
+    """Base of all errors that are the user's to mend.
+
+    Args:
+        what: What is wrong, one sentence without a full stop.
+        where: A file, or a place in a file.
+        expected: What was expected instead.
+        hint: What to do about it.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: str | Place | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        super().__init__(what)
+        self.what = what
+        self.where = where
+        self.expected = expected
+        self.hint = hint
+
+    def __str__(self) -> str:
+        lines = [f"{self.where}: {self.what}" if self.where else self.what]
+        if isinstance(self.where, Place) and self.where.text:
+            lines.append(self.where.caret())
+        if self.expected:
+            lines.append(f"  expected: {self.expected}")
+        if self.hint:
+            lines.append(f"  hint: {self.hint}")
+        return "\n".join(lines)
+
+
+class SourceError(VisupError):
+    """A video source cannot be opened or read."""
+
+
+class DatabaseError(VisupError):
+    """A model database cannot be read or written."""
+
+
+class RuleError(VisupError):
+    """A rules file is not as it should be."""
+
+
+class TaskError(VisupError):
+    """A task file is not as it should be."""
+
+
+class BehaviourError(VisupError):
+    """A behaviour does not keep its contract, or cannot be loaded."""
+
+
+class SettingsError(VisupError):
+    """A setting or an argument is not as it should be."""
+
+
+class OutputError(VisupError):
+    """An output folder or file cannot be written."""
+
+
+class ExtraMissingError(VisupError):
+    """A part of visup was asked for that needs an extra which is not installed.
+
+    Args:
+        what: What was asked for.
+        extra: Name of the extra, as in ``visup[render]``.
+    """
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(
+            f"{what} needs the extra '{extra}', which is not installed",
+            hint=f"pip install 'visup[{extra}]'",
+        )
+
+
+class ManyErrors(VisupError):
+    """All the faults of one file, told at once.
+
+    Args:
+        errors: At least one fault, in the order of their places.
+    """
+
+    def __init__(self, errors: list[VisupError]) -> None:
+        super().__init__("\n".join(str(e) for e in errors))
+        self.errors = tuple(errors)

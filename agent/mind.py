@@ -1,0 +1,278 @@
+"""The mental model: what is believed about objects, their identity, motion, presence and tasks.
+
+A mind is an immutable value; a step makes a new one. All that thinkers remember from step to step
+stands in it too (`memory`), so that a snapshot of a mind is a snapshot of everything that reasons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Any
+
+from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
+
+NO_OBJECTS: Mapping[int, ObjectBelief] = MappingProxyType({})
+HEALTHY = Health(HealthStatus.OK)
+UNKNOWN_OBJECT = "unknown object"
+
+
+class Presence(StrEnum):
+    """Where an object is believed to be."""
+
+    SEEN = "seen"
+    HIDDEN = "hidden"
+    LEFT = "left"
+
+
+class Status(StrEnum):
+    """How a stage of a task stands."""
+
+    PENDING = "pending"
+    ACTIVE = "active"
+    PROGRESSING = "progressing"
+    STALLED = "stalled"
+    FAILING = "failing"
+    FAILED = "failed"
+    DONE = "done"
+    UNKNOWN = "unknown"
+
+
+class Verdict(StrEnum):
+    """How a task as a whole stands."""
+
+    IN_PROGRESS = "in_progress"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An identity that an object may have.
+
+    Attributes:
+        name: Model name.
+        votes: Time-discounted votes (paper, section 5).
+        share: Share of all votes for the object, 0 to 1.
+    """
+
+    name: str
+    votes: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObjectBelief:
+    """What is believed about one object.
+
+    Attributes:
+        id: Stable number; an object keeps it through occlusion and reappearance.
+        region: The region as last seen.
+        presence: Seen, hidden or left.
+        first_seen: Seconds.
+        last_seen: Seconds.
+        confirmed: Seen often enough to have had its entry told.
+        candidates: Identities, most likely first; empty while nothing is known.
+        depth: Relative depth in the units of the best candidate's model, or None when unknown.
+        depth_sigma: Standard deviation of `depth`.
+    """
+
+    id: int
+    region: Region
+    presence: Presence
+    first_seen: float
+    last_seen: float
+    confirmed: bool = False
+    candidates: tuple[Candidate, ...] = ()
+    depth: float | None = None
+    depth_sigma: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Most likely identity, or 'unknown object'."""
+        return self.candidates[0].name if self.candidates else UNKNOWN_OBJECT
+
+    @property
+    def strength(self) -> float:
+        """Vote share of the most likely identity, 0 to 1."""
+        return self.candidates[0].share if self.candidates else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """What holds between objects now.
+
+    Attributes:
+        name: 'converging', 'diverging', 'keeping_distance', 'touching', 'coupled', ...
+        objects: Ids; order matters only for relations that are not symmetric.
+        truth: True, false or unknown.
+        since: Seconds since when it has this truth.
+        confidence: 0 to 1.
+        value: The quantity behind it (such as pixels per second), or None.
+        sigma: Standard deviation of `value`.
+    """
+
+    name: str
+    objects: tuple[int, ...]
+    truth: Truth
+    since: float
+    confidence: float = 1.0
+    value: float | None = None
+    sigma: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """Two objects believed to be rigidly connected.
+
+    Attributes:
+        objects: Ids, smaller first.
+        since: Seconds.
+    """
+
+    objects: tuple[int, int]
+    since: float
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """An actor of a task matched to an object.
+
+    Attributes:
+        actor: Name in the task file.
+        models: Model names that the actor may be.
+        object_id: The object believed to play it, or None when none does.
+        strength: Strength of that belief, 0 to 1.
+    """
+
+    actor: str
+    models: tuple[str, ...]
+    object_id: int | None = None
+    strength: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """An action that the current stage of a task asks for; rules are suspended by it.
+
+    Attributes:
+        relation: Name of the relation, such as 'converging'.
+        objects: Ids of the objects that play its actors.
+    """
+
+    relation: str
+    objects: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StageBelief:
+    """How one stage of a task stands.
+
+    Attributes:
+        stage: Its name.
+        status: Pending, active, progressing, ...
+        since: Seconds since when it has this status.
+        confidence: 0 to 1.
+        evidence: One sentence: why.
+    """
+
+    stage: str
+    status: Status
+    since: float
+    confidence: float = 1.0
+    evidence: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TaskBelief:
+    """How a task stands.
+
+    Attributes:
+        task: Its name.
+        verdict: Overall.
+        stages: In the order of the task.
+        current: Name of the stage that is under way, or None.
+        bindings: Which object plays which actor.
+        expected: What the current stage asks for.
+        unexplained: Ids of objects that no actor of the task explains.
+        confidence: 0 to 1.
+        evidence: One sentence: why the verdict is what it is.
+    """
+
+    task: str
+    verdict: Verdict
+    stages: tuple[StageBelief, ...] = ()
+    current: str | None = None
+    bindings: tuple[Binding, ...] = ()
+    expected: tuple[Expectation, ...] = ()
+    unexplained: tuple[int, ...] = ()
+    confidence: float = 1.0
+    evidence: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mind:
+    """All that is believed at one moment.
+
+    Attributes:
+        time: Seconds of the last observation.
+        frame_index: Number of the last frame.
+        frame_size: (width, height) pixels.
+        objects: By id, including those that are hidden or have left (until forgotten).
+        relations: All relations evaluated in this step.
+        couplings: Pairs believed to be rigidly connected.
+        tasks: One for each active task.
+        alerts: Open alerts.
+        health: State of the camera.
+        percepts: Latest percepts of plug-ins' own kinds, by kind.
+        unknown: Kinds of percept that could not be observed in this step (a behaviour failed).
+        actors: Actor name -> model names, as bound by the user or the task.
+        memory: What thinkers remember, by thinker; immutable values only.
+    """
+
+    time: float = 0.0
+    frame_index: int = -1
+    frame_size: tuple[int, int] = (0, 0)
+    objects: Mapping[int, ObjectBelief] = field(default_factory=lambda: NO_OBJECTS)
+    relations: tuple[Relation, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    tasks: tuple[TaskBelief, ...] = ()
+    alerts: tuple[Alert, ...] = ()
+    health: Health = HEALTHY
+    percepts: Mapping[str, tuple[Percept, ...]] = field(default_factory=empty)
+    unknown: frozenset[str] = frozenset()
+    actors: Mapping[str, tuple[str, ...]] = field(default_factory=empty)
+    memory: Mapping[str, Any] = field(default_factory=empty)
+
+    def remember(self, thinker: str, value: object) -> Mind:
+        """The same mind with one thinker's memory replaced; `value` must be immutable."""
+        return replace(self, memory=MappingProxyType({**self.memory, thinker: value}))
+
+    def with_objects(self, *beliefs: ObjectBelief) -> Mind:
+        """The same mind with beliefs about some objects added or replaced."""
+        updated = {**self.objects, **{b.id: b for b in beliefs}}
+        return replace(self, objects=MappingProxyType(updated))
+
+    def present(self) -> tuple[ObjectBelief, ...]:
+        """Confirmed objects that are seen or hidden, by id."""
+        return tuple(
+            b
+            for _, b in sorted(self.objects.items())
+            if b.confirmed and b.presence is not Presence.LEFT
+        )
+
+    def coupled(self, a: int, b: int) -> bool:
+        """Whether two objects are believed to be rigidly connected."""
+        return any(c.objects == (min(a, b), max(a, b)) for c in self.couplings)
+
+    def relation(self, name: str, *objects: int) -> Relation | None:
+        """The relation of that name between exactly these objects in any order, or None."""
+        wanted = frozenset(objects)
+        for r in self.relations:
+            if r.name == name and frozenset(r.objects) == wanted:
+                return r
+        return None

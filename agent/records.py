@@ -1,0 +1,340 @@
+"""The records that flow through visup, from a frame to a step: frozen, typed, passive.
+
+Frames of reference: image coordinates are pixels with x to the right and y down, the origin at the
+centre of the top left pixel; boxes are half open (x, y, width, height); times are seconds since the
+start of the source; velocities are pixels per second. Arrays in records are never written to.
+
+Read next: `mind.py` (what is believed), then `agent.py` (the cycle).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+EMPTY: Mapping[str, Any] = MappingProxyType({})
+
+
+def empty() -> Mapping[str, Any]:
+    """The mapping with nothing in it; dataclasses want a factory for it."""
+    return EMPTY
+
+
+class Truth(StrEnum):
+    """Three-valued truth: what was not observed is unknown, never false."""
+
+    TRUE = "true"
+    FALSE = "false"
+    UNKNOWN = "unknown"
+
+
+class Severity(IntEnum):
+    """How much an event or alert matters."""
+
+    INFO = 0
+    WARNING = 1
+    CRITICAL = 2
+
+
+class HealthStatus(StrEnum):
+    """What the camera's image is like; anything but OK makes motion untrustworthy."""
+
+    OK = "ok"
+    DARK = "dark"
+    SATURATED = "saturated"
+    FROZEN = "frozen"
+    BLOCKED = "blocked"
+    NOISY = "noisy"
+    SCRAMBLED = "scrambled"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """An image with its time.
+
+    Attributes:
+        index: Number of the frame in its source, from 0.
+        time: Seconds since the start of the source.
+        image: (H, W, 3) uint8, BGR.
+    """
+
+    index: int
+    time: float
+    image: NDArray[np.uint8]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        return self.image.shape[1], self.image.shape[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """A part of the image that moves coherently.
+
+    Attributes:
+        id: Stable number of the region within one run, from 1.
+        bbox: (x, y, width, height), pixels, half open; encloses the mask exactly.
+        mask: (height, width) bool, cropped to `bbox`.
+        contour: (N, 2) float32, outer boundary (x, y) in the image.
+        centroid: (x, y) of the mask, pixels.
+        area: Pixels in the mask.
+        velocity: (vx, vy) pixels per second.
+        velocity_sigma: Standard deviation of each velocity component, pixels per second.
+        motion: (2, 3) float, affine motion of the region between the last frame and this one.
+        cut: Whether the image border cuts the region.
+        confidence: How sure the segmenter is that this is a moving object, 0 to 1.
+    """
+
+    id: int
+    bbox: tuple[int, int, int, int]
+    mask: NDArray[np.bool_]
+    contour: NDArray[np.float32]
+    centroid: tuple[float, float]
+    area: float
+    velocity: tuple[float, float] = (0.0, 0.0)
+    velocity_sigma: float = 0.0
+    motion: NDArray[np.float64] | None = None
+    cut: bool = False
+    confidence: float = 1.0
+
+    def full_mask(self, size: tuple[int, int]) -> NDArray[np.bool_]:
+        """The mask in a whole image.
+
+        Args:
+            size: (width, height) of the image, pixels.
+
+        Returns:
+            (height, width) bool.
+        """
+        out = np.zeros((size[1], size[0]), dtype=bool)
+        x, y, w, h = self.bbox
+        out[y : y + h, x : x + w] = self.mask
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """'Region 2 looks like view 45 of `spartan`, similarity 0.87' (paper, section 4, figure 4).
+
+    Attributes:
+        region_id: The region that was matched.
+        name: Name of the model.
+        view: Number of the view within the model.
+        similarity: 0 to 1.
+        rotation: In-plane rotation from view to region, radians, or None.
+        scale: Region pixels per unit of the model (metres where the model has metres), or None.
+        direction: Unit vector from the object to the viewer in the model's frame, or None.
+    """
+
+    region_id: int
+    name: str
+    view: int
+    similarity: float
+    rotation: float | None = None
+    scale: float | None = None
+    direction: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Depth:
+    """Relative depth of a region under one identity, from its size (paper, section 7.4).
+
+    Attributes:
+        region_id: The region.
+        name: The model whose size was compared.
+        depth: Distance along the line of sight in model units (metres for metric models).
+        sigma: Standard deviation of `depth`.
+    """
+
+    region_id: int
+    name: str
+    depth: float
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """State of the camera image.
+
+    Attributes:
+        status: What the image is like.
+        detail: One sentence for the user, empty when OK.
+    """
+
+    status: HealthStatus
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Percept:
+    """Whatever a behaviour reports about a frame.
+
+    Attributes:
+        kind: What it is: 'region', 'hypothesis', 'depth', 'health', or a plug-in's own word.
+        value: `Region`, `Hypothesis`, `Depth`, `Health`, or a plug-in's own value.
+        time: Seconds, the frame's time.
+        source: Name of the behaviour.
+        confidence: 0 to 1.
+    """
+
+    kind: str
+    value: Any
+    time: float
+    source: str
+    confidence: float = 1.0
+
+
+class ReportState(StrEnum):
+    """What became of a behaviour in one step."""
+
+    RAN = "ran"
+    RESTED = "rested"
+    FAILED = "failed"
+    SUSPENDED = "suspended"
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What one behaviour did in one step.
+
+    Attributes:
+        behaviour: Its name.
+        state: Ran, rested (it was not its turn), failed, or suspended after failing.
+        gives: The kinds it would have reported.
+        percepts: What it reported; empty unless it ran.
+        error: What went wrong, when it failed.
+        elapsed_ms: Wall time; for people, never for decisions.
+    """
+
+    behaviour: str
+    state: ReportState
+    gives: tuple[str, ...] = ()
+    percepts: tuple[Percept, ...] = ()
+    error: str = ""
+    elapsed_ms: float = field(default=0.0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """All that was perceived of one frame: what thinkers see instead of the frame itself.
+
+    Attributes:
+        frame_index: Number of the frame.
+        time: Seconds.
+        frame_size: (width, height) pixels.
+        reports: One for each behaviour.
+    """
+
+    frame_index: int
+    time: float
+    frame_size: tuple[int, int]
+    reports: tuple[Report, ...] = ()
+
+    def of(self, kind: str) -> tuple[Any, ...]:
+        """Values of all percepts of one kind, in order."""
+        return tuple(p.value for r in self.reports for p in r.percepts if p.kind == kind)
+
+    def observed(self, kind: str) -> bool:
+        """Whether some behaviour looked for this kind; seeing none then means none is there."""
+        return any(r.state is ReportState.RAN and kind in r.gives for r in self.reports)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened, told once.
+
+    Attributes:
+        kind: 'entry', 'exit', 'occlusion', 'reappearance', 'coupled', 'decoupled', 'relation',
+            'identified', 'stage_started', 'stage_progressing', 'stage_failing', 'stage_done',
+            'verdict', 'health', 'fault', ...
+        time: Seconds.
+        frame_index: Frame at which it was told.
+        text: The sentence for the narrative, complete, with full stop.
+        objects: Ids of the objects concerned, the subject first.
+        confidence: 0 to 1.
+        severity: INFO unless a person should look.
+        data: Small JSON-like details (relation name, stage, ...).
+    """
+
+    kind: str
+    time: float
+    frame_index: int
+    text: str
+    objects: tuple[int, ...] = ()
+    confidence: float = 1.0
+    severity: Severity = Severity.INFO
+    data: Mapping[str, Any] = field(default_factory=empty)
+
+
+@dataclass(frozen=True, slots=True)
+class Concern:
+    """A reason for an alert that holds now; the act phase keeps alerts from these.
+
+    Attributes:
+        kind: 'collision_course', 'unexpected_object', 'stage_failing', ...
+        objects: Ids of the objects concerned.
+        severity: How grave it is.
+        cause: The sentence for the narrative, with full stop.
+        evidence: Facts that led to it, one sentence each.
+        key: What tells two concerns of one kind and the same objects apart (such as a stage).
+    """
+
+    kind: str
+    objects: tuple[int, ...]
+    severity: Severity
+    cause: str
+    evidence: tuple[str, ...] = ()
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """An event that a person should act on, with its life.
+
+    Attributes:
+        id: Number within the run, from 1.
+        kind: As of its concern.
+        severity: How grave it is.
+        opened: Seconds.
+        updated: Seconds, when the concern last held.
+        closed: Seconds, or None while open.
+        objects: Ids of the objects concerned.
+        cause: One sentence.
+        evidence: Facts, one sentence each.
+        key: As of its concern.
+    """
+
+    id: int
+    kind: str
+    severity: Severity
+    opened: float
+    updated: float
+    objects: tuple[int, ...]
+    cause: str
+    evidence: tuple[str, ...] = ()
+    closed: float | None = None
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Directive:
+    """What cogitation asks of behaviours, with its reason.
+
+    Attributes:
+        kind: 'expect_regions' (data: count), 'look_at' (data: bbox), 'ignore' (data: bbox),
+            'try_first' (data: names), 'restrict' (data: names), 'wake' (data: behaviour),
+            'ask' (data: question).
+        reason: One sentence.
+        data: As the kind says.
+    """
+
+    kind: str
+    reason: str
+    data: Mapping[str, Any] = field(default_factory=empty)

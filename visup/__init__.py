@@ -1,0 +1,1 @@
+"""visup, the visual supervisor."""
