@@ -1,0 +1,108 @@
+"""The last phase of a step: alerts open, are renewed, and close, as concerns come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from visup.agent.records import Alert, Concern, Event, Observation, ReportState, Severity
+
+GRACE_S = 1.0
+"""A concern may be silent this long before its alert closes: alerts must not flicker."""
+
+Key = tuple[str, tuple[int, ...], str]
+
+
+def faults(observation: Observation) -> tuple[Concern, ...]:
+    """Concerns about behaviours that failed or are suspended: their part of the mind is unknown."""
+    broken = (ReportState.FAILED, ReportState.SUSPENDED)
+    return tuple(
+        Concern(
+            "behaviour_failed",
+            (),
+            Severity.WARNING,
+            f"The behaviour '{r.behaviour}' failed; what it gives is unknown.",
+            (r.error,),
+            key=r.behaviour,
+        )
+        for r in observation.reports
+        if r.state in broken
+    )
+
+
+def update_alerts(
+    alerts: Sequence[Alert], concerns: Iterable[Concern], time: float, next_id: int
+) -> tuple[tuple[Alert, ...], tuple[Alert, ...], tuple[Alert, ...]]:
+    """Alerts after the concerns of one step.
+
+    Args:
+        alerts: Those that were open.
+        concerns: Those that hold now; of two alike the graver stays.
+        time: Seconds.
+        next_id: Number of the next alert that opens.
+
+    Returns:
+        The alerts that are open now, those that opened, those that closed.
+    """
+    now = _by_key(concerns)
+    known = {_key(a): a for a in alerts}
+    renewed = [_renew(a, now[k], time) for k, a in known.items() if k in now]
+    silent = [a for k, a in known.items() if k not in now]
+    closed = tuple(replace(a, closed=time) for a in silent if time - a.updated > GRACE_S)
+    kept = [a for a in silent if time - a.updated <= GRACE_S]
+    fresh = [c for k, c in now.items() if k not in known]
+    opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(fresh))
+    still = sorted([*renewed, *kept, *opened], key=lambda a: a.id)
+    return tuple(still), opened, closed
+
+
+def alert_events(
+    opened: Iterable[Alert], closed: Iterable[Alert], time: float, frame_index: int
+) -> tuple[Event, ...]:
+    """The events that tell of alerts that opened or closed."""
+    told = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
+    over = [
+        _event("alert_closed", f"No longer so: {a.cause}", a, time, frame_index, Severity.INFO)
+        for a in closed
+    ]
+    return (*told, *over)
+
+
+def _event(
+    kind: str, text: str, alert: Alert, time: float, frame_index: int, severity: Severity
+) -> Event:
+    data = {"alert": alert.id, "alert_kind": alert.kind, "evidence": list(alert.evidence)}
+    return Event(kind, time, frame_index, text, alert.objects, severity=severity, data=data)
+
+
+def _key(it: Alert | Concern) -> Key:
+    return it.kind, it.objects, it.key
+
+
+def _by_key(concerns: Iterable[Concern]) -> dict[Key, Concern]:
+    now: dict[Key, Concern] = {}
+    for concern in concerns:
+        held = now.get(_key(concern))
+        if held is None or concern.severity > held.severity:
+            now[_key(concern)] = concern
+    return now
+
+
+def _open(concern: Concern, time: float, number: int) -> Alert:
+    return Alert(
+        id=number,
+        kind=concern.kind,
+        severity=concern.severity,
+        opened=time,
+        updated=time,
+        objects=concern.objects,
+        cause=concern.cause,
+        evidence=concern.evidence,
+        key=concern.key,
+    )
+
+
+def _renew(alert: Alert, concern: Concern, time: float) -> Alert:
+    # The cause keeps its first wording, so that the narrative and the report tell one story.
+    severity = max(alert.severity, concern.severity)
+    return replace(alert, updated=time, severity=severity, evidence=concern.evidence)

@@ -1,0 +1,195 @@
+"""The cogitation-action cycle (paper, section 2; after CoCo), on one screen: `Agent.step`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from visup.agent.act import alert_events, faults, update_alerts
+from visup.agent.behaviour import Behaviour, Outcome, Thinker
+from visup.agent.mind import Mind
+from visup.agent.perceive import Slot, in_order, perceive
+from visup.agent.records import (
+    Alert,
+    Concern,
+    Directive,
+    Event,
+    Frame,
+    Observation,
+    Report,
+    Severity,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Thinkers:
+    """What reasons in an agent, by phase; within a phase in this order.
+
+    Attributes:
+        update: Percepts enter the mind.
+        cogitate: Relations and rules are evaluated, events derived.
+        match: Stages of tasks are matched and verified.
+    """
+
+    update: tuple[Thinker, ...] = ()
+    cogitate: tuple[Thinker, ...] = ()
+    match: tuple[Thinker, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """The whole record of one step.
+
+    Attributes:
+        frame_index: Number of the frame.
+        time: Seconds.
+        observation: What was perceived.
+        mind: The mind after the step.
+        events: What happened, in order.
+        alerts: Alerts that were opened or closed in this step.
+        directives: What is asked of behaviours in the next step.
+    """
+
+    frame_index: int
+    time: float
+    observation: Observation
+    mind: Mind
+    events: tuple[Event, ...] = ()
+    alerts: tuple[Alert, ...] = ()
+    directives: tuple[Directive, ...] = ()
+
+    @property
+    def reports(self) -> tuple[Report, ...]:
+        """What each behaviour did."""
+        return self.observation.reports
+
+
+Observer = Callable[[Step, Frame], None]
+"""Told of each step after it is over: journal, console, report. It cannot change the agent."""
+
+
+@dataclass(slots=True)
+class Agent:
+    """A mind with what perceives and reasons for it.
+
+    Two agents never meet: ids, time and state belong to the instance, and the same frames give the
+    same steps.
+
+    Attributes:
+        behaviours: What perceives.
+        thinkers: What reasons.
+        actors: Actor name -> model names, known before the first frame.
+        observers: Told of each step.
+        mind: The mental model now.
+    """
+
+    behaviours: Sequence[Behaviour] = ()
+    thinkers: Thinkers = field(default_factory=Thinkers)
+    actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    observers: Sequence[Observer] = ()
+    mind: Mind = field(init=False)
+    directives: tuple[Directive, ...] = field(default=(), init=False)
+    _slots: list[Slot] = field(init=False, repr=False)
+    _alerts_opened: int = field(default=0, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.mind = Mind(actors=MappingProxyType(dict(self.actors)))
+        self._slots = in_order(self.behaviours)
+
+    def step(self, frame: Frame) -> Step:
+        """Perceive, update, cogitate, match, act: one turn of the cycle.
+
+        Args:
+            frame: The next frame; its time must not be before that of the last one.
+
+        Returns:
+            The whole record of the step; `mind` has become `Step.mind`.
+        """
+        seen = perceive(self._slots, frame, self.directives)
+        thought = self._reason(seen)
+        step = self._act(seen, thought)
+        self.mind, self.directives = step.mind, step.directives
+        for observer in self.observers:
+            observer(step, frame)
+        return step
+
+    def run(
+        self, frames: Iterable[Frame], until: Callable[[Step], bool] | None = None
+    ) -> Step | None:
+        """Step over frames until they end or a condition holds.
+
+        Args:
+            frames: A source; it is left where the run stopped, so a further run goes on from there.
+            until: Looked at after each step.
+
+        Returns:
+            The last step, or None when there was no frame.
+        """
+        last = None
+        for last in self.steps(frames):
+            if until is not None and until(last):
+                break
+        return last
+
+    def steps(self, frames: Iterable[Frame]) -> Iterator[Step]:
+        """Each step over frames, one at a time."""
+        return (self.step(frame) for frame in frames)
+
+    def _reason(self, seen: Observation) -> Outcome:
+        """Update, cogitate, match: all or nothing."""
+        phases = (*self.thinkers.update, *self.thinkers.cogitate, *self.thinkers.match)
+        begin = replace(
+            self.mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+        )
+        outcome = Outcome(begin)
+        for thinker in phases:
+            try:
+                outcome = _joined(outcome, thinker(outcome.mind, seen))
+            except Exception as fault:
+                # The half-made mind is dropped: beliefs stay as they were and count as unknown.
+                return _fault(begin, seen, thinker, fault)
+        return outcome
+
+    def _act(self, seen: Observation, thought: Outcome) -> Step:
+        concerns = (*thought.concerns, *faults(seen))
+        alerts, opened, closed = update_alerts(
+            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1
+        )
+        self._alerts_opened += len(opened)
+        events = (*thought.events, *alert_events(opened, closed, seen.time, seen.frame_index))
+        return Step(
+            frame_index=seen.frame_index,
+            time=seen.time,
+            observation=seen,
+            mind=replace(thought.mind, alerts=alerts),
+            events=events,
+            alerts=(*opened, *closed),
+            directives=thought.directives,
+        )
+
+
+def _joined(so_far: Outcome, more: Outcome) -> Outcome:
+    return Outcome(
+        more.mind,
+        so_far.events + more.events,
+        so_far.concerns + more.concerns,
+        so_far.directives + more.directives,
+    )
+
+
+def _fault(mind: Mind, seen: Observation, thinker: Thinker, fault: Exception) -> Outcome:
+    name = getattr(thinker, "__name__", type(thinker).__name__)
+    concern = Concern(
+        "thinking_failed",
+        (),
+        Severity.CRITICAL,
+        f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",
+        (f"{type(fault).__name__}: {fault}",),
+        key=name,
+    )
+    held = tuple(
+        Concern(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key) for a in mind.alerts
+    )
+    unknown = frozenset(kind for r in seen.reports for kind in r.gives)
+    return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, concern))
