@@ -1,7 +1,7 @@
 """The journal: what happened in a run, in one SQLite file, written step by step.
 
-Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step up to
-the last one that was committed, and can be read while the run goes on.
+Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step
+up to the last one that was committed, and can be read while the run goes on.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ CREATE INDEX events_by_time ON events (time);
 
 
 class Journal:
-    """Writes a run as it goes. Give its `record` to an agent as an observer, and close it at the end.
+    """Writes a run as it goes: give its `record` to an agent as an observer, close it at the end.
 
     Args:
         path: The file; it must not exist yet.

@@ -1,8 +1,8 @@
 """The first phase of a step: the behaviours run on the frame, each contained.
 
 A behaviour that raises or breaks its contract never reaches the mind: its report says so, and what
-it gives is unobserved in that step. After three failures in a row it is suspended for a while, twice
-as long each time, so that a broken plug-in costs little and can still come back.
+it gives is unobserved in that step. After three failures in a row it is suspended for a while,
+twice as long each time, so that a broken plug-in costs little and can still come back.
 """
 
 from __future__ import annotations

@@ -13,10 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    # Only the types: records pass arrays on, so that importing them stays quick.
+    import numpy as np
+    from numpy.typing import NDArray
 
 EMPTY: Mapping[str, Any] = MappingProxyType({})
 
@@ -113,6 +115,8 @@ class Region:
         Returns:
             (height, width) bool.
         """
+        import numpy as np
+
         out = np.zeros((size[1], size[0]), dtype=bool)
         x, y, w, h = self.bbox
         out[y : y + h, x : x + w] = self.mask

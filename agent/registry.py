@@ -107,10 +107,8 @@ def from_file(path: Path) -> list[Behaviour]:
     if not path.is_file():
         raise BehaviourError("there is no such file", where=str(path), expected="a Python file")
     module = _module(path)
-    classes = [
-        c for c in _own_classes(module) if isinstance(getattr(c, "contract", None), Contract)
-    ]
-    if not classes:
+    offered = [c for c in _own_classes(module) if hasattr(c, "contract")]
+    if not offered:
         raise BehaviourError(
             "the file holds no behaviour",
             where=str(path),
