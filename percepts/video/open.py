@@ -1,0 +1,130 @@
+"""Opening whatever the user named as a source of frames."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+from visup.agent.errors import SettingsError, SourceError
+from visup.percepts.video.base import Source
+from visup.percepts.video.capture import (
+    Capture,
+    CaptureFactory,
+    announced_frames,
+    open_capture,
+)
+from visup.percepts.video.file import VideoFile, open_file
+from visup.percepts.video.folder import open_folder
+from visup.percepts.video.live import LiveSource
+
+URL = re.compile(r"^[a-z][a-z0-9+.-]+://", re.IGNORECASE)
+SCHEMES = ("rtsp", "rtsps", "rtmp", "http", "https", "udp", "tcp", "srt")
+
+
+def open_source(
+    source: str,
+    *,
+    every: int = 1,
+    fps: float | None = None,
+    factory: CaptureFactory = open_capture,
+) -> Source:
+    """Open a source of frames.
+
+    Args:
+        source: A video file, a folder of images (or a MOT or DAVIS sequence folder), the index of
+            a camera such as '0', or a URL (rtsp, http, ...).
+        every: Give only every n-th frame; frames keep their number and time in the source.
+        fps: Frames per second to assume in place of what the source says.
+        factory: What opens files, cameras and URLs.
+
+    Returns:
+        The source, its first frame decoded. Use it in a `with` statement.
+
+    Raises:
+        SourceError: It is missing, empty, unreadable, or not a video.
+        SettingsError: `every` is below 1 or `fps` is not a positive number.
+    """
+    _check(every, fps)
+    if not source.strip():
+        raise SourceError("no source was named", hint="name a video file or a folder of images")
+    if source.isdecimal():
+        return LiveSource(f"camera {source}", _camera(int(source), factory), every=every, fps=fps)
+    if URL.match(source):
+        return _open_url(source, every=every, fps=fps, factory=factory)
+    return _open_path(Path(source).expanduser(), every=every, fps=fps, factory=factory)
+
+
+def _check(every: int, fps: float | None) -> None:
+    if every < 1:
+        raise SettingsError(f"every {every} frames is not possible", expected="1 or more")
+    if fps is not None and not (math.isfinite(fps) and fps > 0):
+        raise SettingsError(f"{fps} frames per second are not possible", expected="more than 0")
+
+
+def _camera(camera: int | str, factory: CaptureFactory) -> Capture:
+    capture = factory(camera)
+    if not capture.isOpened():
+        raise SourceError(
+            "the camera cannot be opened",
+            where=f"camera {camera}" if isinstance(camera, int) else camera,
+            expected="a camera that is connected and free",
+            hint=f"to read a file or folder named {camera}, write ./{camera}"
+            if isinstance(camera, int)
+            else None,
+        )
+    return capture
+
+
+def _open_url(
+    url: str, *, every: int, fps: float | None, factory: CaptureFactory
+) -> VideoFile | LiveSource:
+    """A recording when the stream knows how many frames it has, else a live source."""
+    if url.split(":", 1)[0].lower() not in SCHEMES:
+        raise SourceError(
+            "this kind of URL cannot be read", where=url, expected=f"one of {', '.join(SCHEMES)}"
+        )
+    capture = factory(url)
+    if not capture.isOpened():
+        raise SourceError(
+            "the URL cannot be opened, or what it gives is not a video",
+            where=url,
+            expected="an address that delivers video",
+            hint="check the address and the network",
+        )
+    if announced_frames(capture):
+        return VideoFile(url, capture, every=every, fps=fps)
+    return LiveSource(url, capture, every=every, fps=fps)
+
+
+def _open_path(path: Path, *, every: int, fps: float | None, factory: CaptureFactory) -> Source:
+    try:
+        if path.is_dir():
+            return open_folder(path, every=every, fps=fps)
+        if path.is_char_device():
+            return LiveSource(str(path), _camera(str(path), factory), every=every, fps=fps)
+        regular, exists = path.is_file(), path.exists()
+    except (OSError, ValueError) as e:  # a name that is too long or has a NUL in it
+        raise SourceError("this is not a usable file name", where=str(path)) from e
+    if regular:
+        return open_file(path, every=every, fps=fps, factory=factory)
+    if exists:
+        raise SourceError("it is neither a file nor a folder", where=str(path))
+    raise SourceError(
+        "there is no such file or folder",
+        where=str(path),
+        expected="a video file, a folder of images, a camera index or a URL",
+        hint=_nearest(path),
+    )
+
+
+def _nearest(path: Path) -> str:
+    """The file of the same folder whose name comes closest, if one does."""
+    import difflib
+
+    try:
+        names = [p.name for p in path.parent.iterdir()]
+    except OSError:
+        return f"there is no folder {path.parent} that can be read"
+    close = difflib.get_close_matches(path.name, names, n=1)
+    return f"did you mean {path.parent / close[0]}?" if close else "check the name"
