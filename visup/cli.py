@@ -1,0 +1,70 @@
+"""The `visup` command. Heavy imports stay inside the commands, so that `--help` comes at once."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+import visup
+from visup.agent.errors import VisupError
+from visup.commands import doctor, evaluate, models, render, step, task, watch
+
+BAD_INPUT = 2
+
+app = typer.Typer(
+    name="visup",
+    help="The visual supervisor: it watches machines work and says in plain words whether it goes well.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("watch")(watch.watch)
+app.command("demo")(watch.demo)
+app.command("step")(step.step)
+app.command("render")(render.render)
+app.command("doctor")(doctor.doctor)
+app.add_typer(task.app, name="task", help="Check, show and list task files.")
+app.add_typer(models.app, name="models", help="Build, extend, list and query model databases.")
+app.add_typer(evaluate.app, name="eval", help="Compute figures against ground truth.")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"visup {visup.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """The visual supervisor: it watches machines work and says whether it goes well."""
+
+
+def main() -> None:
+    """Run the command; every error that is the user's to mend is one message and exit code 2."""
+    try:
+        app()
+    except VisupError as error:
+        _complain(str(error))
+        sys.exit(BAD_INPUT)
+    except BrokenPipeError:
+        # The reader (such as `head`) went away; nothing more can be said to it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _complain(message: str) -> None:
+    from rich.console import Console
+    from rich.text import Text
+
+    Console(stderr=True, soft_wrap=True).print(Text("error: ", style="bold red") + Text(message))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,174 @@
+"""`visup eval`: figures against ground truth, as tables and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+app = typer.Typer(no_args_is_help=True)
+
+Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
+Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]
+Limit = Annotated[
+    int | None, typer.Option(help="Frames (or shapes) of each item, for a quick look.")
+]
+
+MOTION_KEYS = ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
+SHAPE_KEYS = ("nn1", "rank_sum", "bullseye", "ms_shape", "ms_pair", "compared", "lost")
+MISSION_KEYS = (
+    "identity",
+    "event_precision",
+    "event_recall",
+    "event_f1",
+    "stage",
+    "failing_latency_s",
+    "alerts_found",
+    "alerts_expected",
+    "false_alerts",
+    "false_alerts_per_hour",
+    "verdicts_right",
+    "verdicts",
+    "verdict",
+    "view_deg",
+    "fps",
+)
+PUBLIC_MISSION_KEYS = frozenset(MISSION_KEYS) - {"verdict"}
+
+
+@app.command("motion")
+def motion(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
+    """Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time."""
+    from visup.evaluation.motion import evaluate_motion
+
+    _checked(folder, json_file)
+    with _told("seeing") as tell:
+        figures = evaluate_motion(folder, limit=limit, progress=tell)
+    _show("motion", folder, figures, MOTION_KEYS, json_file, {"limit": limit})
+
+
+@app.command("shapes")
+def shapes(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
+    """Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time."""
+    from visup.evaluation.shapes import evaluate_shapes
+
+    _checked(folder, json_file)
+    with _told("comparing") as tell:
+        figures = evaluate_shapes(folder, limit=limit, progress=tell)
+    _show("shapes", folder, figures, SHAPE_KEYS, json_file, {"limit": limit})
+
+
+@app.command("missions")
+def missions(
+    folder: Folder,
+    json_file: Json = None,
+    models: Annotated[Path | None, typer.Option(help="Model database.")] = None,
+    limit: Limit = None,
+) -> None:
+    """Whole missions: identity, events, stages, alerts, verdicts, speed."""
+    from visup.evaluation.missions import evaluate_missions
+
+    _checked(folder, json_file)
+    with _told("supervising") as tell:
+        figures = evaluate_missions(folder, models=models, limit=limit, progress=tell)
+    settings = {"limit": limit, "models": str(models) if models else None}
+    _show("missions", folder, figures, MISSION_KEYS, json_file, settings)
+
+
+def _checked(folder: Path, json_file: Path | None) -> None:
+    """Refuse what cannot work before an evaluation of minutes begins."""
+    from visup.agent.errors import OutputError, SettingsError
+
+    if not folder.is_dir():
+        raise SettingsError("there is no such folder", where=str(folder))
+    if json_file and not json_file.absolute().parent.is_dir():
+        raise OutputError("its folder does not exist", where=str(json_file))
+
+
+class _told:
+    """A line of progress on standard error, replaced as items are done."""
+
+    def __init__(self, word: str) -> None:
+        from rich.console import Console
+
+        self._status = Console(stderr=True).status(word)
+        self._word = word
+
+    def __enter__(self) -> _told:
+        self._status.start()
+        return self
+
+    def __call__(self, text: str) -> None:
+        self._status.update(f"{self._word}: {text}")
+
+    def __exit__(self, *_: object) -> None:
+        self._status.stop()
+
+
+def _show(
+    title: str,
+    folder: Path,
+    figures: Mapping[str, Any],
+    keys: tuple[str, ...],
+    json_file: Path | None,
+    settings: Mapping[str, Any],
+) -> None:
+    from rich.console import Console
+
+    from visup.evaluation.record import write_record
+
+    console = Console()
+    _print_table(console, f"{title}: {folder}", figures, keys)
+    if ranks := figures["total"].get("ranks"):
+        console.print("ranks 1 to 10: " + " ".join(str(r) for r in ranks))
+    if json_file:
+        write_record(json_file, figures, settings)
+
+
+def _print_table(
+    console: Console, title: str, figures: Mapping[str, Any], keys: tuple[str, ...]
+) -> None:
+    shown = [k for k in keys if any(k in row for row in _rows(figures).values())]
+    # Many columns are told as many rows: a table must be readable at 80 columns.
+    tall = len(shown) > 8 and len(figures["items"]) <= 8
+    console.print(_tall(title, figures, shown) if tall else _wide(title, figures, shown))
+
+
+def _rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    return {**figures["items"], "total": figures["total"]}
+
+
+def _wide(title: str, figures: Mapping[str, Any], keys: list[str]) -> Table:
+    from rich.table import Table
+
+    table = Table("", title=title, title_justify="left")
+    for key in keys:
+        table.add_column(key, justify="right")
+    for name, row in _rows(figures).items():
+        if name == "total":
+            table.add_section()
+        table.add_row(name, *(_cell(row.get(k)) for k in keys))
+    return table
+
+
+def _tall(title: str, figures: Mapping[str, Any], keys: list[str]) -> Table:
+    from rich.table import Table
+
+    table = Table("", title=title, title_justify="left")
+    for name in _rows(figures):
+        table.add_column(name, justify="right", overflow="fold")
+    for key in keys:
+        table.add_row(key, *(_cell(row.get(key)) for row in _rows(figures).values()))
+    return table
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.3f}" if isinstance(value, float) else str(value)

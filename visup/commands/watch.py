@@ -1,0 +1,191 @@
+"""`visup watch` and `visup demo`: supervise a video, tell the story, give the verdict."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import Console
+
+    from visup.run import Progress, RunResult
+    from visup.settings import WatchSettings
+
+Source = Annotated[str, typer.Argument(help="Video file, folder of images, camera index or URL.")]
+Tasks = Annotated[
+    list[str] | None, typer.Option("--task", help="Task file, or the name of a shipped task.")
+]
+Models = Annotated[Path | None, typer.Option(help="Model database (see `visup models build`).")]
+Rules = Annotated[list[Path] | None, typer.Option(help="Rules file, instead of the shipped rules.")]
+Actors = Annotated[
+    list[str] | None,
+    typer.Option("--actor", help="NAME=MODEL: what an actor of the task looks like."),
+]
+Every = Annotated[int, typer.Option(help="Use every n-th frame.")]
+Behaviours = Annotated[
+    list[Path] | None, typer.Option("--behaviour", help="Python file with a behaviour of your own.")
+]
+Plugins = Annotated[
+    list[str] | None, typer.Option("--plugin", help="Name of an installed behaviour to add.")
+]
+Fps = Annotated[float | None, typer.Option(help="Frame rate, where the source has none.")]
+Fov = Annotated[float | None, typer.Option(help="Vertical field of view of the camera, degrees.")]
+
+
+def settings_of(
+    source: str,
+    task: list[str] | None,
+    models: Path | None,
+    rules: list[Path] | None,
+    actor: list[str] | None,
+    every: int,
+    behaviour: list[Path] | None,
+    plugin: list[str] | None,
+    fps: float | None,
+    fov: float | None,
+) -> WatchSettings:
+    """The settings of a run, from the command's options."""
+    from visup.settings import WatchSettings, parse_actors
+
+    return WatchSettings(
+        source=source,
+        tasks=tuple(task or ()),
+        models=models,
+        rules=tuple(rules or ()),
+        actors=parse_actors(actor or ()),
+        behaviours=tuple(behaviour or ()),
+        plugins=tuple(plugin or ()),
+        every=every,
+        fps=fps,
+        fov_vertical_deg=fov,
+    )
+
+
+def watch(
+    source: Source,
+    task: Tasks = None,
+    models: Models = None,
+    rules: Rules = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder (default: runs/NAME).")] = None,
+    actor: Actors = None,
+    every: Every = 1,
+    behaviour: Behaviours = None,
+    plugin: Plugins = None,
+    fps: Fps = None,
+    fov: Fov = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Only the verdict.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Events as JSON, one a line.")] = False,
+    video: Annotated[bool, typer.Option(help="Write the annotated video.")] = True,
+) -> None:
+    """Watch a video and say whether the work goes well.
+
+    Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
+    """
+    settings = settings_of(source, task, models, rules, actor, every, behaviour, plugin, fps, fov)
+    result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, video=video)
+    raise typer.Exit(result.exit_code)
+
+
+def demo(
+    out: Annotated[Path | None, typer.Option(help="Run folder (default: demo-run).")] = None,
+    every: Every = 2,
+) -> None:
+    """Supervise the clip that ships with visup: an arm tries to capture a satellite, and fails."""
+    from visup.demo import demo_settings, free_folder
+
+    result = run_and_tell(demo_settings(every), out or free_folder(Path("demo-run")))
+    # The clip shows a failed capture: having seen that is the demo's success.
+    from visup.agent import Verdict
+
+    raise typer.Exit(0 if result.verdict is Verdict.FAILED else 1)
+
+
+def run_and_tell(
+    settings: WatchSettings,
+    out: Path | None,
+    *,
+    quiet: bool = False,
+    as_json: bool = False,
+    video: bool = True,
+) -> RunResult:
+    """Run, print the narrative as it goes and the verdict last."""
+    from rich.console import Console
+
+    from visup.narrative import Narrator
+    from visup.run import fresh_folder, supervise
+
+    console = Console(highlight=False)
+    folder = fresh_folder(out, settings.source)
+    narrator = Narrator(console, as_json)
+    silent = quiet or as_json
+    with _progress(console, shown=not silent) as progress:
+        result = supervise(
+            settings,
+            folder,
+            observers=() if quiet else (narrator,),
+            progress=progress,
+            video=video,
+        )
+    _tell_end(console, result, as_json=as_json)
+    return result
+
+
+@contextmanager
+def _progress(console: Console, *, shown: bool) -> Iterator[Progress]:
+    """A progress bar on a terminal; nothing where the output is not one."""
+    from rich import progress
+
+    bar = progress.Progress(
+        "watching",
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not (shown and console.is_terminal),
+    )
+    with bar:
+        task = bar.add_task("watching", total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _tell_end(console: Console, result: RunResult, *, as_json: bool) -> None:
+    if as_json:
+        import json
+
+        print(json.dumps(_as_json(result), sort_keys=True))
+        return
+    for text in _closing(result):
+        console.print(text, soft_wrap=True)
+
+
+def _as_json(result: RunResult) -> dict[str, object]:
+    return {
+        "kind": "result",
+        "verdict": result.verdict.value if result.verdict else None,
+        "frames": result.steps,
+        "problem": result.problem,
+        "folder": str(result.folder) if result.folder else None,
+        "report": str(result.report) if result.report else None,
+    }
+
+
+def _closing(result: RunResult) -> Iterator[str]:
+    from rich.markup import escape
+
+    from visup.narrative import verdict_line
+
+    if result.problem:
+        yield f"[yellow]The source: {escape(result.problem)}[/yellow]"
+    for note in result.notes:
+        yield f"[yellow]{escape(note)}[/yellow]"
+    if result.report:
+        yield f"Report:  {escape(str(result.report))}"
+    elif result.folder:
+        yield f"Run:     {escape(str(result.folder))}"
+    yield verdict_line(result.verdict)

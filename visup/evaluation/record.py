@@ -1,0 +1,44 @@
+"""The record of an evaluation on disk: version, settings, machine, figures."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import visup
+from visup.agent.encode import plain
+from visup.agent.errors import OutputError
+
+RECORD_VERSION = 1
+
+
+def write_record(path: Path, figures: Mapping[str, Any], settings: Mapping[str, Any]) -> None:
+    """Write figures with what is needed to compare them later.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    record = {
+        "version": RECORD_VERSION,
+        "settings": {"visup": visup.__version__, **settings},
+        "machine": machine(),
+        **figures,
+    }
+    try:
+        path.write_text(json.dumps(plain(record), indent=1) + "\n", encoding="utf-8")
+    except OSError as fault:
+        raise OutputError(f"cannot write: {fault.strerror}", where=str(path)) from fault
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were made on, without names of hosts or people."""
+    return {
+        "system": platform.system(),
+        "architecture": platform.machine(),
+        "python": platform.python_version(),
+        "cores": os.cpu_count(),
+    }

@@ -1,0 +1,69 @@
+"""What a run says on the terminal: one line for each event worth telling, and the verdict last."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.markup import escape
+
+from visup.agent import Event, Frame, Severity, Verdict
+from visup.agent.agent import Step
+from visup.agent.encode import event_line
+
+STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
+VERDICT_STYLE = {
+    Verdict.SUCCEEDED: "bold green",
+    Verdict.IN_PROGRESS: "bold cyan",
+    Verdict.FAILED: "bold red",
+    Verdict.INTERRUPTED: "bold yellow",
+    Verdict.UNKNOWN: "bold magenta",
+}
+VERDICT_TEXT = {
+    Verdict.SUCCEEDED: "the task went as it should",
+    Verdict.IN_PROGRESS: "the task was still under way at the end, and nothing was wrong",
+    Verdict.FAILED: "the task failed",
+    Verdict.INTERRUPTED: "something unsafe or unexpected came between",
+    Verdict.UNKNOWN: "the task could not be followed",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Narrator:
+    """Prints events as they come. Give it to an agent as an observer.
+
+    Attributes:
+        console: Where to.
+        as_json: One JSON object a line instead of sentences.
+    """
+
+    console: Console
+    as_json: bool = False
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Print the events of one step."""
+        for event in step.events:
+            self.tell(event)
+
+    def tell(self, event: Event) -> None:
+        """Print one event."""
+        if self.as_json:
+            print(json.dumps(event_line(event), ensure_ascii=False, sort_keys=True), flush=True)
+        else:
+            self.console.print(line(event), highlight=False, soft_wrap=False)
+
+
+def line(event: Event) -> str:
+    """One event as a line of rich markup: time, mark, sentence."""
+    style = STYLE[event.severity]
+    mark = {Severity.INFO: " ", Severity.WARNING: "!", Severity.CRITICAL: "‼"}[event.severity]
+    return f"[dim]{event.time:7.1f} s[/dim] [{style}]{mark} {escape(event.text)}[/{style}]"
+
+
+def verdict_line(verdict: Verdict | None) -> str:
+    """The verdict as a line of rich markup; None stands for a run without a task."""
+    if verdict is None:
+        return "Verdict: [bold green]nothing unsafe was seen[/bold green] (no task was given)"
+    style = VERDICT_STYLE[verdict]
+    return f"Verdict: [{style}]{verdict.value}[/{style}] ({VERDICT_TEXT[verdict]})"

@@ -1,0 +1,110 @@
+"""The wiring: an agent that sees, interprets and verifies, made from the settings of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from visup.agent import Behaviour, Mind, Severity, Verdict
+from visup.agent.agent import Agent, Observer, Thinkers
+from visup.agent.errors import SettingsError
+from visup.agent.registry import discover, from_file
+from visup.percepts.depth import DepthBehaviour
+from visup.percepts.health import HealthBehaviour
+from visup.percepts.motion.behaviour import MotionBehaviour
+from visup.percepts.shape.behaviour import ShapeBehaviour
+from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.video import Source, open_source
+from visup.rules import default_thinkers
+from visup.rules.language import load_rules
+from visup.settings import WatchSettings
+from visup.tasks import load_task
+from visup.tasks.supervise import finish, task_thinker
+
+if TYPE_CHECKING:
+    from visup.tasks.tree import Task
+
+__all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video"]
+
+
+def open_video(settings: WatchSettings) -> Source:
+    """The source of a run, opened.
+
+    Raises:
+        SourceError: It cannot be opened.
+    """
+    return open_source(settings.source, every=settings.every, fps=settings.fps)
+
+
+def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> Agent:
+    """An agent that supervises as the settings say.
+
+    Raises:
+        VisupError: A task, rules file, model database or behaviour is not as it should be, or an actor is
+            bound that no task has or to a model that the database lacks.
+    """
+    tasks = [task for name in settings.tasks for task in load_task(name)]
+    database = ModelDatabase.open(settings.models) if settings.models else None
+    _check_actors(settings, tasks, database)
+    return Agent(
+        behaviours=_behaviours(settings, database),
+        thinkers=_thinkers(settings, tasks),
+        actors=settings.actors,
+        observers=observers,
+    )
+
+
+def final_verdict(mind: Mind) -> Verdict:
+    """The verdict of a run that is over.
+
+    With tasks it is the gravest of theirs; without, a warning that is still open interrupts.
+    """
+    if mind.tasks:
+        return max((finish(t) for t in mind.tasks), key=_GRAVITY.index)
+    grave = any(a.severity >= Severity.WARNING for a in mind.alerts)
+    return Verdict.INTERRUPTED if grave else Verdict.SUCCEEDED
+
+
+_GRAVITY = (
+    Verdict.SUCCEEDED,
+    Verdict.IN_PROGRESS,
+    Verdict.UNKNOWN,
+    Verdict.FAILED,
+    Verdict.INTERRUPTED,
+)
+
+
+def _behaviours(settings: WatchSettings, database: ModelDatabase | None) -> list[Behaviour]:
+    seeing: list[Behaviour] = [HealthBehaviour(), MotionBehaviour()]
+    if database is not None:
+        seeing += [ShapeBehaviour(database), DepthBehaviour(database, settings.fov_vertical_deg)]
+    registry = discover() if settings.plugins else None
+    named = [registry.make(name) for name in settings.plugins] if registry else []
+    own = [b for path in settings.behaviours for b in from_file(path)]
+    return [*seeing, *named, *own]
+
+
+def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
+    rules = [rule for path in settings.rules for rule in load_rules(path)]
+    interpreting = default_thinkers(rules=rules or None)
+    match = (task_thinker(tasks),) if tasks else ()
+    return Thinkers(interpreting.update, interpreting.cogitate, match)
+
+
+def _check_actors(
+    settings: WatchSettings, tasks: Sequence[Task], database: ModelDatabase | None
+) -> None:
+    known = {actor for task in tasks for actor in task.actor_names()}
+    for actor, models in settings.actors.items():
+        if tasks and actor not in known:
+            raise SettingsError(
+                f"no task has an actor called '{actor}'",
+                expected=f"one of: {', '.join(sorted(known))}",
+            )
+        for model in models:
+            if database is not None and model not in database.names():
+                raise SettingsError(
+                    f"the actor '{actor}' stands for '{model}', which is not in the model database",
+                    where=str(settings.models),
+                    expected=f"one of: {', '.join(database.names())}",
+                )
