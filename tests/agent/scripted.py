@@ -1,0 +1,76 @@
+"""Scripted behaviours, frames and thinkers for tests of the cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import numpy as np
+
+from visup.agent import (
+    Concern,
+    Contract,
+    Directive,
+    Event,
+    Frame,
+    Mind,
+    Observation,
+    Outcome,
+    Percept,
+    Severity,
+)
+
+
+def frames(count: int, fps: float = 10.0) -> Iterator[Frame]:
+    for i in range(count):
+        yield Frame(i, i / fps, np.full((4, 6, 3), i % 256, np.uint8))
+
+
+class Scripted:
+    """A behaviour that runs a function of the frame's index."""
+
+    def __init__(
+        self,
+        name: str,
+        gives: tuple[str, ...],
+        says: Callable[[int], object] = lambda i: i,
+        needs: tuple[str, ...] = (),
+        every_s: float = 0.0,
+    ) -> None:
+        self.contract = Contract(name, gives, needs, every_s)
+        self.says = says
+        self.directives: list[tuple[Directive, ...]] = []
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        self.directives.append(tuple(directives))
+        value = self.says(frame.index)
+        return [Percept(self.contract.gives[0], value, frame.time, self.contract.name)]
+
+
+def counting(mind: Mind, seen: Observation) -> Outcome:
+    """Remembers how often it thought and tells an event each time."""
+    count = mind.memory.get("counting", 0) + 1
+    event = Event("counted", seen.time, seen.frame_index, f"I counted {count}.")
+    return Outcome(mind.remember("counting", count), (event,))
+
+
+def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation], Outcome]:
+    """A thinker with one concern while a predicate of time holds."""
+
+    def think(mind: Mind, seen: Observation) -> Outcome:
+        concern = Concern("worry", (1,), Severity.WARNING, "This is a worry.", ("because",))
+        return Outcome(mind, concerns=(concern,) if holds(seen.time) else ())
+
+    return think
+
+
+def exploding_at(index: int) -> Callable[[Mind, Observation], Outcome]:
+    """A thinker that raises at one frame, after having half-made a mind."""
+
+    def think(mind: Mind, seen: Observation) -> Outcome:
+        if seen.frame_index == index:
+            raise RuntimeError("the fuse blew")
+        return Outcome(mind.remember("exploding", seen.frame_index))
+
+    return think

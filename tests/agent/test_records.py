@@ -1,0 +1,35 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.agent import Coupling, Mind, Observation, Region, Relation, Report, ReportState, Truth
+
+
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(1, 4), st.integers(1, 4))
+def test_a_full_mask_holds_the_crop_in_its_place_and_nothing_else(
+    x: int, y: int, w: int, h: int
+) -> None:
+    crop = np.random.default_rng(x + 7 * y).random((h, w)) > 0.5
+    region = Region(1, (x, y, w, h), crop, np.zeros((0, 2), np.float32), (0, 0), float(crop.sum()))
+    full = region.full_mask((12, 10))
+    assert full.shape == (10, 12)
+    assert (full[y : y + h, x : x + w] == crop).all()
+    assert full.sum() == crop.sum()
+
+
+def test_seeing_nothing_differs_from_not_looking() -> None:
+    looked = Report("eye", ReportState.RAN, ("region",))
+    rested = Report("eye", ReportState.RESTED, ("region",))
+    assert Observation(0, 0.0, (1, 1), (looked,)).observed("region")
+    assert not Observation(0, 0.0, (1, 1), (rested,)).observed("region")
+
+
+def test_relations_and_couplings_are_found_whatever_the_order_of_objects() -> None:
+    relation = Relation("touching", (1, 2), Truth.TRUE, 0.0)
+    mind = Mind(relations=(relation,), couplings=(Coupling((1, 2), 0.0),))
+    assert mind.relation("touching", 2, 1) is relation
+    assert mind.relation("touching", 1, 3) is None
+    assert mind.coupled(2, 1)
+    assert not mind.coupled(1, 3)
