@@ -1,0 +1,58 @@
+"""`make bench`: every figure that shared data gives, in one run, with its commands."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+EVALUATIONS = (
+    ("shapes", "shapes/kimia99"),
+    ("shapes", "shapes/mpeg7-half"),
+    ("motion", "missions"),
+    ("motion", "video/davis"),
+    ("motion", "video/static"),
+    ("motion", "video/mot"),
+    ("missions", "missions"),
+)
+
+
+def main() -> int:
+    """Run the evaluations one after another; figures go to the terminal and to JSON files.
+
+    Returns:
+        0 when all ran, 1 when one did not, 0 with a reason when there is no data.
+    """
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    beside = Path.cwd().parent / "shared" / "data"
+    parser.add_argument("--data", type=Path, default=beside, help="folder with the data")
+    parser.add_argument("--out", type=Path, default=Path("runs/bench"), help="folder for JSON")
+    parser.add_argument("--only", help="only evaluations whose name contains this")
+    given = parser.parse_args()
+    if not given.data.is_dir():
+        print(f"no data at {given.data}: nothing to measure (see --data)")
+        return 0
+    given.out.mkdir(parents=True, exist_ok=True)
+    results = [
+        _run(kind, given.data / folder, given.out)
+        for kind, folder in EVALUATIONS
+        if (given.only or "") in f"{kind} {folder}" and (given.data / folder).is_dir()
+    ]
+    return int(any(results))
+
+
+def _run(kind: str, folder: Path, out: Path) -> int:
+    target = out / f"{kind}-{folder.name}.json"
+    print(f"== visup eval {kind} {folder.name}", flush=True)
+    begin = time.perf_counter()
+    # A process each, so that the timing of one is not coloured by what another left behind.
+    command = [sys.executable, "-m", "visup.cli", "eval", kind, str(folder), "--json", str(target)]
+    code = subprocess.run(command, check=False).returncode
+    print(f"   {time.perf_counter() - begin:.0f} s, exit code {code}", flush=True)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
