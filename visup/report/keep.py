@@ -1,0 +1,116 @@
+"""Containers that keep a whole run in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from visup.report.records import Span
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Thinned(Generic[T]):
+    """An evenly spaced selection of a stream of unknown length.
+
+    When it is full, every other item goes and from then on half as many are taken, so that between
+    half of `most` and `most` items stay, however long the stream is.
+
+    Attributes:
+        most: How many items may be kept, at least 2.
+    """
+
+    most: int
+    _stride: int = field(default=1, init=False)
+    _count: int = field(default=0, init=False)
+    _items: list[T] = field(default_factory=list, init=False)
+
+    def offer(self, make: Callable[[], T]) -> None:
+        """Count one more item of the stream; it is made only if it is to be kept."""
+        if self._count % self._stride == 0:
+            if len(self._items) >= self.most:
+                self._items = self._items[::2]
+                self._stride *= 2
+            if self._count % self._stride == 0:
+                self._items.append(make())
+        self._count += 1
+
+    def items(self) -> tuple[T, ...]:
+        """What was kept, in order."""
+        return tuple(self._items)
+
+
+@dataclass(slots=True)
+class SpanRecorder:
+    """Turns values that are told step by step into spans of time.
+
+    Attributes:
+        most: How many closed spans may be kept; later ones are then dropped.
+    """
+
+    most: int
+    _open: dict[tuple[str, ...], tuple[str, float]] = field(default_factory=dict, init=False)
+    _closed: list[Span] = field(default_factory=list, init=False)
+
+    def note(self, time: float, values: Mapping[tuple[str, ...], str]) -> None:
+        """Tell how everything is now; a subject that is not told has no value.
+
+        Args:
+            time: Seconds.
+            values: Subject -> how it is.
+        """
+        for subject, (value, start) in list(self._open.items()):
+            if values.get(subject) != value:
+                self._close(subject, value, start, time)
+                del self._open[subject]
+        for subject, value in values.items():
+            self._open.setdefault(subject, (value, time))
+
+    def spans(self, end: float) -> tuple[Span, ...]:
+        """All spans by subject and time; those still open end at `end`."""
+        still = [Span(s, v, start, end) for s, (v, start) in self._open.items()]
+        return tuple(sorted([*self._closed, *still], key=lambda s: (s.subject, s.start)))
+
+    def _close(self, subject: tuple[str, ...], value: str, start: float, end: float) -> None:
+        if len(self._closed) < self.most:
+            self._closed.append(Span(subject, value, start, end))
+
+
+@dataclass(slots=True)
+class Heaviest(Generic[T]):
+    """The items that matter most; among equals the earlier stay.
+
+    Attributes:
+        most: How many may be kept.
+        weight: How much an item matters.
+    """
+
+    most: int
+    weight: Callable[[T], int]
+    _items: list[T] = field(default_factory=list, init=False)
+
+    def has_room_for(self, weight: int) -> bool:
+        """Whether an item of this weight would be kept."""
+        return len(self._items) < self.most or weight > min(map(self.weight, self._items))
+
+    def add(self, item: T) -> None:
+        """Keep an item, at the cost of the lightest (the latest of those) when there is no room."""
+        self._items.append(item)
+        if len(self._items) > self.most:
+            lightest = min(map(self.weight, self._items))
+            last = max(i for i, x in enumerate(self._items) if self.weight(x) == lightest)
+            del self._items[last]
+
+    def items(self) -> tuple[T, ...]:
+        """What was kept, in the order in which it came."""
+        return tuple(self._items)
+
+
+def first_seen(items: list[T], key: Callable[[T], Hashable]) -> list[T]:
+    """The items without those whose key came before."""
+    seen: dict[Hashable, T] = {}
+    for item in items:
+        seen.setdefault(key(item), item)
+    return list(seen.values())

@@ -1,0 +1,117 @@
+"""The annotated video of a run, in a form that browsers play."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame
+from visup.agent.agent import Step
+from visup.agent.errors import OutputError
+from visup.percepts.video.quiet import quiet
+from visup.report.annotate import annotate
+
+MOST_WIDTH = 960
+FOURCC = "VP80"
+
+
+class VideoWriter:
+    """Writes pictures as WebM with VP8, which every browser plays.
+
+    The first picture fixes the size, at most 960 pixels wide; the file appears with it.
+
+    Args:
+        path: The file to write, `.webm`.
+        fps: Frames per second to play, more than 0.
+    """
+
+    def __init__(self, path: Path, fps: float) -> None:
+        self.path = path
+        self.fps = fps
+        self._size: tuple[int, int] | None = None
+        self._writer: cv2.VideoWriter | None = None
+
+    def write(self, image: NDArray[np.uint8]) -> None:
+        """Write one picture; it is resized to the size of the first.
+
+        Args:
+            image: (H, W, 3) uint8 BGR.
+
+        Raises:
+            OutputError: The file cannot be written.
+        """
+        if self._writer is None:
+            self._size = playable_size(image.shape[1], image.shape[0])
+            self._writer = self._opened(self._size)
+        if self._size is not None and (image.shape[1], image.shape[0]) != self._size:
+            image = np.asarray(
+                cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), np.uint8
+            )
+        self._writer.write(image)
+
+    def close(self) -> None:
+        """Finish the file; without a frame there is none."""
+        if self._writer is not None:
+            self._writer.release()
+            self._writer = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _opened(self, size: tuple[int, int]) -> cv2.VideoWriter:
+        # FFmpeg picks the tag of the container by itself and says so on standard error.
+        with quiet():
+            code = cv2.VideoWriter.fourcc(*FOURCC)
+            writer = cv2.VideoWriter(str(self.path), cv2.CAP_FFMPEG, code, self.fps, size)
+        if not writer.isOpened():
+            raise OutputError(
+                "the annotated video cannot be written",
+                where=str(self.path),
+                expected="a folder that exists and is writable, and an OpenCV with FFmpeg and VP8",
+                hint="run `visup doctor` to see what is installed",
+            )
+        return writer
+
+
+class AnnotatedVideo(VideoWriter):
+    """Writes each frame with what is believed drawn over it. Give its `add` to an agent as an observer.
+
+    Args:
+        path: The file to write, `.webm`.
+        fps: Frames per second to play: those of the source divided by `every`.
+    """
+
+    def add(self, step: Step, frame: Frame) -> None:
+        """Write one frame as it was understood.
+
+        Raises:
+            OutputError: The file cannot be written.
+        """
+        self.write(annotate(frame.image, step.mind))
+
+
+def playable_size(width: int, height: int) -> tuple[int, int]:
+    """The size of the video: at most 960 wide, proportions kept, both sides even and at least 16.
+
+    Args:
+        width: Of the frames, pixels.
+        height: Of the frames, pixels.
+
+    Returns:
+        (width, height), pixels.
+    """
+    scale = min(1.0, MOST_WIDTH / width)
+    return max(16, round(width * scale / 2) * 2), max(16, round(height * scale / 2) * 2)
