@@ -18,7 +18,7 @@ from visup.narrative import line
 Predicate = Callable[[Step], bool]
 HELP = """\
 step [N]          one step, or N
-run [until WHAT]  until an event of kind WHAT, a stage, a time such as 12.5, or the end
+run [until WHAT]  until an event of kind WHAT, a stage, a time (12.5), the end
 objects           who is there, with their most likely identities
 candidates ID     all identities that object ID may have
 relations [ID]    what holds between objects
