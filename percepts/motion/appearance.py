@@ -1,0 +1,37 @@
+"""Appearance: how well a tone fits what each label has looked like, from smoothed histograms."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from visup.percepts.motion.image import Floats
+from visup.percepts.motion.superpixels import Superpixels
+
+BINS = 16
+
+
+def appearance(cells: Superpixels, prior: Floats, least: float = 12.0) -> Floats:
+    """Likelihood of each superpixel's tone under each label.
+
+    Args:
+        cells: The superpixels.
+        prior: (count, K) float32 label shares; label 0 is the background, the last is unknown.
+        least: Cells that a label must have for its histogram to be trusted.
+
+    Returns:
+        (count, K) float32, normalised over labels; even where a label is too small to tell.
+    """
+    bins = np.minimum((cells.tone / (256 / BINS)).astype(np.int64), BINS - 1)
+    code = (bins[:, 0] * BINS + bins[:, 1]) * BINS + bins[:, 2]
+    out = np.zeros_like(prior)
+    even = np.full(cells.count, 1.0 / BINS, dtype=np.float32)
+    for k in range(prior.shape[1]):
+        size = float(prior[:, k].sum())
+        if size < least:
+            out[:, k] = even
+            continue
+        histogram = np.bincount(code, weights=prior[:, k], minlength=BINS**3)
+        smooth = gaussian_filter(histogram.reshape(BINS, BINS, BINS), 0.8, mode="nearest").ravel()
+        out[:, k] = smooth[code] / size + 0.002
+    return np.asarray(out / out.sum(axis=1, keepdims=True), dtype=np.float32)

@@ -1,0 +1,213 @@
+"""Sparse motion constraints: how points moved, and how surely, along each direction.
+
+A corner fixes both components of its motion, an edge only the one across it (the aperture
+problem). Both are carried in one form: a displacement with a 2 x 2 information matrix, whose
+small eigenvalue says along which direction nothing is known (paper, section 3; Chung, MacLean and
+Dickinson). Points are taken only where the image has structure, because dense flow invents motion
+in a dark sky.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.image import Floats, WorkImage
+
+Ints = NDArray[np.int64]
+WINDOW = 11
+FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Where motion can be measured in the newest image.
+
+    Attributes:
+        xy: (N, 2) float32 positions.
+        tensor: (N, 3) float32 structure tensor (xx, xy, yy) summed over the window.
+        normal: (N, 2) float32 unit gradient.
+    """
+
+    xy: Floats
+    tensor: Floats
+    normal: Floats
+
+    def __len__(self) -> int:
+        return len(self.xy)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Constraints:
+    """Measured motions of points over one baseline.
+
+    Attributes:
+        lag: Baseline in frames.
+        span_s: Baseline in seconds.
+        index: (N,) int64, which of the points.
+        xy: (N, 2) float32 positions in the newest image.
+        moved: (N, 2) float32 displacement from the old image to the newest, pixels.
+        information: (N, 3) float32 inverse covariance (xx, xy, yy), per square pixel.
+    """
+
+    lag: int
+    span_s: float
+    index: Ints
+    xy: Floats
+    moved: Floats
+    information: Floats
+
+    def __len__(self) -> int:
+        return len(self.xy)
+
+
+def find_points(image: WorkImage, cell: int, noise: float, most: int = 2500) -> Points:
+    """The strongest gradient of each cell, where it stands out of the noise.
+
+    Args:
+        image: The working image.
+        cell: Size of a cell, pixels.
+        noise: Standard deviation of grey values.
+        most: Most points to return; the strongest are kept.
+
+    Returns:
+        Points, in scan order.
+    """
+    strength = image.gx**2 + image.gy**2
+    margin = 3
+    strength[:margin] = strength[-margin:] = 0
+    strength[:, :margin] = strength[:, -margin:] = 0
+    rows, cols = image.shape[0] // cell, image.shape[1] // cell
+    cells = strength[: rows * cell, : cols * cell].reshape(rows, cell, cols, cell)
+    flat = cells.transpose(0, 2, 1, 3).reshape(rows * cols, cell * cell)
+    best = flat.argmax(axis=1)
+    value = flat[np.arange(len(flat)), best]
+    keep = np.flatnonzero(value > (1.5 * noise) ** 2)
+    if len(keep) > most:
+        keep = np.sort(keep[np.argsort(-value[keep], kind="stable")[:most]])
+    y = (keep // cols) * cell + best[keep] // cell
+    x = (keep % cols) * cell + best[keep] % cell
+    size = (WINDOW, WINDOW)
+    products = (image.gx * image.gx, image.gx * image.gy, image.gy * image.gy)
+    sums = [cv2.boxFilter(p, -1, size, normalize=False)[y, x] for p in products]
+    gradient = np.stack([image.gx[y, x], image.gy[y, x]], axis=1)
+    normal = gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-6)
+    xy = np.stack([x, y], axis=1).astype(np.float32)
+    return Points(xy, np.stack(sums, axis=1).astype(np.float32), normal.astype(np.float32))
+
+
+def information_of(tensor: Floats, sigma: Floats, floor: float) -> Floats:
+    """Inverse covariance of displacements measured with these structure tensors.
+
+    Args:
+        tensor: (N, 3) float32 (xx, xy, yy).
+        sigma: (N,) float32 error of grey values.
+        floor: Least standard deviation of a displacement, pixels.
+
+    Returns:
+        (N, 3) float32 (xx, xy, yy); nearly singular along an edge.
+    """
+    xx, xy, yy = tensor.T.astype(np.float64)
+    mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    variance = np.asarray(sigma, dtype=np.float64) ** 2
+    strong = 1 / (variance / np.maximum(mean + half, 1e-6) + floor**2)
+    weak = 1 / (variance / np.maximum(mean - half, 1e-6) + floor**2)
+    c, s = np.cos(angle), np.sin(angle)
+    parts = (
+        strong * c * c + weak * s * s,
+        (strong - weak) * c * s,
+        strong * s * s + weak * c * c,
+    )
+    return np.stack(parts, axis=1).astype(np.float32)
+
+
+def mahalanobis(error: Floats, information: Floats) -> Floats:
+    """Squared Mahalanobis length of (N, 2) errors under (N, 3) information; (N,) float32."""
+    dx, dy = error[:, 0], error[:, 1]
+    a, b, c = information[:, 0], information[:, 1], information[:, 2]
+    return np.asarray(a * dx * dx + 2 * b * dx * dy + c * dy * dy, dtype=np.float32)
+
+
+def from_flow(
+    points: Points, flow: Floats, old: WorkImage, new: WorkImage, noise: float
+) -> Constraints:
+    """Constraints over one frame, read from a dense flow field where there is structure.
+
+    Args:
+        points: Points of the newest image.
+        flow: (h, w, 2) float32, from the newest image back to the old one.
+        old: The image before.
+        new: The newest image.
+        noise: Standard deviation of grey values.
+
+    Returns:
+        Constraints; points that left the image or whose grey value did not fit are left out.
+    """
+    x, y = points.xy.astype(np.int64).T
+    back = flow[y, x]
+    target = points.xy + back
+    height, width = new.shape
+    inside = (target >= 0).all(1) & (target[:, 0] < width - 1) & (target[:, 1] < height - 1)
+    there = cv2.remap(old.grey, target[:, None].astype(np.float32), None, cv2.INTER_LINEAR)
+    misfit = np.abs(there.ravel().astype(np.float32) - new.grey[y, x].astype(np.float32))
+    keep = np.flatnonzero(inside & (misfit < 6 * noise + 20))
+    sigma = np.maximum(3 * noise, misfit[keep]).astype(np.float32)
+    information = information_of(points.tensor[keep], sigma, 2 * FLOOR)
+    span = new.time - old.time
+    return Constraints(1, span, keep, points.xy[keep], -back[keep], information)
+
+
+def track(
+    points: Points, guess: Floats, old: WorkImage, new: WorkImage, lag: int, noise: float
+) -> Constraints:
+    """Constraints over a longer baseline, each point checked forward and backward.
+
+    Args:
+        points: Points of the newest image.
+        guess: (N, 2) float32, where each is expected in the old image.
+        old: The older image.
+        new: The newest image.
+        lag: Frames between them.
+        noise: Standard deviation of grey values.
+
+    Returns:
+        Constraints of the points that were found again.
+    """
+    if not len(points):
+        return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_nothing())
+    options = {"winSize": (WINDOW, WINDOW), "maxLevel": 2, "minEigThreshold": 1e-5}
+    initial = cv2.OPTFLOW_USE_INITIAL_FLOW
+    start = points.xy.reshape(-1, 1, 2).copy()
+    there, found, misfit = cv2.calcOpticalFlowPyrLK(
+        new.grey,
+        old.grey,
+        start,
+        guess.astype(np.float32).reshape(-1, 1, 2).copy(),
+        flags=initial,
+        **options,
+    )
+    home, back, _ = cv2.calcOpticalFlowPyrLK(
+        old.grey, new.grey, there, start.copy(), flags=initial, **options
+    )
+    ok = (found.ravel() > 0) & (back.ravel() > 0)
+    energy = (points.tensor[:, 0] + points.tensor[:, 2]) / WINDOW**2
+    wrong = np.asarray(misfit, dtype=np.float32).ravel()
+    ok &= wrong < 3 * noise + 0.7 * np.sqrt(energy)
+    sigma = np.maximum(1.5 * noise, wrong).astype(np.float32)
+    information = information_of(points.tensor, sigma, FLOOR)
+    ok &= mahalanobis(home[:, 0] - points.xy, information) < 16.0
+    keep = np.flatnonzero(ok)
+    moved = points.xy[keep] - there[keep, 0]
+    return Constraints(lag, new.time - old.time, keep, points.xy[keep], moved, information[keep])
+
+
+def _nothing() -> tuple[Floats, Floats, Floats]:
+    return (
+        np.zeros((0, 2), np.float32),
+        np.zeros((0, 2), np.float32),
+        np.zeros((0, 3), np.float32),
+    )
