@@ -1,0 +1,114 @@
+"""Relative depth from size: how far a region must be for its model to look that big.
+
+The paper compares the area of a region with the dimensions of the model that it is believed to be
+(section 7.4). With a focal length of f pixels, a silhouette of `real` model units squared at depth d covers
+``real * (f / d) ** 2`` pixels. An error in the field of view scales all depths alike, so that nearer and
+farther, approaching and receding remain right.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from visup.agent.behaviour import Contract
+from visup.agent.errors import SettingsError
+from visup.agent.records import Depth, Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.percepts.shape.database import ModelDatabase
+
+FOV_VERTICAL_DEG = 40.0
+"""Vertical field of view assumed when none is told."""
+
+NEAR_BEST = 0.08
+"""Views less similar than the best by more than this say nothing about size."""
+
+LEAST_RELATIVE_SIGMA = 0.03
+"""Even a perfect match has its area from a finite set of views and a pixel grid."""
+
+
+class DepthBehaviour:
+    """Reports the depth of each whole region under each identity that it may have.
+
+    Args:
+        database: Tells the real area of views whose hypotheses carry no scale; may be None.
+        fov_vertical_deg: Vertical field of view, degrees; 40 is assumed when None.
+
+    Raises:
+        SettingsError: The field of view is not between 0 and 180 degrees.
+    """
+
+    contract = Contract("depth", gives=("depth",), needs=("region", "hypothesis"))
+
+    def __init__(
+        self, database: ModelDatabase | None = None, fov_vertical_deg: float | None = None
+    ) -> None:
+        self.fov_vertical_deg = FOV_VERTICAL_DEG if fov_vertical_deg is None else fov_vertical_deg
+        if not 0.0 < self.fov_vertical_deg < 180.0:
+            raise SettingsError(
+                f"the vertical field of view is {self.fov_vertical_deg:g} degrees",
+                expected="more than 0 and less than 180",
+            )
+        views = database.views if database is not None else ()
+        self._areas = {(v.name, v.number): v.area for v in views if v.area is not None}
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """One depth for each region that the border does not cut and each name it may have."""
+        focal = focal_px(frame.size[1], self.fov_vertical_deg)
+        hypotheses: tuple[Hypothesis, ...] = seen.of("hypothesis")
+        for region in seen.of("region"):
+            if not region.cut and region.area > 0:
+                own = [h for h in hypotheses if h.region_id == region.id]
+                for depth in region_depths(region, own, focal, self._areas):
+                    yield Percept("depth", depth, frame.time, self.contract.name)
+
+
+def focal_px(height: int, fov_vertical_deg: float) -> float:
+    """Focal length in pixels of an image of that height with that vertical field of view.
+
+    Example:
+        >>> focal_px(480, 90.0)
+        240.0
+    """
+    return round(height / 2 / math.tan(math.radians(fov_vertical_deg) / 2), 9)
+
+
+def region_depths(
+    region: Region,
+    hypotheses: Sequence[Hypothesis],
+    focal: float,
+    areas: Mapping[tuple[str, int], float],
+) -> list[Depth]:
+    """Depths of one region, one for each name whose size is known.
+
+    Args:
+        region: The region, whole.
+        hypotheses: What it may be.
+        focal: Focal length, pixels.
+        areas: (name, view) -> real area, model units squared.
+
+    Returns:
+        In the order in which the names first appear. Sigma joins how the best views of a name disagree
+        on size, weighted by similarity, with what the best one leaves unexplained.
+    """
+    by_name: dict[str, list[tuple[float, float]]] = {}
+    for h in hypotheses:
+        scale = h.scale if h.scale is not None else _scale(region, areas.get((h.name, h.view)))
+        if scale is not None and scale > 0:
+            by_name.setdefault(h.name, []).append((h.similarity, focal / scale))
+    return [_depth(region.id, name, found) for name, found in by_name.items()]
+
+
+def _scale(region: Region, area: float | None) -> float | None:
+    return None if area is None else math.sqrt(region.area / area)
+
+
+def _depth(region_id: int, name: str, found: Sequence[tuple[float, float]]) -> Depth:
+    """The depth that the best view gives, and how sure it is; `found` holds (similarity, depth)."""
+    best, depth = max(found)
+    near = [(s, d) for s, d in found if s >= best - NEAR_BEST]
+    total = sum(s for s, _ in near)
+    spread = math.sqrt(sum(s * (d - depth) ** 2 for s, d in near) / total) if total > 0 else 0.0
+    relative = LEAST_RELATIVE_SIGMA + 0.2 * (1 - best)
+    return Depth(region_id, name, depth, math.hypot(spread, relative * depth))

@@ -1,0 +1,210 @@
+"""The shape behaviour: what each region may be, by its silhouette (paper, sections 4 and 5).
+
+It matches every region against the database, but not in every frame: a region whose silhouette hardly
+changed, or that was matched a moment ago, keeps its hypotheses; and no frame pays for more than a few
+matches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.behaviour import Contract
+from visup.agent.records import Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.percepts.shape.database import ModelDatabase, ViewMatch
+from visup.percepts.shape.silhouette import normalise
+
+_THUMB = 48
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSettings:
+    """How regions are matched.
+
+    Attributes:
+        threshold: Similarity above which a view is a hypothesis.
+        most: Hypotheses for each region at most.
+        per_name: Of these, views of one model at most.
+        every_s: Least seconds of video between two matches of a region.
+        renew_s: Seconds after which even an unchanged silhouette is matched again.
+        unchanged: Overlap (IoU) with the silhouette last matched above which it counts as unchanged.
+        matches_per_frame: Regions matched in one frame at most; the others wait their turn.
+        budget: Share of the database's views that one match may compare in full.
+    """
+
+    threshold: float = 0.4
+    most: int = 8
+    per_name: int = 3
+    every_s: float = 0.2
+    renew_s: float = 2.0
+    unchanged: float = 0.97
+    matches_per_frame: int = 2
+    budget: float = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Remembered:
+    """What a region looked like when it was last matched, and what came of it."""
+
+    time: float
+    thumb: NDArray[np.bool_]
+    aspect: float
+    cut: bool
+    restrict: frozenset[str] | None
+    hypotheses: tuple[Hypothesis, ...]
+    areas: tuple[float | None, ...]
+
+    def told(self, region: Region) -> Iterable[Hypothesis]:
+        """The hypotheses with the scale that the region has now."""
+        for hypothesis, area in zip(self.hypotheses, self.areas, strict=True):
+            yield _scaled(hypothesis, area, region)
+
+
+class ShapeBehaviour:
+    """Reports which views of which models each region looks like.
+
+    Args:
+        database: The models; without it nothing is ever reported.
+        settings: How regions are matched.
+    """
+
+    contract = Contract("shape", gives=("hypothesis",), needs=("region",))
+
+    def __init__(
+        self, database: ModelDatabase | None = None, settings: ShapeSettings | None = None
+    ) -> None:
+        self.database = database
+        self.settings = settings or ShapeSettings()
+        self._remembered: dict[int, _Remembered] = {}
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Hypotheses for all regions of a frame, the best of each region first.
+
+        Args:
+            frame: The frame; only its time is used.
+            seen: Holds the regions.
+            directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
+                (data: names) has these compared whatever the index says.
+        """
+        if self.database is None:
+            return []
+        regions: tuple[Region, ...] = seen.of("region")
+        restrict, first = _wishes(directives)
+        here = {r.id for r in regions}
+        self._remembered = {k: v for k, v in self._remembered.items() if k in here}
+        for region in self._due(regions, frame.time, restrict):
+            self._remembered[region.id] = self._match(
+                self.database, region, frame.time, restrict, first
+            )
+        return [
+            Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
+            for r in regions
+            if r.id in self._remembered
+            for h in self._remembered[r.id].told(r)
+        ]
+
+    def _due(
+        self, regions: Sequence[Region], time: float, restrict: frozenset[str] | None
+    ) -> list[Region]:
+        """Regions to be matched now: those never matched first, then those matched longest ago."""
+        due = [r for r in regions if self._is_due(r, time, restrict)]
+        last = {k: v.time for k, v in self._remembered.items()}
+        due.sort(key=lambda r: (last.get(r.id, -np.inf), r.id))
+        return due[: self.settings.matches_per_frame]
+
+    def _is_due(self, region: Region, time: float, restrict: frozenset[str] | None) -> bool:
+        old = self._remembered.get(region.id)
+        if old is None or old.restrict != restrict or time < old.time:
+            return True
+        since = time - old.time
+        if since < self.settings.every_s - 1e-6:
+            return False
+        return since >= self.settings.renew_s or not self._unchanged(old, region)
+
+    def _unchanged(self, old: _Remembered, region: Region) -> bool:
+        stretch = _aspect(region) / old.aspect
+        if (
+            old.cut != region.cut
+            or not self.settings.unchanged < stretch < 1 / self.settings.unchanged
+        ):
+            return False
+        thumb = _thumb(region)
+        either = np.count_nonzero(thumb | old.thumb)
+        return bool(np.count_nonzero(thumb & old.thumb) >= self.settings.unchanged * either)
+
+    def _match(
+        self,
+        database: ModelDatabase,
+        region: Region,
+        time: float,
+        restrict: frozenset[str] | None,
+        first: Collection[str],
+    ) -> _Remembered:
+        silhouette = normalise(region.mask, cut=region.cut)
+        found: tuple[ViewMatch, ...] = ()
+        if silhouette is not None:
+            found = database.query(
+                silhouette,
+                top=self.settings.most,
+                per_name=self.settings.per_name,
+                threshold=self.settings.threshold,
+                restrict=restrict,
+                try_first=first,
+                budget=self.settings.budget,
+            ).matches
+        return _Remembered(
+            time=time,
+            thumb=_thumb(region),
+            aspect=_aspect(region),
+            cut=region.cut,
+            restrict=restrict,
+            hypotheses=tuple(_hypothesis(region, m) for m in found),
+            areas=tuple(m.view.area for m in found),
+        )
+
+
+def _aspect(region: Region) -> float:
+    return region.bbox[2] / region.bbox[3]
+
+
+def _thumb(region: Region) -> NDArray[np.bool_]:
+    """The region's mask stretched over a small square: what it looks like, whatever its size."""
+    small = cv2.resize(
+        region.mask.astype(np.uint8) * np.uint8(255), (_THUMB, _THUMB), interpolation=cv2.INTER_AREA
+    )
+    return np.asarray(small > 127)
+
+
+def _wishes(directives: Sequence[Directive]) -> tuple[frozenset[str] | None, frozenset[str]]:
+    """Names that alone are to be considered (None for all), and names to be tried first."""
+    restrict = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "restrict"]
+    first = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "try_first"]
+    only = frozenset().union(*restrict) if restrict else None
+    return only, frozenset().union(*first)
+
+
+def _hypothesis(region: Region, match: ViewMatch) -> Hypothesis:
+    """What a match says of a region; its scale is added for each frame, from the region's size then."""
+    view = match.view
+    return Hypothesis(
+        region_id=region.id,
+        name=view.name,
+        view=view.number,
+        similarity=match.similarity,
+        rotation=match.rotation,
+        direction=view.direction,
+    )
+
+
+def _scaled(hypothesis: Hypothesis, area: float | None, region: Region) -> Hypothesis:
+    """With region pixels per model unit; unknown where the border hides part of the area."""
+    if area is None or region.cut:
+        return hypothesis
+    return replace(hypothesis, scale=float((region.area / area) ** 0.5))

@@ -1,0 +1,187 @@
+"""Matching two shock graphs: which part of one is which part of the other.
+
+After figure 3 of the paper (Shokoufandeh et al. 2005): every node of the one graph is compared with every
+node of the other, by what it looks like and by its topological signature; a maximum-cardinality,
+best-weight bipartite matching is found; its best pair is taken for true; the graphs are split at that
+pair, so that what hangs below one node may only match what hangs below the other; and so on.
+
+Node features are embedded such that the similarity of two nodes is exp(-|a - b|^2): one matrix product
+compares a silhouette with a whole database.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from visup.percepts.shape.shock_graph import ShockGraph
+
+
+@dataclass(frozen=True, slots=True)
+class MatchWeights:
+    """How much each feature of a node counts when two nodes are compared.
+
+    Attributes:
+        kind: Different kinds of shock.
+        mass: Square root of the share of the area.
+        length: Square root of the length along the skeleton.
+        profile: Square roots of the radii along the node.
+        context: What the shape looks like from the node.
+        signature: Topology of what hangs below.
+        root: Share of the similarity that the root has: the shape as a whole.
+    """
+
+    kind: float = 0.25
+    mass: float = 1.2
+    length: float = 0.8
+    profile: float = 2.5
+    context: float = 2.0
+    signature: float = 0.08
+    root: float = 0.3
+
+
+WEIGHTS = MatchWeights()
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """What two graphs have in common.
+
+    Attributes:
+        similarity: 0 to 1; 1 for equal graphs.
+        pairs: (node of the first, node of the second, similarity of the two) in the order found.
+    """
+
+    similarity: float
+    pairs: tuple[tuple[int, int, float], ...]
+
+
+def embed(graph: ShockGraph, weights: MatchWeights = WEIGHTS) -> NDArray[np.float32]:
+    """Nodes as points: their similarity is exp(-squared distance).
+
+    Returns:
+        (N, D) float32.
+    """
+    kind = np.eye(5, dtype=np.float32)[graph.kinds] * weights.kind
+    mass = np.sqrt(graph.weights)[:, None] * weights.mass
+    length = np.sqrt(graph.lengths)[:, None] * weights.length
+    scale = weights.profile / graph.profiles.shape[1] ** 0.5
+    profile = np.sqrt(graph.profiles) * scale
+    context = np.sqrt(_blurred(graph.contexts)) * weights.context
+    signature = graph.signatures * weights.signature
+    return np.hstack([kind, mass, length, profile, context, signature]).astype(np.float32)
+
+
+def _blurred(contexts: NDArray[np.float32]) -> NDArray[np.float32]:
+    return contexts
+
+
+def node_similarities(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Similarity of every node of one embedding with every node of another; (N, M) in (0, 1]."""
+    squares = (a**2).sum(axis=1)[:, None] - 2 * (a @ b.T) + (b**2).sum(axis=1)[None]
+    return np.asarray(np.exp(-np.maximum(squares, 0.0)), dtype=np.float32)
+
+
+def match(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) -> Match:
+    """Match two graphs.
+
+    Args:
+        a: The first graph.
+        b: The second graph.
+        weights: How much each feature counts.
+
+    Returns:
+        The similarity, the same whichever comes first, and the corresponding nodes.
+    """
+    if b.key < a.key:
+        turned = match(b, a, weights)
+        return Match(turned.similarity, tuple((v, u, s) for u, v, s in turned.pairs))
+    similar = node_similarities(embed(a, weights), embed(b, weights))
+    return match_nodes(a, b, similar, weights.root)
+
+
+def match_nodes(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> Match:
+    """Match two graphs whose nodes are compared already.
+
+    Args:
+        a: The first graph, N nodes.
+        b: The second graph, M nodes.
+        similar: (N, M), similarity of each pair of nodes.
+        root: Share of the similarity that the root has.
+
+    Returns:
+        The match. Each pair counts by the mean of its two nodes' shares of the area.
+    """
+    shares = 0.5 * (a.weights[:, None] + b.weights[None]) * similar
+    pairs = correspond(a.below, b.below, shares)
+    whole = float(similar[0, 0])
+    total = float(sum(shares[u, v] for u, v in pairs))
+    found = ((0, 0, whole), *((u, v, float(similar[u, v])) for u, v in pairs))
+    return Match(min(1.0, root * whole + (1 - root) * total), found)
+
+
+def correspond(
+    below_a: NDArray[np.bool_], below_b: NDArray[np.bool_], value: NDArray[np.float32]
+) -> list[tuple[int, int]]:
+    """Corresponding nodes by recursive bipartite matching; roots (node 0) are left out.
+
+    The matching is solved anew only when a split forbids a pair of it: what is left of a best matching
+    whose pairs are all still allowed is a best matching of what is left.
+
+    Args:
+        below_a: (N, N) bool, row u marks u and its descendants.
+        below_b: (M, M) bool, the same for the second graph.
+        value: (N, M), worth of each pair, 0 or more.
+
+    Returns:
+        Pairs of nodes, best first.
+    """
+    left = np.array(value, dtype=np.float64)
+    left[0, :] = left[:, 0] = -1.0
+    pairs: list[tuple[int, int]] = []
+    rows, columns = _assign(left)
+    while len(rows):
+        best = int(np.argmax(left[rows, columns]))
+        u, v = int(rows[best]), int(columns[best])
+        pairs.append((u, v))
+        left[below_a[u][:, None] != below_b[v][None]] = -1.0
+        left[u, :] = left[:, v] = -1.0
+        others = np.arange(len(rows)) != best
+        rows, columns = rows[others], columns[others]
+        if (left[rows, columns] < 0).any():
+            rows, columns = _assign(left)
+    return pairs
+
+
+def _assign(left: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The best matching among pairs that are still allowed (not negative)."""
+    rows, columns = linear_sum_assignment(np.maximum(left, 0.0), maximize=True)
+    allowed = left[rows, columns] >= 0
+    return rows[allowed], columns[allowed]
+
+
+def in_plane_rotation(a: ShockGraph, b: ShockGraph, matched: Match) -> float | None:
+    """Rotation that takes the first shape onto the second, by their corresponding nodes.
+
+    Args:
+        a: The first graph.
+        b: The second graph.
+        matched: Their match, with pairs (node of the second, node of the first, similarity).
+
+    Returns:
+        Radians, from x towards y (clockwise in the image), in (-pi, pi]; None when the nodes lie too
+        close to the centroids to tell.
+    """
+    pairs = np.array([(u, v) for v, u, _ in matched.pairs[1:]], dtype=np.intp).reshape(-1, 2)
+    worth = np.array([s for _, _, s in matched.pairs[1:]])
+    p = a.positions[pairs[:, 0]].astype(np.float64)
+    q = b.positions[pairs[:, 1]].astype(np.float64)
+    worth = worth * np.sqrt(a.weights[pairs[:, 0]] * b.weights[pairs[:, 1]])
+    sine = float((worth * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])).sum())
+    cosine = float((worth * (p * q).sum(axis=1)).sum())
+    if np.hypot(sine, cosine) < 1e-3:
+        return None
+    return float(np.arctan2(sine, cosine))

@@ -1,0 +1,236 @@
+"""Silhouettes in normal form: one outline, without holes, of unit area, smoothed.
+
+The normal form is what makes a rendered model and a region of an image comparable. Its unit of
+length is the square root of the silhouette's area; its origin is the silhouette's centroid; x points
+right and y down, as in the image. Gaussian smoothing removes the fine detail that a model shows and
+an image does not (paper, section 7.2).
+
+Read next: `skeleton.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+SMOOTHING = 0.02
+"""Standard deviation of the Gaussian, as a share of the square root of the area."""
+
+RESOLUTION = 80
+"""Pixels of the working raster per unit of length."""
+
+SPACING = 0.03
+"""Distance between neighbouring points of the outline, units."""
+
+LEAST_AREA = 24
+"""Pixels below which a mask has no shape to speak of."""
+
+_MOST_PIXELS = 1 << 21
+_MOST_EXTENT = 1400
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Silhouette:
+    """An outline in normal form.
+
+    Attributes:
+        contour: (N, 2) float64, closed outline without repeated end point, evenly spaced, clockwise
+            as seen in the image (y down), in units of the square root of the area.
+        origin: (x, y) of the centroid in the source image, pixels.
+        unit: Pixels of the source image per unit of length; the square root of `area`.
+        area: Area in the source image, holes filled, pixels squared.
+        cut: Whether the border of the source image cuts the silhouette.
+    """
+
+    contour: NDArray[np.float64]
+    origin: tuple[float, float]
+    unit: float
+    area: float
+    cut: bool = False
+
+
+def normalise(
+    mask: NDArray[np.bool_], *, cut: bool = False, smoothing: float = SMOOTHING
+) -> Silhouette | None:
+    """Bring a mask to normal form.
+
+    Args:
+        mask: (H, W) bool, what belongs to the object.
+        cut: Whether the image border cuts the object.
+        smoothing: Standard deviation of the Gaussian in units of the square root of the area.
+
+    Returns:
+        The silhouette of the largest connected part with its holes filled, or None when nothing of at
+        least `LEAST_AREA` pixels is there.
+
+    Example:
+        >>> disc = np.hypot(*np.mgrid[-30:31, -30:31]) <= 25
+        >>> s = normalise(disc)
+        >>> round(s.unit), np.round(np.hypot(*s.contour.T).mean(), 2) == round(np.pi ** -0.5, 2)
+        (44, np.True_)
+    """
+    cropped = _crop(np.ascontiguousarray(mask, dtype=np.uint8))
+    if cropped is None:
+        return None
+    part, corner, shrink = cropped
+    solid = _solid_largest(part)
+    area = float(np.count_nonzero(solid))
+    if area < LEAST_AREA:
+        return None
+    field, zoom, pad = _smooth_field(solid, area, smoothing)
+    outline = _longest_outline(field)
+    if outline is None:
+        return None
+    return _in_units(outline, zoom, pad, corner, shrink, area, cut)
+
+
+def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], float] | None:
+    """The part that holds the mask, its corner and how much it was shrunk to a workable size."""
+    columns = np.asarray(mask.any(axis=0))
+    rows = np.asarray(mask.any(axis=1))
+    if not columns.any():
+        return None
+    x0, x1 = int(columns.argmax()), mask.shape[1] - int(columns[::-1].argmax())
+    y0, y1 = int(rows.argmax()), mask.shape[0] - int(rows[::-1].argmax())
+    part = (mask[y0:y1, x0:x1] != 0).astype(np.uint8)
+    shrink = min(1.0, (_MOST_PIXELS / part.size) ** 0.5)
+    if shrink < 1.0:
+        size = (max(1, int(part.shape[1] * shrink)), max(1, int(part.shape[0] * shrink)))
+        part = (cv2.resize(part * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 127).astype(
+            np.uint8
+        )
+    return part, (x0, y0), shrink
+
+
+def _solid_largest(part: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The largest 8-connected part, holes filled."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(part, connectivity=8)
+    if count <= 1:
+        return np.zeros_like(part)
+    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    around = np.pad((labels != best).astype(np.uint8), 1, constant_values=1)
+    _, outside = cv2.connectedComponents(around, connectivity=4)
+    return np.asarray(outside[1:-1, 1:-1] != outside[0, 0], dtype=np.uint8)
+
+
+def _smooth_field(
+    solid: NDArray[np.uint8], area: float, smoothing: float
+) -> tuple[NDArray[np.float32], float, int]:
+    """The silhouette at working resolution, blurred: its outline is where the field is one half."""
+    zoom = min(RESOLUTION / area**0.5, _MOST_EXTENT / max(solid.shape))
+    sigma = smoothing * zoom * area**0.5
+    margin = int(np.ceil(3 * sigma / zoom)) + 2
+    padded = np.pad(solid, margin).astype(np.float32)
+    size = (max(3, round(padded.shape[1] * zoom)), max(3, round(padded.shape[0] * zoom)))
+    method = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
+    field = cv2.resize(padded, size, interpolation=method)
+    if sigma > 0.2:
+        field = cv2.GaussianBlur(field, (0, 0), sigma)
+    return np.asarray(field, dtype=np.float32), zoom, margin
+
+
+def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
+    """The sub-pixel outline of the largest part, (N, 2) as (x, y); None when the blur left nothing."""
+    from skimage.measure import find_contours
+
+    level = 0.5 if field.max() > 0.55 else 0.5 * float(field.max())
+    found: list[NDArray[np.float64]] = find_contours(field, level)  # type: ignore[no-untyped-call]
+    if not found:
+        return None
+    longest = max(found, key=len)
+    return np.asarray(longest[:-1, ::-1], dtype=np.float64) if len(longest) > 8 else None
+
+
+def _in_units(
+    outline: NDArray[np.float64],
+    zoom: float,
+    pad: int,
+    corner: tuple[int, int],
+    shrink: float,
+    area: float,
+    cut: bool,
+) -> Silhouette:
+    """The outline scaled to unit area around its centroid, and the way back to the image."""
+    outer, centroid = polygon_moments(outline)
+    if outer < 0:
+        outline, outer = outline[::-1], -outer
+    unit = outer**0.5
+    contour = resample_closed((outline - centroid) / unit)
+    where = ((centroid + 0.5) / zoom - 0.5 - pad + 0.5) / shrink - 0.5 + np.asarray(corner)
+    real = area / shrink**2
+    return Silhouette(contour, (float(where[0]), float(where[1])), real**0.5, real, cut)
+
+
+def polygon_moments(polygon: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Signed area and centroid of a closed polygon.
+
+    Args:
+        polygon: (N, 2) points (x, y).
+
+    Returns:
+        Area, positive when the polygon runs clockwise with y down, and the (x, y) of its centroid.
+    """
+    x, y = polygon.T
+    u, v = np.roll(x, -1), np.roll(y, -1)
+    cross = x * v - u * y
+    area = float(cross.sum()) / 2
+    if abs(area) < 1e-12:
+        return area, np.asarray(polygon.mean(axis=0), dtype=np.float64)
+    return area, np.array([((x + u) * cross).sum(), ((y + v) * cross).sum()]) / (6 * area)
+
+
+def resample_closed(
+    polygon: NDArray[np.float64], spacing: float = SPACING, *, count: int | None = None
+) -> NDArray[np.float64]:
+    """Points evenly spaced along a closed polygon.
+
+    Args:
+        polygon: (N, 2) points (x, y).
+        spacing: Distance between neighbours wanted; the number of points is kept within 48 and 640.
+        count: Number of points, instead of a spacing.
+
+    Returns:
+        (M, 2) float64.
+    """
+    closed = np.vstack([polygon, polygon[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    points = count or int(np.clip(along[-1] / spacing, 48, 640))
+    at = np.arange(points) * (along[-1] / points)
+    return np.stack(
+        [np.interp(at, along, closed[:, 0]), np.interp(at, along, closed[:, 1])], axis=1
+    )
+
+
+def looks_cut(mask: NDArray[np.bool_]) -> bool:
+    """Whether a picture's border seems to cut its silhouette.
+
+    A picture cropped tightly touches all four sides and is not taken for cut; one that touches some
+    sides along at least 3 pixels is.
+
+    Args:
+        mask: (H, W) bool, the whole picture.
+    """
+    touches = [int(np.count_nonzero(side)) for side in (mask[0], mask[-1], mask[:, 0], mask[:, -1])]
+    return any(t >= 3 for t in touches) and not all(t >= 1 for t in touches)
+
+
+def binary_picture(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """A silhouette picture as a mask, whichever of object and background is the brighter.
+
+    Args:
+        image: (H, W) uint8.
+
+    Returns:
+        (H, W) bool. The background is what most of the picture's border shows; when the border is
+        undecided, the brighter part is the object.
+    """
+    bright = image > 127
+    border = np.concatenate([bright[0], bright[-1], bright[1:-1, 0], bright[1:-1, -1]])
+    corners = bright[[0, 0, -1, -1], [0, -1, 0, -1]]
+    share = float(border.mean()) if border.size else 0.0
+    if 0.35 < share < 0.65:
+        return np.asarray(~bright if corners.sum() >= 3 else bright)
+    return np.asarray(~bright if share >= 0.65 else bright)
