@@ -1,0 +1,371 @@
+"""Scenario files: what is in the scene, how it moves, how it is lit, and what is true of it.
+
+The format is told in ``docs/scenarios.md``. World coordinates are metres, right-handed; times are seconds.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from visup.agent.errors import ManyErrors, Place, SettingsError, VisupError
+
+Vector = tuple[float, float, float]
+
+
+def _not_zero(v: Vector) -> Vector:
+    if not any(v):
+        raise ValueError("a direction must not be zero")
+    return v
+
+
+Direction = Annotated[Vector, AfterValidator(_not_zero)]
+Seconds = Annotated[float, Field(ge=0)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PoseKey(_Model):
+    """Where an object is at a time; at most one way to give its orientation, none for unturned."""
+
+    at_s: Seconds = 0.0
+    position: Vector
+    euler_deg: Vector | None = None
+    quat_xyzw: tuple[float, float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> PoseKey:
+        if self.euler_deg is not None and self.quat_xyzw is not None:
+            raise ValueError("give euler_deg or quat_xyzw, not both")
+        if self.quat_xyzw is not None and not any(self.quat_xyzw):
+            raise ValueError("a quaternion must not be zero")
+        return self
+
+
+class CameraKey(_Model):
+    """Where the camera is at a time, and the point it looks at."""
+
+    at_s: Seconds = 0.0
+    position: Vector
+    look_at: Vector
+    up: Direction = (0.0, 0.0, 1.0)
+
+    @model_validator(mode="after")
+    def _sees(self) -> CameraKey:
+        sight = np.subtract(self.look_at, self.position)
+        if np.linalg.norm(np.cross(sight, self.up)) < 1e-9:
+            raise ValueError(
+                "look_at must differ from position, and up must not lie along the line of sight"
+            )
+        return self
+
+
+class TipKey(_Model):
+    """Where the tip of an arm is at a time, and the way its end effector points (world)."""
+
+    at_s: Seconds = 0.0
+    position: Vector
+    direction: Direction
+
+
+class JointKey(_Model):
+    """The six joint angles of an arm at a time, degrees, from the shoulder to the tip."""
+
+    at_s: Seconds = 0.0
+    angles_deg: tuple[float, float, float, float, float, float]
+
+
+class Spin(_Model):
+    """A steady turn about an axis of the world, from a time on, added to the track."""
+
+    axis: Direction
+    deg_per_s: float
+    from_s: Seconds = 0.0
+
+
+class Shake(_Model):
+    """An unsteady hand."""
+
+    amplitude_deg: Annotated[float, Field(ge=0, le=5)]
+    frequency_hz: Annotated[float, Field(gt=0, le=50)] = 1.0
+    seed: int = 0
+
+
+def _rising(keys: tuple[Any, ...]) -> tuple[Any, ...]:
+    times = [k.at_s for k in keys]
+    if any(b <= a for a, b in zip(times[:-1], times[1:], strict=True)):
+        raise ValueError("at_s must rise from key to key")
+    return keys
+
+
+Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(_rising)]
+
+
+class Camera(_Model):
+    """The camera and its track."""
+
+    size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = (
+        640,
+        480,
+    )
+    fps: Annotated[float, Field(gt=0, le=1000)] = 25.0
+    fov_vertical_deg: Annotated[float, Field(gt=0.1, lt=170)] = 38.0
+    track: Annotated[tuple[CameraKey, ...], Field(min_length=1), AfterValidator(_rising)]
+    shake: Shake | None = None
+    smooth: bool = False
+
+    @property
+    def focal_px(self) -> float:
+        """Distance from the pinhole to the image, in pixels."""
+        return float(self.size[1] / 2 / np.tan(np.radians(self.fov_vertical_deg) / 2))
+
+
+class Light(_Model):
+    """One distant sun, and the weak light of the Earth."""
+
+    sun: Direction
+    earth: Direction = (0.0, 0.0, -1.0)
+    earthshine: Annotated[float, Field(ge=0, le=1)] = 0.05
+
+
+class Stars(_Model):
+    """Stars that stand still in the world."""
+
+    kind: Literal["stars"] = "stars"
+    count: Annotated[int, Field(ge=0, le=100_000)] = 4000
+    brightness: Annotated[float, Field(ge=0)] = 0.25
+    seed: int = 0
+
+
+class Earth(_Model):
+    """A cloudy Earth with its limb before the stars; `light.earth` says where it is."""
+
+    kind: Literal["earth"]
+    altitude_km: Annotated[float, Field(ge=100, le=40_000)] = 300.0
+    clouds: Annotated[float, Field(ge=0, le=1)] = 0.5
+    brightness: Annotated[float, Field(ge=0)] = 0.6
+    turn_deg_per_s: float = 0.0
+    turn_axis: Direction = (0.0, 1.0, 0.0)
+    count: Annotated[int, Field(ge=0, le=100_000)] = 4000
+    seed: int = 0
+
+
+class Sensor(_Model):
+    """What the camera makes of the light."""
+
+    exposure: Annotated[float, Field(gt=0)] = 1.0
+    gamma: Annotated[float, Field(ge=1, le=3)] = 2.2
+    black: Annotated[float, Field(ge=0, le=100)] = 4.0
+    noise: Annotated[float, Field(ge=0, le=64)] = 1.5
+    blur_px: Annotated[float, Field(ge=0, le=10)] = 0.5
+
+
+class Attachment(_Model):
+    """From a time on the object moves as if bolted to another (the tip, when that is an arm)."""
+
+    to: str
+    from_s: Seconds
+
+
+class SceneObject(_Model):
+    """Something in the scene: a rigid body on a track, or an arm led by its tip or its joints.
+
+    Objects with label 0 are scenery: they are seen but belong to the background.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    mesh: Annotated[str, Field(min_length=1)]
+    label: Annotated[int, Field(ge=0, le=255)] = 0
+    model: str | None = None
+    actor: bool = False
+    colour: tuple[float, float, float] | None = None
+    scale: Annotated[float, Field(gt=0)] = 1.0
+    smooth: bool = False
+    track: Keys
+    spin: tuple[Spin, ...] = ()
+    attach: Attachment | None = None
+    tip: Annotated[tuple[TipKey, ...], AfterValidator(_rising)] = ()
+    joints: Annotated[tuple[JointKey, ...], AfterValidator(_rising)] = ()
+    roll_deg: float = 0.0
+    elbow_up: bool = True
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SceneObject:
+        if self.label == 128:
+            raise ValueError("label 128 means 'not scored' in masks; choose another")
+        led = bool(self.tip) + bool(self.joints)
+        if self.mesh == "arm" and led != 1:
+            raise ValueError("an arm needs either tip or joints keys")
+        if self.mesh != "arm" and led:
+            raise ValueError("only the mesh 'arm' has tip or joints keys")
+        return self
+
+
+class StageTruth(_Model):
+    """A stage that a supervisor should see, and how it goes."""
+
+    stage: str
+    from_s: Seconds
+    to_s: Seconds
+    outcome: Literal["complete", "failing", "unsafe"]
+
+
+class AlertTruth(_Model):
+    """An alert that a supervisor should raise."""
+
+    kind: str
+    from_s: Seconds
+    objects: tuple[str, ...] = ()
+
+
+class CouplingTruth(_Model):
+    """Two objects take hold of each other, or let go."""
+
+    kind: Literal["coupled", "decoupled"]
+    objects: tuple[str, str]
+    at_s: Seconds
+
+
+class Truth(_Model):
+    """What is meant by the scene; the geometry gives the rest."""
+
+    verdict: Literal["succeeded", "failed", "interrupted", "in_progress"] = "in_progress"
+    stage: tuple[StageTruth, ...] = ()
+    alert: tuple[AlertTruth, ...] = ()
+    coupling: tuple[CouplingTruth, ...] = ()
+    spin_of: str | None = None
+
+
+class Scenario(_Model):
+    """A whole scenario file."""
+
+    name: Annotated[str, Field(pattern=r"^[\w-]+$")]
+    task: str = "dock"
+    duration_s: Annotated[float, Field(gt=0, le=3600)]
+    seed: int = 0
+    camera: Camera
+    light: Light
+    background: Annotated[Stars | Earth, Field(discriminator="kind")] = Stars()
+    sensor: Sensor = Sensor()
+    object: Annotated[tuple[SceneObject, ...], Field(min_length=1)]
+    truth: Truth = Truth()
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames of the video."""
+        return max(1, round(self.duration_s * self.camera.fps))
+
+    @property
+    def labelled(self) -> tuple[SceneObject, ...]:
+        """The objects that have a label of their own, scenery left out."""
+        return tuple(o for o in self.object if o.label)
+
+    def resized(self, size: tuple[int, int]) -> Scenario:
+        """The same scene on another number of pixels; the vertical field of view stays."""
+        return self.model_copy(update={"camera": self.camera.model_copy(update={"size": size})})
+
+    @model_validator(mode="after")
+    def _names(self) -> Scenario:
+        names = [o.name for o in self.object]
+        labels = [o.label for o in self.labelled]
+        for words, kind in ((names, "name"), (labels, "label")):
+            twice = sorted({str(w) for w in words if words.count(w) > 1})  # type: ignore[attr-defined]
+            if twice:
+                raise ValueError(f"two objects have the {kind} {twice[0]!r}")
+        known = set(names)
+        wanted = [o.attach.to for o in self.object if o.attach]
+        wanted += [n for c in self.truth.coupling for n in c.objects]
+        wanted += [n for a in self.truth.alert for n in a.objects]
+        wanted += [self.truth.spin_of] if self.truth.spin_of else []
+        for name in wanted:
+            if name not in known:
+                raise ValueError(f"there is no object {name!r}; there are {', '.join(names)}")
+        self._no_ring_of_attachments()
+        return self
+
+    def _no_ring_of_attachments(self) -> None:
+        to = {o.name: o.attach.to for o in self.object if o.attach}
+        for start in to:
+            at, seen = start, {start}
+            while at in to:
+                at = to[at]
+                if at in seen:
+                    raise ValueError(f"{start!r} is attached to itself, at last")
+                seen.add(at)
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read and check a scenario file.
+
+    Args:
+        path: A TOML file.
+
+    Returns:
+        The scenario.
+
+    Raises:
+        SettingsError: The file cannot be read, is not TOML, or has one fault.
+        ManyErrors: It has several.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not a text file"
+        raise SettingsError(
+            f"the scenario cannot be read: {reason}", where=str(path), expected="a scenario in TOML"
+        ) from error
+    return parse_scenario(text, str(path))
+
+
+def parse_scenario(text: str, name: str = "scenario") -> Scenario:
+    """Check the text of a scenario; `name` is what messages call it. Raises as `load_scenario`."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(
+            f"this is not TOML: {error}", where=name, expected="a scenario in TOML"
+        ) from error
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        faults: list[VisupError] = [_fault(dict(e), name, text) for e in error.errors()]
+        raise (faults[0] if len(faults) == 1 else ManyErrors(faults)) from error
+
+
+def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
+    """One fault that pydantic found, in the user's words."""
+    steps = [s for s in error["loc"] if s not in ("stars", "earth") or len(error["loc"]) == 1]
+    where = ".".join(str(s + 1) if isinstance(s, int) else str(s) for s in steps)
+    message = str(error["msg"]).removeprefix("Value error, ").rstrip(".")
+    if error["type"] == "extra_forbidden":
+        message = "there is no such setting"
+    if error["type"] == "missing":
+        message = "this setting is missing"
+    return SettingsError(
+        f"{where}: {message}" if where else message,
+        where=_place(name, text, steps) or name,
+        hint="docs/scenarios.md lists every setting",
+    )
+
+
+def _place(name: str, text: str, steps: list[Any]) -> Place | None:
+    """The line where a key stands, when its word occurs only once in the file."""
+    keys = [s for s in steps if isinstance(s, str)]
+    if not keys:
+        return None
+    key = keys[-1]
+    found = [
+        (n, line)
+        for n, line in enumerate(text.splitlines(), 1)
+        if line.split("=")[0].strip(" [].") == key
+    ]
+    if len(found) != 1:
+        return None
+    number, line = found[0]
+    return Place(name, number, line.index(key) + 1, line, len(key))
