@@ -1,0 +1,201 @@
+"""From readings to belief: stages, what is under way, what is expected, the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from visup.agent import (
+    Binding,
+    Expectation,
+    Mind,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Verdict,
+)
+from visup.tasks.actions import Meaning
+from visup.tasks.course import Leaf, Step, leaves, moves
+from visup.tasks.observe import Relations, Sighting, observe
+from visup.tasks.readings import Follower, Reading, confidence
+from visup.tasks.sentences import evidence, outcome
+from visup.tasks.structure import stage_names
+from visup.tasks.verify import BAD, Watch, entered
+
+NEAR = 1.0  # readings that cost so little more than the best have a say in what is expected
+
+# Of several steps of one stage the first of these speaks for the stage.
+WORST_FIRST = (
+    Status.FAILED,
+    Status.FAILING,
+    Status.UNKNOWN,
+    Status.STALLED,
+    Status.ACTIVE,
+    Status.PROGRESSING,
+)
+
+
+class Scene:
+    """One task at one moment: who plays its actors, and what is seen of its actions.
+
+    Args:
+        mind: What is believed.
+        bindings: Who plays which actor.
+        actions: Meanings of actions.
+    """
+
+    def __init__(
+        self, mind: Mind, bindings: tuple[Binding, ...], actions: Mapping[str, Meaning]
+    ) -> None:
+        self.mind = mind
+        self.bindings = bindings
+        self._actions = actions
+        self._objects = {b.actor: b.object_id for b in bindings}
+        self._relations = Relations(mind)
+        self._seen: dict[tuple[str, tuple[str, ...]], Sighting] = {}
+
+    def see(self, step: Step) -> Sighting:
+        """What is seen now of the action of a step."""
+        key = (step.action, step.actors)
+        if key not in self._seen:
+            objects = tuple(self._objects.get(a) for a in step.actors)
+            self._seen[key] = observe(self._actions[step.action], objects, self._relations)
+        return self._seen[key]
+
+    def found(self, actors: tuple[str, ...]) -> bool:
+        """Whether each of some actors is played by an object."""
+        return all(self._objects.get(a) is not None for a in actors)
+
+    def objects(self, actors: tuple[str, ...]) -> tuple[int, ...]:
+        """Ids of the objects that play some actors; those not found are left out."""
+        ids = (self._objects.get(a) for a in actors)
+        return tuple(i for i in ids if i is not None)
+
+
+def believe(
+    follower: Follower, scene: Scene, readings: tuple[Reading, ...], interrupted: str
+) -> TaskBelief:
+    """What is believed of a task.
+
+    Args:
+        follower: The task with its settings.
+        scene: What is seen now.
+        readings: Cheapest first; empty while the task has not begun.
+        interrupted: Why it is interrupted, or empty.
+
+    Returns:
+        The belief; `unexplained` is left to the caller.
+    """
+    name, now = follower.task.name, scene.mind.time
+    if not readings:
+        verdict = Verdict.INTERRUPTED if interrupted else Verdict.UNKNOWN
+        return TaskBelief(
+            name,
+            verdict,
+            tuple(StageBelief(s, Status.PENDING, now) for s in stage_names(follower.task)),
+            bindings=scene.bindings,
+            expected=_expected(follower, scene, follower.start(now)),
+            evidence=interrupted or _missing(scene),
+        )
+    best, sure = readings[0], confidence(readings)
+    stages = _stages(follower, best, now, sure)
+    verdict, why = _verdict(best, stages, interrupted)
+    current = None if best.finished is not None else _current(follower, best)
+    near = tuple(r for r in readings if r.cost <= NEAR)
+    return TaskBelief(
+        name,
+        verdict,
+        stages,
+        current,
+        scene.bindings,
+        _expected(follower, scene, near),
+        confidence=sure,
+        evidence=why,
+    )
+
+
+def _stages(
+    follower: Follower, reading: Reading, now: float, sure: float
+) -> tuple[StageBelief, ...]:
+    told = {p.stage: p for p in reading.past}
+    under_way: dict[str, list[Leaf[Watch]]] = {}
+    for leaf in leaves(reading.state):
+        under_way.setdefault(leaf.step.stage, []).append(leaf)
+    for stage, steps in under_way.items():
+        told[stage] = _stage(follower, stage, steps, reading.finished, now, sure)
+    pending = {s: StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task)}
+    return tuple(told.get(s, belief) for s, belief in pending.items())
+
+
+def _stage(
+    follower: Follower,
+    stage: str,
+    steps: list[Leaf[Watch]],
+    finished: float | None,
+    now: float,
+    sure: float,
+) -> StageBelief:
+    leaf = min(steps, key=lambda x: WORST_FIRST.index(x.watch.status))
+    watch, meaning = leaf.watch, follower.actions[leaf.step.action]
+    if finished is not None:
+        _, why = outcome(leaf.step, meaning, watch, finished)
+        return StageBelief(stage, Status.DONE, finished, sure * watch.confidence, why)
+    why = evidence(leaf.step, meaning, watch, now, follower.actions)
+    return StageBelief(stage, watch.status, watch.since, sure * watch.confidence, why)
+
+
+def _current(follower: Follower, reading: Reading) -> str:
+    """The stage under way; of several at the same time the one that stands worst."""
+    steps = leaves(reading.state)
+    return min(steps, key=lambda x: WORST_FIRST.index(x.watch.status)).step.stage
+
+
+def _verdict(
+    reading: Reading, stages: tuple[StageBelief, ...], interrupted: str
+) -> tuple[Verdict, str]:
+    if interrupted:
+        return Verdict.INTERRUPTED, interrupted
+    failed = next((s for s in stages if s.status is Status.FAILED), None)
+    if failed is not None:
+        return Verdict.FAILED, failed.evidence
+    if reading.finished is not None:
+        return Verdict.SUCCEEDED, f"all stages were done at {reading.finished:.1f} s"
+    bad = next((s for s in stages if s.status in BAD), None)
+    if reading.begun or bad is not None:
+        told = bad or next((s for s in stages if s.stage == reading_stage(reading)), None)
+        return Verdict.IN_PROGRESS, told.evidence if told else ""
+    return Verdict.UNKNOWN, "nothing of the task has been seen yet"
+
+
+def reading_stage(reading: Reading) -> str:
+    """The first stage under way in a reading."""
+    return leaves(reading.state)[0].step.stage
+
+
+def _missing(scene: Scene) -> str:
+    missing = [b.actor for b in scene.bindings if b.object_id is None]
+    return f"not found yet: {', '.join(missing)}" if missing else "nothing of it has been seen yet"
+
+
+def _expected(
+    follower: Follower, scene: Scene, readings: tuple[Reading, ...]
+) -> tuple[Expectation, ...]:
+    """What is under way asks for, and the entry to what may come next; each told once."""
+    wanted: dict[Expectation, None] = {}
+    now = scene.mind.time
+    for reading in readings:
+        for leaf in leaves(reading.state):
+            meaning = follower.actions[leaf.step.action]
+            names = (meaning.name, *meaning.holds, *meaning.expects)
+            wanted.update(_asked(scene, leaf.step, names))
+        for move in moves(follower.task, reading.state, entered(now), now):
+            for leaf in move.entered:
+                names = follower.actions[leaf.step.action].begins
+                wanted.update(_asked(scene, leaf.step, names))
+    return tuple(wanted)
+
+
+def _asked(scene: Scene, step: Step, names: tuple[str, ...]) -> dict[Expectation, None]:
+    if not scene.found(step.actors):
+        return {}
+    objects = scene.objects(step.actors)
+    return {Expectation(n, objects): None for n in names}

@@ -1,0 +1,130 @@
+"""Who plays which actor: weighted matching of actors and believed objects (paper, section 6).
+
+Several identities are believed of each object, each with a strength. The weight of a pair is how
+strongly the object is believed to be one of the models that the actor stands for; the matching
+with the greatest total weight is taken, each object playing one actor at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from visup.agent import Binding, Mind, ObjectBelief, Presence
+from visup.tasks.settings import DEFAULT_SETTINGS, TaskSettings
+from visup.tasks.structure import stage_actors, stage_names, task_actors
+from visup.tasks.tree import Task
+
+CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two actors want one object
+
+
+def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
+    """Model names that an actor stands for: the user's word, else the task's, else its own name."""
+    return tuple(mind.actors.get(actor, ())) or task.models(actor)
+
+
+def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
+    """How strongly an object is believed to be one of some models, 0 to 1."""
+    return min(1.0, sum(c.share for c in belief.candidates if c.name in models))
+
+
+def match(
+    task: Task,
+    mind: Mind,
+    before: Sequence[Binding] = (),
+    current: Sequence[str] = (),
+    settings: TaskSettings = DEFAULT_SETTINGS,
+) -> tuple[Binding, ...]:
+    """Match the actors of a task to objects.
+
+    Args:
+        task: The task.
+        mind: What is believed; confirmed objects can play an actor, seen or hidden. One that has
+            left keeps its part until another object takes it.
+        before: The bindings of the last step; they are kept unless another is clearly better.
+        current: Names of actors of the stage under way.
+        settings: Thresholds.
+
+    Returns:
+        One binding for each actor, in the order in which the task names them.
+    """
+    actors = task_actors(task)
+    models = [models_of(task, a, mind) for a in actors]
+    held = {b.actor: b.object_id for b in before if b.object_id is not None}
+    objects = [b for _, b in sorted(mind.objects.items()) if _eligible(b, held)]
+    if not actors or not objects:
+        return tuple(Binding(a, m) for a, m in zip(actors, models, strict=True))
+    pure = np.array([[strength(o, m) for o in objects] for m in models])
+    weight = pure.copy()
+    for i, actor in enumerate(actors):
+        if actor in current:
+            weight[i] *= CURRENT_BONUS
+        for j, belief in enumerate(objects):
+            if held.get(actor) == belief.id:
+                weight[i, j] = _held_weight(weight[i, j], belief, settings)
+    weight[weight < settings.bind_at] = 0.0
+    chosen = {
+        i: j
+        for i, j in zip(*linear_sum_assignment(weight, maximize=True), strict=True)
+        if weight[i, j] > 0.0
+    }
+    return tuple(
+        Binding(a, m, objects[chosen[i]].id, float(pure[i, chosen[i]]))
+        if i in chosen
+        else Binding(a, m)
+        for i, (a, m) in enumerate(zip(actors, models, strict=True))
+    )
+
+
+def _eligible(belief: ObjectBelief, held: Mapping[str, int]) -> bool:
+    if belief.presence is Presence.LEFT:
+        return belief.id in held.values()
+    return belief.confirmed
+
+
+def _held_weight(weight: float, belief: ObjectBelief, settings: TaskSettings) -> float:
+    if belief.presence is Presence.LEFT:
+        return settings.bind_at
+    return weight + settings.keep_bonus
+
+
+def unexplained(
+    mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
+) -> tuple[int, ...]:
+    """Objects in the scene that no actor explains, by id.
+
+    With every actor bound that is any further object. With an actor still unbound, an object that
+    is not identified yet may be it, and so may one that could be any of the actors; only one that
+    is clearly something else is unexplained.
+    """
+    bound = {b.object_id for b in bindings if b.object_id is not None}
+    others = [o for o in mind.present() if o.id not in bound]
+    if all(b.object_id is not None for b in bindings):
+        return tuple(o.id for o in others)
+    known = {m for b in bindings for m in b.models}
+    return tuple(o.id for o in others if o.strength >= settings.familiar and o.name not in known)
+
+
+def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:
+    """How well some actors are matched, 0 to 1: the mean strength, 0 for an unbound one."""
+    by_actor = {b.actor: b.strength for b in bindings if b.object_id is not None}
+    return sum(by_actor.get(a, 0.0) for a in actors) / len(actors) if actors else 0.0
+
+
+def rank_stages(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[str, float], ...]:
+    """The stages of a task that may be under way, best matched first; ties as in the task."""
+    ranked = [(s, match_strength(stage_actors(task, s), bindings)) for s in stage_names(task)]
+    return tuple(sorted(ranked, key=lambda pair: -pair[1]))
+
+
+def rank_tasks(
+    tasks: Sequence[Task], mind: Mind, settings: TaskSettings = DEFAULT_SETTINGS
+) -> tuple[tuple[str, float], ...]:
+    """The tasks that may be under way, by their best matched stage; ties as given."""
+    ranked = []
+    for task in tasks:
+        stages = rank_stages(task, match(task, mind, settings=settings))
+        ranked.append((task.name, stages[0][1] if stages else 0.0))
+    return tuple(sorted(ranked, key=lambda pair: -pair[1]))

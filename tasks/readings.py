@@ -1,0 +1,208 @@
+"""Readings: the courses that what was seen may have taken through a task, side by side.
+
+A reading is one state of the course with what is kept about the steps under way, the stages that
+lie behind it, and a cost: seconds in which what was seen did not fit. The cheapest reading is what
+supervision tells. Costs stand where a probabilistic parser has log probabilities, so that such a
+parser can take the place of `follow` without anything around it changing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from visup.agent import StageBelief, Status, Truth
+from visup.tasks.actions import Meaning
+from visup.tasks.course import (
+    Leaf,
+    Move,
+    State,
+    Step,
+    begin,
+    enter,
+    form,
+    leaves,
+    moves,
+    with_leaves,
+)
+from visup.tasks.observe import Sighting
+from visup.tasks.sentences import outcome
+from visup.tasks.settings import TaskSettings
+from visup.tasks.tree import Task
+from visup.tasks.verify import BAD, Watch, entered, over, update
+
+CONTRARY, IDLE, UNOBSERVED, WAITING = 1.0, 0.2, 0.05, 0.02  # cost per second of one step
+STAYED = 0.5  # cost of staying, once, when what comes next was seen to begin
+SKIPPED = 1.5  # cost of leaving a step that was not seen through
+WORST = 6.0  # a reading that costs so much more than the best is given up
+
+See = Callable[[Step], Sighting]
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One course that what was seen may have taken.
+
+    Attributes:
+        state: Where it is.
+        cost: How badly it fits, 0 for the best.
+        past: Stages that lie behind it, the latest word on each.
+        finished: When the task was done by it, or None.
+        stayed: Whether it has paid for staying where it is.
+    """
+
+    state: State[Watch]
+    cost: float = 0.0
+    past: tuple[StageBelief, ...] = ()
+    finished: float | None = None
+    stayed: bool = False
+
+    @property
+    def begun(self) -> bool:
+        """Whether anything of the task was seen by it."""
+        return bool(self.past) or any(x.watch.begun is not None for x in leaves(self.state))
+
+
+@dataclass(frozen=True, slots=True)
+class Follower:
+    """What following the readings of one task needs: the task, meanings of actions, patience."""
+
+    task: Task
+    actions: Mapping[str, Meaning]
+    settings: TaskSettings
+
+    def start(self, now: float) -> tuple[Reading, ...]:
+        """The readings in which the task begins now."""
+        ways = enter(self.task, begin(self.task), entered(now), now)
+        return tuple(Reading(s) for s in ways if s is not None)
+
+    def follow(
+        self, readings: tuple[Reading, ...], see: See, now: float, dt: float
+    ) -> tuple[Reading, ...]:
+        """Take what is seen now into all readings.
+
+        Args:
+            readings: As they were.
+            see: What is seen now of a step.
+            now: Seconds.
+            dt: Seconds since the last time.
+
+        Returns:
+            At most `most_courses` readings, the cheapest first; its cost is 0.
+        """
+        aged = [self._age(r, see, now, dt) for r in readings]
+        return self._best(n for r in aged for n in self._go_on(r, see, now))
+
+    def _age(self, reading: Reading, see: See, now: float, dt: float) -> Reading:
+        """The same reading after `dt` seconds in which it stays where it is."""
+        if reading.finished is not None and now - reading.finished > self.settings.regret_s:
+            return reading
+        done = reading.finished is not None
+        new = [self._look(leaf, see(leaf.step), now, dt, done) for leaf in leaves(reading.state)]
+        cost = reading.cost + dt * sum(self._cost(x, see(x.step), done) for x in new)
+        lost = any(x.watch.status in BAD for x in new)
+        return replace(
+            reading,
+            state=with_leaves(reading.state, iter(new)),
+            cost=cost,
+            finished=None if lost else reading.finished,
+        )
+
+    def _look(
+        self, leaf: Leaf[Watch], seen: Sighting, now: float, dt: float, done: bool
+    ) -> Leaf[Watch]:
+        # A `within` no longer matters once the task is done.
+        step = replace(leaf.step, deadlines=()) if done else leaf.step
+        meaning = self.actions[step.action]
+        watch = update(leaf.watch, step, meaning, seen, now, dt, self.settings)
+        return replace(leaf, watch=watch)
+
+    def _cost(self, leaf: Leaf[Watch], seen: Sighting, done: bool) -> float:
+        if not seen.observed:
+            return UNOBSERVED
+        if seen.contrary is not None and seen.holds is not Truth.TRUE:
+            return CONTRARY
+        if seen.helps is not None or done or self._over(leaf):
+            return 0.0
+        return WAITING if leaf.watch.begun is None else IDLE
+
+    def _over(self, leaf: Leaf[Watch]) -> bool:
+        return over(leaf.watch, leaf.step, self.actions[leaf.step.action])
+
+    def _go_on(self, reading: Reading, see: See, now: float) -> Iterator[Reading]:
+        """A reading and those that come out of it by leaving a step."""
+        ways = list(moves(self.task, reading.state, entered(now), now))
+        ends = any(w.state is None and self._may_end(w) for w in ways)
+        if ends and reading.finished is None:
+            reading = replace(reading, finished=now)
+        forced = tempted = False
+        for way in ways:
+            price = None if way.state is None else self._price(way, see, now)
+            if price is None or way.state is None:
+                continue
+            forced = forced or all(self._over(x) for x in way.left)
+            seen = all(self._enters(x.step, way.left, see, now) for x in way.entered)
+            tempted = tempted or (price == 0.0 and seen)
+            yield self._moved(reading, way.state, way, price, see, now)
+        if ends or not forced:
+            if tempted and not reading.stayed:
+                reading = replace(reading, cost=reading.cost + STAYED, stayed=True)
+            yield reading
+
+    def _may_end(self, way: Move[Watch]) -> bool:
+        return all(x.watch.fulfilled and x.watch.status not in BAD for x in way.left)
+
+    def _price(self, way: Move[Watch], see: See, now: float) -> float | None:
+        """What a move costs, or None when nothing speaks for it."""
+        if all(self._over(x) for x in way.left):
+            return 0.0
+        if not all(self._enters(x.step, way.left, see, now) for x in way.entered):
+            return None
+        return SKIPPED * sum(not x.watch.fulfilled for x in way.left)
+
+    def _enters(self, step: Step, left: tuple[Leaf[Watch], ...], see: See, now: float) -> bool:
+        """Whether a step is seen to begin; one like that before it only once that has ceased."""
+        if any(step.same_as(x.step) and not x.watch.ceased for x in left):
+            return False
+        entry = see(step).entry
+        return entry is not None and now - entry.since >= self.settings.enter_s - 1e-9
+
+    def _moved(
+        self,
+        reading: Reading,
+        state: State[Watch],
+        way: Move[Watch],
+        price: float,
+        see: See,
+        now: float,
+    ) -> Reading:
+        fresh = [
+            self._look(x, see(x.step), now, 0.0, False) if x in way.entered else x
+            for x in leaves(state)
+        ]
+        past = reading.past
+        under_way = {x.step.stage for x in fresh}
+        for leaf in way.left:
+            status, why = outcome(leaf.step, self.actions[leaf.step.action], leaf.watch, now)
+            if leaf.step.stage not in under_way or status is Status.FAILED:
+                belief = StageBelief(leaf.step.stage, status, now, leaf.watch.confidence, why)
+                past = (*(p for p in past if p.stage != belief.stage), belief)
+        return Reading(with_leaves(state, iter(fresh)), reading.cost + price, past)
+
+    def _best(self, readings: Iterator[Reading]) -> tuple[Reading, ...]:
+        """The cheapest reading of each form, cheapest first, the best at cost 0."""
+        cheapest: dict[object, Reading] = {}
+        for reading in readings:
+            key = form(reading.state)
+            if key not in cheapest or reading.cost < cheapest[key].cost - 1e-9:
+                cheapest[key] = reading
+        ranked = sorted(cheapest.values(), key=lambda r: r.cost)[: self.settings.most_courses]
+        least = ranked[0].cost
+        kept = (replace(r, cost=r.cost - least) for r in ranked if r.cost - least <= WORST)
+        return tuple(kept)
+
+
+def confidence(readings: tuple[Reading, ...]) -> float:
+    """How sure the best reading is against the others, 0 to 1."""
+    return 1.0 / sum(math.exp(readings[0].cost - r.cost) for r in readings) if readings else 0.0

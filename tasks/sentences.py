@@ -1,0 +1,103 @@
+"""What supervision says: evidence of a stage, sentences of its events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from visup.agent import Status, Verdict
+from visup.tasks.actions import Meaning
+from visup.tasks.course import Step
+from visup.tasks.verify import Watch, overdue
+
+
+def names(words: Sequence[str]) -> str:
+    """Names as they are said: `the arm and the satellite`."""
+    the = [f"the {w.replace('_', ' ')}" for w in words]
+    return the[0] if len(the) == 1 else f"{', '.join(the[:-1])} and {the[-1]}"
+
+
+def evidence(step: Step, meaning: Meaning, watch: Watch, now: float, actions: Words) -> str:
+    """Why a step stands as it does: one clause, without capital and full stop.
+
+    Args:
+        step: The step.
+        meaning: Its action.
+        watch: What is kept about it.
+        now: Seconds.
+        actions: All actions, for their words.
+    """
+    who, have = names(step.actors), "has" if len(step.actors) == 1 else "have"
+    match watch.status:
+        case Status.FAILING | Status.FAILED if watch.contrary_since is not None:
+            what = _say(watch.contrary or "", actions)
+            return (
+                f"{who} {have} been {what} since {watch.contrary_since:.1f} s; "
+                f"`{step.stage}` asks for {step.action}"
+            )
+        case Status.FAILED if overdue(step, now):
+            due = next(d for d in step.deadlines if now > d.at)
+            return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
+        case Status.FAILING | Status.FAILED:
+            return f"{who} {have} not been {meaning.text} again since {watch.since:.1f} s"
+        case Status.PROGRESSING if watch.helped_since is not None:
+            what = _say(watch.helped_by or "", actions)
+            return f"{who} {have} been {what} since {max(0.0, watch.helped_since):.1f} s"
+        case Status.STALLED if watch.helped_at is not None:
+            return f"{who} {have} not been {meaning.text} since {watch.helped_at:.1f} s"
+        case Status.UNKNOWN if watch.unseen_since is not None:
+            return f"{who} could not be observed since {watch.unseen_since:.1f} s"
+    return f"{who} should be {meaning.text}"
+
+
+def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Status, str]:
+    """How a step that has been left ended, and why.
+
+    Returns:
+        DONE, FAILED when it was left before its `for` was kept or after its time was over, or
+        UNKNOWN when it was never seen.
+    """
+    who, was = names(step.actors), "was" if len(step.actors) == 1 else "were"
+    if any(now > d.at for d in step.deadlines) and watch.status is Status.FAILED:
+        due = next(d for d in step.deadlines if now > d.at)
+        return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
+    if step.hold_s is not None and not watch.fulfilled:
+        return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
+    if watch.begun is None:
+        return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
+    return Status.DONE, f"{who} {was} {meaning.text} until {now:.1f} s"
+
+
+def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
+    """The sentence of an event of a stage."""
+    return f"{STAGE_WORDS[kind].format(stage=stage, task=task)}: {why}."
+
+
+def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
+    """The sentence of a verdict."""
+    return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
+
+
+Words = Mapping[str, Meaning]
+
+STAGE_WORDS = {
+    "stage_started": "Stage `{stage}` of task `{task}` has begun",
+    "stage_progressing": "Stage `{stage}` is progressing satisfactorily",
+    "stage_stalled": "Stage `{stage}` makes no progress",
+    "stage_failing": "Stage `{stage}` is failing",
+    "stage_failed": "Stage `{stage}` has failed",
+    "stage_done": "Stage `{stage}` is complete",
+    "stage_unknown": "Stage `{stage}` cannot be judged",
+}
+
+VERDICT_WORDS = {
+    Verdict.IN_PROGRESS: "is in progress again",
+    Verdict.SUCCEEDED: "has succeeded",
+    Verdict.FAILED: "has failed",
+    Verdict.INTERRUPTED: "is interrupted",
+    Verdict.UNKNOWN: "cannot be judged",
+}
+
+
+def _say(relation: str, actions: Words) -> str:
+    meaning = actions.get(relation)
+    return meaning.text if meaning else relation.replace("_", " ")

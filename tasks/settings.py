@@ -1,0 +1,46 @@
+"""How patient, how forgiving and how sure supervision is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSettings:
+    """Settings of task supervision; times in seconds.
+
+    Attributes:
+        bind_at: An object may play an actor when this share of its votes is for the actor's models.
+        keep_bonus: What is added to the strength of a pair that is already bound, so that bindings
+            do not flicker.
+        enter_s: A relation must be true so long before it counts as the entry to a stage.
+        contrary_s: The contrary of an action must hold so long before a begun stage fails.
+        contrary_early_s: The same for a stage that has not begun yet.
+        recover_s: A failing stage must make progress so long before it counts as recovered.
+        stalled_s: A begun stage without progress for so long is stalled.
+        unseen_s: A stage whose actors were not observed for so long is unknown.
+        gap_s: A break of a `for` shorter than this is forgiven.
+        failed_s: A stage that has been failing for so long has failed.
+        regret_s: A task that is done may be undone by contrary evidence for so long.
+        unexplained_s: An object that no actor explains must be there so long to be named.
+        familiar: An object whose best identity has at least this share is taken to be identified.
+        most_courses: How many courses of a task are followed side by side.
+    """
+
+    bind_at: float = 0.1
+    keep_bonus: float = 0.25
+    enter_s: float = 0.2
+    contrary_s: float = 0.5
+    contrary_early_s: float = 2.0
+    recover_s: float = 1.0
+    stalled_s: float = 3.0
+    unseen_s: float = 2.0
+    gap_s: float = 0.5
+    failed_s: float = 8.0
+    regret_s: float = 10.0
+    unexplained_s: float = 0.3
+    familiar: float = 0.35
+    most_courses: int = 24
+
+
+DEFAULT_SETTINGS = TaskSettings()

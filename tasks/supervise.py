@@ -1,0 +1,234 @@
+"""Supervision of tasks: the thinker of the cycle's match phase (paper, sections 6 and 7.4).
+
+In each step the actors of every task are matched to objects, what is seen of them is taken into
+the readings of the task, and the best reading says which stage is under way, how it stands, what
+should be seen next and what the verdict is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from visup.agent import (
+    Concern,
+    Event,
+    Mind,
+    Observation,
+    Outcome,
+    Severity,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Thinker,
+    Truth,
+    Verdict,
+)
+from visup.tasks.actions import ACTIONS, Meaning
+from visup.tasks.believe import Scene, believe
+from visup.tasks.course import Step, leaves
+from visup.tasks.matching import match, unexplained
+from visup.tasks.readings import Follower, Reading
+from visup.tasks.settings import DEFAULT_SETTINGS, TaskSettings
+from visup.tasks.structure import stage_names
+from visup.tasks.tell import stage_concerns, stage_events
+from visup.tasks.tree import Invariant, Task
+from visup.tasks.verify import BAD
+
+MEMORY = "tasks"
+UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
+LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
+
+
+@dataclass(frozen=True, slots=True)
+class TaskMemory:
+    """What is remembered of one task from step to step.
+
+    Attributes:
+        time: Seconds of the last step.
+        readings: The courses followed; empty until its first actors are found.
+        belief: What was last believed.
+        interrupted: Why the task was interrupted, or empty; once set it stays.
+        strange_since: Since when objects have been unexplained, by id.
+        broken_since: Since when each invariant has been broken, or None.
+    """
+
+    time: float
+    readings: tuple[Reading, ...]
+    belief: TaskBelief
+    interrupted: str = ""
+    strange_since: tuple[tuple[int, float], ...] = ()
+    broken_since: tuple[float | None, ...] = ()
+
+
+def task_thinker(
+    tasks: Sequence[Task],
+    settings: TaskSettings = DEFAULT_SETTINGS,
+    actions: Mapping[str, Meaning] = ACTIONS,
+) -> Thinker:
+    """The thinker that supervises some tasks.
+
+    Args:
+        tasks: The active tasks, checked (see `parse_task`).
+        settings: Patience and thresholds.
+        actions: Meanings of actions, with those of plug-ins.
+
+    Returns:
+        A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
+        in order, keeps its memory in `Mind.memory['tasks']`, and gives events 'stage_started',
+        'stage_progressing', 'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
+        'stage_unknown', 'invariant_broken' and 'verdict', and concerns 'stage_failing' and
+        'invariant_broken'.
+    """
+    followers = tuple(Follower(t, actions, settings) for t in tasks)
+
+    def think(mind: Mind, observation: Observation) -> Outcome:
+        memories = _recall(mind, followers)
+        steps = [_step(f, m, mind) for f, m in zip(followers, memories, strict=True)]
+        new = tuple(s.memory for s in steps)
+        believed = replace(mind, tasks=tuple(m.belief for m in new)).remember(MEMORY, new)
+        events = tuple(e for s in steps for e in s.events)
+        return Outcome(believed, events, tuple(c for s in steps for c in s.concerns))
+
+    return think
+
+
+def finish(belief: TaskBelief) -> Verdict:
+    """The verdict on a task once nothing more will be seen of it.
+
+    Args:
+        belief: The last belief about the task.
+
+    Returns:
+        The verdict as it stands, with a task that was failing at the end failed, and one of which
+        nothing was seen unknown.
+    """
+    if belief.verdict is Verdict.IN_PROGRESS and any(s.status in BAD for s in belief.stages):
+        return Verdict.FAILED
+    return belief.verdict
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    memory: TaskMemory
+    events: tuple[Event, ...]
+    concerns: tuple[Concern, ...]
+
+
+def _recall(mind: Mind, followers: tuple[Follower, ...]) -> tuple[TaskMemory, ...]:
+    kept = mind.memory.get(MEMORY, ())
+    if [m.belief.task for m in kept] == [f.task.name for f in followers]:
+        return tuple(kept)
+    return tuple(_blank(f, mind.time) for f in followers)
+
+
+def _blank(follower: Follower, now: float) -> TaskMemory:
+    stages = tuple(StageBelief(s, Status.PENDING, now) for s in stage_names(follower.task))
+    belief = TaskBelief(follower.task.name, Verdict.UNKNOWN, stages)
+    return TaskMemory(now, (), belief, broken_since=(None,) * len(follower.task.invariants))
+
+
+def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
+    """One step of one task: bind its actors, follow its readings, judge, tell."""
+    task, settings, now = follower.task, follower.settings, mind.time
+    bindings = match(task, mind, memory.belief.bindings, _current_actors(memory), settings)
+    scene = Scene(mind, bindings, follower.actions)
+    readings = memory.readings or _start(follower, scene)
+    if readings:
+        dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.readings else 0.0
+        readings = follower.follow(readings, scene.see, now, dt)
+    broken = _broken(follower, scene, memory)
+    strange = _strange(scene, memory, settings)
+    interrupted = memory.interrupted or _interrupted(follower, scene, memory, broken)
+    belief = believe(follower, scene, readings, interrupted)
+    lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
+    belief = replace(belief, unexplained=lasting)
+    new = TaskMemory(now, readings, belief, interrupted, strange, broken)
+    events = (
+        *stage_events(memory.belief, belief, mind),
+        *_invariant_events(follower, memory, new, mind),
+    )
+    return _Step(new, events, (*stage_concerns(belief), *_invariant_concerns(follower, new, scene)))
+
+
+def _start(follower: Follower, scene: Scene) -> tuple[Reading, ...]:
+    """The task begins once all actors of one of its first steps are found."""
+    readings = follower.start(scene.mind.time)
+    found = any(scene.found(x.step.actors) for r in readings for x in leaves(r.state))
+    return readings if found else ()
+
+
+def _strange(
+    scene: Scene, memory: TaskMemory, settings: TaskSettings
+) -> tuple[tuple[int, float], ...]:
+    """Objects that are unexplained now, each with the time since when."""
+    before = dict(memory.strange_since)
+    now = unexplained(scene.mind, scene.bindings, settings)
+    return tuple((i, before.get(i, scene.mind.time)) for i in now)
+
+
+def _interrupted(
+    follower: Follower, scene: Scene, memory: TaskMemory, broken: tuple[float | None, ...]
+) -> str:
+    """Why the task is interrupted by something unsafe, or empty; a task that is over is not."""
+    if memory.belief.verdict in (Verdict.SUCCEEDED, Verdict.FAILED):
+        return ""
+    for alert in scene.mind.alerts:
+        if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
+            return alert.cause.rstrip(".")
+    for invariant, since in zip(follower.task.invariants, broken, strict=True):
+        if since is not None and scene.mind.time - since >= follower.settings.contrary_s:
+            return f"`{invariant}` does not hold"
+    return ""
+
+
+def _broken(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[float | None, ...]:
+    """Since when each invariant has been broken, or None; what is not seen is not broken."""
+    before = memory.broken_since
+    return tuple(
+        (since if since is not None else scene.mind.time)
+        if _breaks(i, scene, memory.belief.current)
+        else None
+        for i, since in zip(follower.task.invariants, before, strict=True)
+    )
+
+
+def _breaks(invariant: Invariant, scene: Scene, current: str | None) -> bool:
+    if invariant.during is not None and invariant.during.stage != current:
+        return False
+    actors = tuple(map(str, invariant.action.actors))
+    holds = scene.see(Step(invariant.action.name, actors, "")).holds
+    return holds is (Truth.TRUE if invariant.when == "never" else Truth.FALSE)
+
+
+def _invariant_concerns(follower: Follower, memory: TaskMemory, scene: Scene) -> Iterator[Concern]:
+    for invariant, since in zip(follower.task.invariants, memory.broken_since, strict=True):
+        if since is not None and memory.time - since >= follower.settings.contrary_s:
+            objects = scene.objects(tuple(map(str, invariant.action.actors)))
+            cause = f"`{invariant}` has not held since {since:.1f} s."
+            key = f"{follower.task.name}: {invariant}"
+            yield Concern("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
+
+
+def _invariant_events(
+    follower: Follower, memory: TaskMemory, new: TaskMemory, mind: Mind
+) -> Iterator[Event]:
+    patience = follower.settings.contrary_s
+    for i, invariant in enumerate(follower.task.invariants):
+        since = new.broken_since[i]
+        if since is not None and memory.time - since < patience <= new.time - since:
+            text = f"Task `{follower.task.name}`: `{invariant}` has not held since {since:.1f} s."
+            yield Event(
+                "invariant_broken",
+                mind.time,
+                mind.frame_index,
+                text,
+                severity=Severity.CRITICAL,
+                data={"task": follower.task.name, "invariant": str(invariant)},
+            )
+
+
+def _current_actors(memory: TaskMemory) -> tuple[str, ...]:
+    if not memory.readings:
+        return ()
+    return tuple(a for x in leaves(memory.readings[0].state) for a in x.step.actors)

@@ -1,0 +1,103 @@
+"""What supervision tells: events where a belief about a task changes, concerns while it is bad."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from visup.agent import (
+    Concern,
+    Event,
+    Mind,
+    Severity,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Verdict,
+)
+from visup.tasks.sentences import stage_sentence, verdict_sentence
+from visup.tasks.verify import BAD
+
+KINDS = {
+    Status.PROGRESSING: "stage_progressing",
+    Status.STALLED: "stage_stalled",
+    Status.FAILING: "stage_failing",
+    Status.FAILED: "stage_failed",
+    Status.DONE: "stage_done",
+    Status.UNKNOWN: "stage_unknown",
+}
+
+
+def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind) -> Iterator[Event]:
+    """Events of what changed between two beliefs about a task, stages first, in their order."""
+    was = {s.stage: s.status for s in before.stages}
+    for stage in now.stages:
+        for kind in _kinds(was.get(stage.stage, Status.PENDING), stage.status):
+            yield _stage_event(kind, stage, now, mind)
+    if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
+        yield _verdict_event(now, mind)
+
+
+def stage_concerns(belief: TaskBelief) -> Iterator[Concern]:
+    """A concern for each stage that is failing or has failed."""
+    for stage in belief.stages:
+        if stage.status in BAD:
+            cause = stage_sentence("stage_failing", stage.stage, belief.task, stage.evidence)
+            yield Concern(
+                "stage_failing",
+                _objects(belief),
+                Severity.WARNING,
+                cause,
+                (f"{_capital(stage.evidence)}.",),
+                key=f"{belief.task}/{stage.stage}",
+            )
+
+
+def _kinds(was: Status, now: Status) -> Iterator[str]:
+    if was is now:
+        return
+    begins = was in (Status.PENDING, Status.DONE) and now not in (Status.PENDING, Status.UNKNOWN)
+    if begins and (was is Status.PENDING or now is not Status.DONE):
+        yield "stage_started"
+    if now in KINDS and not (was is Status.UNKNOWN and now is Status.PENDING):
+        yield KINDS[now]
+
+
+def _worth_telling(was: Verdict, now: Verdict) -> bool:
+    """A task that begins to be seen is told by its stages; every other change by itself."""
+    return not (was is Verdict.UNKNOWN and now is Verdict.IN_PROGRESS)
+
+
+def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) -> Event:
+    bad = kind in ("stage_failing", "stage_failed")
+    return Event(
+        kind,
+        mind.time,
+        mind.frame_index,
+        stage_sentence(kind, stage.stage, belief.task, stage.evidence),
+        _objects(belief),
+        stage.confidence,
+        Severity.WARNING if bad else Severity.INFO,
+        {"task": belief.task, "stage": stage.stage, "status": str(stage.status)},
+    )
+
+
+def _verdict_event(belief: TaskBelief, mind: Mind) -> Event:
+    good = belief.verdict in (Verdict.SUCCEEDED, Verdict.IN_PROGRESS)
+    return Event(
+        "verdict",
+        mind.time,
+        mind.frame_index,
+        verdict_sentence(belief.task, belief.verdict, belief.evidence),
+        _objects(belief),
+        belief.confidence,
+        Severity.INFO if good else Severity.WARNING,
+        {"task": belief.task, "verdict": str(belief.verdict)},
+    )
+
+
+def _objects(belief: TaskBelief) -> tuple[int, ...]:
+    return tuple(b.object_id for b in belief.bindings if b.object_id is not None)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,171 @@
+"""Scripted minds: what holds between objects over time, written down, as tests need it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from visup.agent import (
+    Alert,
+    Candidate,
+    Event,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Presence,
+    Region,
+    Relation,
+    Severity,
+    Thinker,
+    Truth,
+)
+
+ARM, SATELLITE, INTRUDER = 1, 2, 3
+IDENTITIES: Mapping[int, Mapping[str, float]] = {
+    ARM: {"arm": 0.7, "guitar": 0.3},
+    SATELLITE: {"satellite": 0.6, "umbrella": 0.2, "arm": 0.2},
+    INTRUDER: {"dish": 0.8, "umbrella": 0.2},
+}
+REGION = Region(
+    id=1,
+    bbox=(0, 0, 2, 2),
+    mask=np.ones((2, 2), dtype=bool),
+    contour=np.zeros((4, 2), dtype=np.float32),
+    centroid=(0.5, 0.5),
+    area=4.0,
+)
+
+
+@dataclass(frozen=True)
+class Spell:
+    """A relation that is true from one time to another; `objects` in any order."""
+
+    name: str
+    from_s: float
+    to_s: float
+    objects: tuple[int, ...] = (ARM, SATELLITE)
+    truth: Truth = Truth.TRUE
+    confidence: float = 1.0
+
+
+@dataclass(frozen=True)
+class Script:
+    """A scene over time. What no spell names is false for any pair that both can be seen."""
+
+    spells: Sequence[Spell] = ()
+    objects: Mapping[int, tuple[float, float]] = field(
+        default_factory=lambda: {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9)}
+    )
+    hidden: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    identities: Mapping[int, Mapping[str, float]] = field(default_factory=lambda: IDENTITIES)
+    alerts: Sequence[tuple[str, float, float]] = ()
+    actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    known: Sequence[str] = (
+        "converging",
+        "diverging",
+        "keeping_distance",
+        "touching",
+        "coupled",
+        "moving_together",
+    )
+
+
+def belief(
+    number: int,
+    shares: Mapping[str, float],
+    presence: Presence = Presence.SEEN,
+    confirmed: bool = True,
+    seen: tuple[float, float] = (0.0, 0.0),
+) -> ObjectBelief:
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    candidates = tuple(Candidate(n, s * 10, s) for n, s in ranked)
+    return ObjectBelief(number, REGION, presence, *seen, confirmed, candidates)
+
+
+def mind_at(script: Script, time: float, index: int, before: Mind) -> Mind:
+    """The mind that a script has at one time, with the memory of the one before."""
+    objects = {}
+    for number, (enters, leaves) in script.objects.items():
+        if time < enters:
+            continue
+        hides, shows = script.hidden.get(number, (1e9, 1e9))
+        hidden = hides <= time < shows
+        presence = Presence.HIDDEN if hidden else Presence.SEEN
+        if time >= leaves:
+            presence = Presence.LEFT
+        objects[number] = belief(
+            number, script.identities.get(number, {}), presence, seen=(enters, min(time, leaves))
+        )
+    alerts = tuple(
+        Alert(i, kind, Severity.WARNING, opened, time, (), f"There is a {kind}.")
+        for i, (kind, opened, closed) in enumerate(script.alerts, 1)
+        if opened <= time < closed
+    )
+    return replace(
+        before,
+        time=time,
+        frame_index=index,
+        objects=MappingProxyType(objects),
+        relations=_relations(script, time, objects),
+        alerts=alerts,
+        actors=script.actors,
+    )
+
+
+def _relations(
+    script: Script, time: float, objects: Mapping[int, ObjectBelief]
+) -> tuple[Relation, ...]:
+    seen = sorted(i for i, b in objects.items() if b.presence is Presence.SEEN)
+    found = []
+    for i, a in enumerate(seen):
+        for b in seen[i + 1 :]:
+            found += [_relation(script, name, (a, b), time) for name in script.known]
+    return tuple(found)
+
+
+def _relation(script: Script, name: str, pair: tuple[int, int], time: float) -> Relation:
+    mine = [s for s in script.spells if s.name == name and set(s.objects) == set(pair)]
+    for spell in mine:
+        if spell.from_s <= time < spell.to_s:
+            return Relation(name, pair, spell.truth, spell.from_s, spell.confidence)
+    ended = [s.to_s for s in mine if s.to_s <= time]
+    return Relation(name, pair, Truth.FALSE, max(ended, default=0.0))
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a thinker made of a script: its minds and all it told."""
+
+    minds: tuple[Mind, ...]
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        return tuple(e for o in self.outcomes for e in o.events)
+
+    @property
+    def last(self) -> Mind:
+        return self.minds[-1]
+
+    def at(self, time: float) -> Mind:
+        return next(m for m in self.minds if m.time >= time - 1e-9)
+
+    def told(self) -> list[tuple[str, str]]:
+        return [(e.kind, str(e.data.get("stage", ""))) for e in self.events]
+
+
+def play(thinker: Thinker, script: Script, until: float, fps: float = 10.0) -> Played:
+    """Let a thinker live through a script."""
+    mind, minds, outcomes = Mind(), [], []
+    for index in range(round(until * fps) + 1):
+        now = mind_at(script, index / fps, index, mind)
+        observation = Observation(index, index / fps, (640, 480))
+        outcome = thinker(now, observation)
+        mind = outcome.mind
+        minds.append(mind)
+        outcomes.append(outcome)
+    return Played(tuple(minds), tuple(outcomes))
