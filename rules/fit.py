@@ -1,0 +1,98 @@
+"""Robust linear fits over time, for many quantities at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.rules.geometry import DIRECTIONS
+
+Floats = NDArray[np.float64]
+
+
+def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Slope of a line through samples, by the median of the slopes of all pairs of samples.
+
+    Up to 29 % of the samples may be wild without moving it far (Theil 1950, Sen 1968).
+
+    Args:
+        times: (T,) seconds, increasing.
+        values: (T, N) any unit; NaN where there is no sample.
+
+    Returns:
+        Slope and its standard deviation, both (N,), in units per second; NaN where fewer than four
+        samples stand. The deviation comes from the spread of the residuals (their median absolute
+        deviation) as if they were independent, so that it is too small for slow wobbles.
+    """
+    count = np.isfinite(values).sum(axis=0)
+    enough = count >= 4
+    slope = np.full(values.shape[1], np.nan)
+    sigma = np.full(values.shape[1], np.nan)
+    if not enough.any():
+        return slope, sigma
+    kept = values[:, enough]
+    first, second = np.triu_indices(len(times), 1)
+    rises = (kept[second] - kept[first]) / (times[second] - times[first])[:, None]
+    slope[enough] = nanmedian(rises)
+    residual = kept - slope[enough] * times[:, None]
+    residual -= nanmedian(residual)
+    spread = 1.4826 * nanmedian(np.abs(residual)) * np.sqrt(count[enough] / (count[enough] - 2))
+    valid = np.isfinite(kept)
+    middle = (valid * times[:, None]).sum(axis=0) / count[enough]
+    lever = np.sqrt((valid * (times[:, None] - middle) ** 2).sum(axis=0))
+    # Medians need pi/2 times as many samples as means for the same variance of their result.
+    sigma[enough] = np.sqrt(np.pi / 2) * spread / np.maximum(lever, 1e-9)
+    return slope, sigma
+
+
+def nanmedian(values: Floats) -> Floats:
+    """Median along the first axis with NaN left out; much quicker than NumPy's, and without noise.
+
+    Args:
+        values: (T, N) float.
+
+    Returns:
+        (N,) float; NaN for columns without a value.
+    """
+    ordered = np.sort(values, axis=0)  # NaN goes last
+    count = np.isfinite(ordered).sum(axis=0)
+    column = np.arange(values.shape[1])
+    low = ordered[np.maximum((count - 1) // 2, 0), column]
+    high = ordered[np.minimum(count // 2, len(values) - 1), column]
+    return np.where(count > 0, 0.5 * (low + high), np.nan)
+
+
+def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
+    """Velocity of bodies from how their outlines' reach changes.
+
+    A body that moves by v changes its reach in direction n by v . n; a line is fitted over time in
+    each direction and v over the directions, robustly (iteratively reweighted least squares, one
+    norm), so that a hidden side or a turning corner has little say. Directions in which the
+    outline ends at the image border take no part.
+
+    Args:
+        times: (T,) seconds.
+        support: (T, M, 16) pixels, NaN where a body is not seen.
+        free: (T, M, 16) bool, clear of the border.
+
+    Returns:
+        (M, 2) pixels per second; NaN where fewer than four samples or three directions serve.
+    """
+    good = np.isfinite(support) & free
+    count = good.sum(axis=0)
+    usable = (count >= 4) & (count >= 0.6 * len(times))
+    values = np.where(good, support, 0.0)
+    n = np.maximum(count, 1)
+    t = np.where(good, times[:, None, None], 0.0)
+    centred = np.where(good, times[:, None, None] - t.sum(axis=0) / n, 0.0)
+    slopes = (centred * values).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-12)
+    weight = usable.astype(float)
+    enough = usable.sum(axis=1) >= 3
+    found = np.zeros((support.shape[1], 2))
+    for _ in range(5):
+        a = np.einsum("mk,ki,kj->mij", weight, DIRECTIONS, DIRECTIONS) + 1e-9 * np.eye(2)
+        b = np.einsum("mk,mk,ki->mi", weight, slopes, DIRECTIONS)
+        found = np.linalg.solve(a, b[..., None])[..., 0]
+        off = np.abs(slopes - found @ DIRECTIONS.T)
+        weight = usable / np.maximum(off, 0.3)
+    return np.where(enough[:, None], found, np.nan)

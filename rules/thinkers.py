@@ -1,0 +1,64 @@
+"""The thinkers of rules/, in the order in which an agent runs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from visup.agent import Thinker
+from visup.rules.coupling import Couple, CouplingSettings
+from visup.rules.depth import BelieveDepth, DepthSettings
+from visup.rules.narrative import NarrativeSettings, TellRelations
+from visup.rules.objects import ObjectSettings, UpdateObjects
+from visup.rules.presence import PresenceSettings, SeePresence
+from visup.rules.relations import Relations, RelationSettings
+from visup.rules.votes import Votes, VoteSettings
+
+
+@dataclass(frozen=True, slots=True)
+class RuleSettings:
+    """Settings of all thinkers of rules/, one group for each."""
+
+    objects: ObjectSettings = field(default_factory=ObjectSettings)
+    votes: VoteSettings = field(default_factory=VoteSettings)
+    presence: PresenceSettings = field(default_factory=PresenceSettings)
+    depth: DepthSettings = field(default_factory=DepthSettings)
+    relations: RelationSettings = field(default_factory=RelationSettings)
+    coupling: CouplingSettings = field(default_factory=CouplingSettings)
+    narrative: NarrativeSettings = field(default_factory=NarrativeSettings)
+
+
+@dataclass(frozen=True, slots=True)
+class RuleSet:
+    """Thinkers by phase, in order.
+
+    Attributes:
+        update: Percepts enter the mind.
+        cogitate: Presence, votes, depth, relations, couplings, narrative, and rules.
+    """
+
+    update: tuple[Thinker, ...]
+    cogitate: tuple[Thinker, ...]
+
+
+def default_thinkers(settings: RuleSettings | None = None) -> RuleSet:
+    """The thinkers that ship with visup.
+
+    Args:
+        settings: Their settings; the defaults when left out.
+
+    Returns:
+        The thinkers of the update and cogitate phases. Each is a pure function of mind and
+        observation, so that one set may serve many agents.
+    """
+    s = settings or RuleSettings()
+    return RuleSet(
+        update=(UpdateObjects(s.objects),),
+        cogitate=(
+            SeePresence(s.presence),
+            Votes(s.votes),
+            BelieveDepth(s.depth),
+            Relations(s.relations),
+            Couple(s.coupling),
+            TellRelations(s.narrative),
+        ),
+    )

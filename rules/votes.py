@@ -1,0 +1,248 @@
+"""Who is who: the weighted, occlusion-sensitive, time-discounted vote (paper, section 5, figure 5).
+
+For each object o and each model name n, in each step of length dt:
+
+    v(o, n) <- v(o, n) * exp(-dt / tau) + w,        w = visible(o) * rank^k * (s - 0.4) / (1 - 0.4)
+
+where s is the best similarity with which any view of n was hypothesised for o's region in this
+step (nothing at or below 0.4 counts; section 7.3), k the place of n among the names of this step
+(0 for the best), and visible(o) the share of o that is in sight. The three principles:
+
+1. recurrent and temporally stable hypotheses are more likely: votes add up over steps;
+2. what has not been hypothesised lately is forgotten: votes decay with `tau_s`;
+3. an occluded object keeps its votes for some time: while it is hidden, or while nobody could look,
+   they decay with `tau_hidden_s` instead.
+
+An object whose best name has too few votes or too small a share stays an 'unknown object'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import exp
+from types import MappingProxyType
+
+from visup.agent import (
+    Candidate,
+    Event,
+    Hypothesis,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Presence,
+)
+from visup.rules.objects import owners
+from visup.rules.presence import visible_share
+from visup.rules.sentences import describe, spaced
+
+VOTES = "rules.votes"
+Tally = tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class VoteSettings:
+    """How votes are counted.
+
+    Attributes:
+        least_similarity: Hypotheses at or below it do not count (paper: 0.4).
+        tau_s: Votes of a seen object fall to 37 % in this time.
+        tau_hidden_s: The same for a hidden object.
+        rank: Weight of each name relative to the name above it in the same step.
+        least_visible: Below this share in sight an object is treated as hidden.
+        most_candidates: Names kept for an object.
+        least_share: Names with a smaller share of the votes are dropped.
+        known_votes: Votes that the best name needs for the object to be known at all.
+        known_share: Share that the best name needs.
+        settle_share: Share at which a name is told.
+        settle_margin: Lead over the second name at which it is told.
+        settle_s: How long it must have had both.
+    """
+
+    least_similarity: float = 0.4
+    tau_s: float = 2.0
+    tau_hidden_s: float = 60.0
+    rank: float = 0.6
+    least_visible: float = 0.5
+    most_candidates: int = 5
+    least_share: float = 0.03
+    known_votes: float = 0.3
+    known_share: float = 0.25
+    settle_share: float = 0.45
+    settle_margin: float = 0.1
+    settle_s: float = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Ballot:
+    """What is remembered of one object's votes.
+
+    Attributes:
+        tally: (name, votes), most votes first.
+        leader: The name that leads clearly now, or None.
+        leads_since: Seconds since when it does.
+        told: The name that was told last, or None.
+    """
+
+    tally: Tally = ()
+    leader: str | None = None
+    leads_since: float = 0.0
+    told: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Ballots:
+    """All votes.
+
+    Attributes:
+        time: Seconds of the last count.
+        of: Object id -> its votes.
+    """
+
+    time: float
+    of: Mapping[int, Ballot] = field(default_factory=lambda: MappingProxyType({}))
+
+
+def weights(hypotheses: tuple[Hypothesis, ...], settings: VoteSettings) -> dict[str, float]:
+    """Weights of the names hypothesised for one region in one step.
+
+    Args:
+        hypotheses: All of them, in any order.
+        settings: Threshold and rank discount.
+
+    Returns:
+        Name -> weight, 0 to 1, best first.
+    """
+    best: dict[str, float] = {}
+    for h in hypotheses:
+        if h.similarity > settings.least_similarity:
+            best[h.name] = max(best.get(h.name, 0.0), h.similarity)
+    ranked = sorted(best.items(), key=lambda item: (-item[1], item[0]))
+    room = 1.0 - settings.least_similarity
+    return {
+        name: settings.rank**k * (s - settings.least_similarity) / room
+        for k, (name, s) in enumerate(ranked)
+    }
+
+
+def count(
+    tally: Tally, new: Mapping[str, float], dt: float, tau: float, most: int, visible: float = 1.0
+) -> Tally:
+    """One step of the vote for one object.
+
+    Args:
+        tally: Votes before.
+        new: Weights of this step's names.
+        dt: Seconds since the last count.
+        tau: Time constant, seconds.
+        most: Names to keep.
+        visible: Share of the object in sight, 0 to 1.
+
+    Returns:
+        Votes after, most first.
+    """
+    votes = {name: v * exp(-dt / tau) for name, v in tally}
+    for name, weight in new.items():
+        votes[name] = votes.get(name, 0.0) + visible * weight
+    ranked = sorted(votes.items(), key=lambda item: (-item[1], item[0]))
+    return tuple((n, v) for n, v in ranked[: 2 * most] if v > 1e-4)
+
+
+def candidates(tally: Tally, settings: VoteSettings) -> tuple[Candidate, ...]:
+    """Candidates that votes allow: none while the best has too few votes or too small a share."""
+    total = sum(v for _, v in tally)
+    if not tally or tally[0][1] < settings.known_votes:
+        return ()
+    if tally[0][1] / total < settings.known_share:
+        return ()
+    shares = (Candidate(n, v, v / total) for n, v in tally[: settings.most_candidates])
+    return tuple(c for c in shares if c.share >= settings.least_share)
+
+
+@dataclass(frozen=True, slots=True)
+class Votes:
+    """Thinker of the cogitate phase: counts votes and tells who is who."""
+
+    settings: VoteSettings = VoteSettings()
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Count one step; see `Thinker`."""
+        old: Ballots = mind.memory.get(VOTES, Ballots(observation.time))
+        dt = max(0.0, observation.time - old.time)
+        said = _by_object(mind, observation)
+        ballots: dict[int, Ballot] = {}
+        events: list[Event] = []
+        beliefs: list[ObjectBelief] = []
+        for object_id, belief in sorted(mind.objects.items()):
+            before = old.of.get(object_id, Ballot())
+            tally = self._count(mind, belief, before.tally, said.get(object_id, ()), dt)
+            named = candidates(tally, self.settings)
+            belief = replace(belief, candidates=named)
+            beliefs.append(belief)
+            after = self._lead(replace(before, tally=tally), named, observation.time)
+            if after.told != before.told:
+                event = _identified(mind.with_objects(belief), belief, before.told, observation)
+                after = after if belief.confirmed else before
+                events += [event] if belief.confirmed else []
+            ballots[object_id] = replace(after, tally=tally)
+        mind = mind.with_objects(*beliefs)
+        mind = mind.remember(VOTES, Ballots(observation.time, MappingProxyType(ballots)))
+        return Outcome(mind, tuple(events))
+
+    def _count(
+        self,
+        mind: Mind,
+        belief: ObjectBelief,
+        tally: Tally,
+        said: tuple[Hypothesis, ...],
+        dt: float,
+    ) -> Tally:
+        s = self.settings
+        visible = visible_share(mind, belief.id)
+        hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
+        blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
+        if hidden or blind:
+            return count(tally, {}, dt, s.tau_hidden_s, s.most_candidates)
+        return count(tally, weights(said, s), dt, s.tau_s, s.most_candidates, visible)
+
+    def _lead(self, ballot: Ballot, named: tuple[Candidate, ...], now: float) -> Ballot:
+        s = self.settings
+        leader = None
+        if named and named[0].share >= s.settle_share:
+            second = named[1].share if len(named) > 1 else 0.0
+            leader = named[0].name if named[0].share - second >= s.settle_margin else None
+        since = ballot.leads_since if leader == ballot.leader else now
+        settled = leader is not None and now - since >= s.settle_s - 1e-9
+        told = leader if settled else ballot.told
+        return replace(ballot, leader=leader, leads_since=since, told=told)
+
+
+def _by_object(mind: Mind, observation: Observation) -> dict[int, tuple[Hypothesis, ...]]:
+    owner = owners(mind)
+    said: dict[int, tuple[Hypothesis, ...]] = {}
+    for h in observation.of("hypothesis"):
+        object_id = owner.get(h.region_id)
+        if object_id is not None:
+            said[object_id] = (*said.get(object_id, ()), h)
+    return said
+
+
+def _identified(
+    mind: Mind, belief: ObjectBelief, before: str | None, observation: Observation
+) -> Event:
+    words = describe(mind, belief.id).removeprefix("an object, believed to be ")
+    if before is None:
+        text = f"An object is believed to be {words}."
+    else:
+        text = f"The object taken for the {spaced(before)} is now believed to be {words}."
+    data = MappingProxyType({"name": belief.name, "before": before})
+    return Event(
+        "identified",
+        observation.time,
+        observation.frame_index,
+        text,
+        (belief.id,),
+        belief.strength,
+        data=data,
+    )
