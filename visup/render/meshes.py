@@ -1,6 +1,6 @@
 """The spacecraft of the demo, built in code, and the list of all meshes by name.
 
-SPARTAN-201's bus is 1.8 x 2.3 x 3.1 m, with an instrument cylinder of 0.43 m diameter and 3 m length.
+Sizes are in metres. SPARTAN-201 measures 1.8 x 2.3 x 3.1 m and carries an instrument of 0.43 x 3 m.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ STEEL: Colour = (0.45, 0.46, 0.48)
 
 
 def spartan() -> Solid:
-    """The SPARTAN-201 satellite: instrument along x, base along -z; metres, origin in the bus.
+    """The SPARTAN-201 satellite: 3.1 m tall on a base of 2.3 (x) by 1.8 m (y); origin in the bus.
 
-    The bus measures 1.8 (y) x 2.3 (x) x 3.1 m (z, from the foot of the base to the top of the
-    instrument's cradle is left to the details); its widest part is the base plate.
+    The instrument, 0.43 m thick and 3 m long, lies along x on top; its wider hood looks towards +x.
+    The grapple fixture stands out below the hood, also towards +x.
     """
     instrument = join(
         cone((-1.5, 0, 0.85), (1.1, 0, 0.85), 0.215, None, WHITE),
@@ -45,8 +45,8 @@ def spartan() -> Solid:
         cone((0, 0, -1.0), (0, 0, -1.25), 0.45, 0.3, STEEL),
     )
     antenna = join(
-        cone((-0.5, 0.3, 0.6), (-0.5, 0.3, 1.62), 0.03, None, STEEL),
-        ball(0.07, (-0.5, 0.3, 1.66), WHITE),
+        cone((-0.5, 0.3, 0.6), (-0.5, 0.3, 1.74), 0.03, None, STEEL),
+        ball(0.07, (-0.5, 0.3, 1.78), WHITE),
     )
     grapple = join(
         box((0.3, 0.3, 0.1), (0.95, 0, -0.45), STEEL),

@@ -43,7 +43,7 @@ class Picture:
         image: (H, W, 3) uint8, BGR.
         mask: (H, W) uint8, the label of what the ray through the middle of each pixel meets.
         amodal_px: For each labelled object, pixels it would show with nothing before it.
-        poses: For each labelled object, (4, 4) from its frame to the camera's.
+        poses: For each labelled rigid object, (4, 4) from its frame to the camera's; arms have none.
     """
 
     index: int
@@ -107,17 +107,30 @@ class Renderer:
         behind = self._background(time, camera)
         radiance = self._shade(caster, hits, self._rays, behind.reshape(-1, 3), camera)
         self._smooth_edges(radiance, caster, hits, behind.reshape(-1, 3), camera)
-        labels = np.array([*(b.label for b in bodies), 0], np.uint8)
         image = expose(
             radiance.reshape(height, width, 3), self.scenario.sensor, self.scenario.seed, index
         )
         return Picture(
             index,
             image,
-            labels[hits.body].reshape(height, width),
+            self._labels(bodies, hits),
             self._amodal(bodies),
-            {b.name: b.pose for b in bodies if b.label},
+            {b.name: b.pose for b in bodies if b.label and b.name in self._solids},
         )
+
+    def mask(self, index: int) -> NDArray[np.uint8]:
+        """The mask of a frame alone, (H, W) uint8, as in `picture` but in a fraction of its time."""
+        time = index / self.scenario.camera.fps
+        bodies = self.bodies(time, self.camera_pose(time))
+        inside = self._window(bodies)
+        return self._labels(
+            bodies, _spread(Caster(bodies).from_pinhole(self._rays[inside]), inside)
+        )
+
+    def _labels(self, bodies: list[Body], hits: Hits) -> NDArray[np.uint8]:
+        """(H, W): the label of what each ray met."""
+        width, height = self.scenario.camera.size
+        return np.array([*(b.label for b in bodies), 0], np.uint8)[hits.body].reshape(height, width)
 
     def camera_pose(self, time: float) -> Matrix:
         """(4, 4) from the camera's frame to the world's."""
@@ -189,7 +202,6 @@ class Renderer:
 
     def _amodal(self, bodies: list[Body]) -> dict[str, int]:
         """Pixels of each labelled object were it alone."""
-        width, height = self.scenario.camera.size
         counts = {}
         for body in bodies:
             if not body.label:

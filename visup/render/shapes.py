@@ -117,9 +117,11 @@ def box(size: ArrayLike, at: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY)
     return from_trimesh(trimesh.creation.box(extents=np.asarray(size, float)), colour).moved(by=at)
 
 
-def ball(radii: ArrayLike, at: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY) -> Solid:
-    """An ellipsoid; one radius, or one for each axis."""
-    mesh = trimesh.creation.icosphere(subdivisions=3)
+def ball(
+    radii: ArrayLike, at: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY, detail: int = 3
+) -> Solid:
+    """An ellipsoid; one radius, or one for each axis. Each step of detail has four times the faces."""
+    mesh = trimesh.creation.icosphere(subdivisions=detail)
     return from_trimesh(mesh, colour).moved(by=at, scale=radii)
 
 
@@ -191,7 +193,9 @@ def rod(
     """A limb: a cone between two points with round ends."""
     top = radius if end_radius is None else end_radius
     return join(
-        cone(start, end, radius, top, colour), ball(radius, start, colour), ball(top, end, colour)
+        cone(start, end, radius, top, colour),
+        ball(radius, start, colour, 2),
+        ball(top, end, colour, 2),
     )
 
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from visup.render.renderer import Picture, Renderer
 from visup.render.scenario import Scenario
+from visup.render.tracks import Matrix
 
 ENTERED = 0.10
 """An object is in the image while it would show this share of the most it ever shows."""
@@ -28,7 +29,8 @@ def frame_truth(picture: Picture, labels: Mapping[str, int]) -> dict[str, Any]:
     Returns:
         ``index`` and, for each object: ``visible_px``, ``amodal_px``, ``bbox`` [x, y, w, h] of what is
         visible (absent when nothing is), ``range_m`` from the camera to the object's origin,
-        ``quat_xyzw`` from the object's frame to the camera's (x right, y down, z forward).
+        ``quat_xyzw`` from the object's frame to the camera's (x right, y down, z forward); the last
+        two not for arms, which have no pose of their own.
     """
     out: dict[str, Any] = {"index": picture.index}
     for name, label in labels.items():
@@ -42,13 +44,18 @@ def frame_truth(picture: Picture, labels: Mapping[str, int]) -> dict[str, Any]:
             record["bbox"] = [
                 int(v) for v in (xs[0], ys[0], xs[-1] - xs[0] + 1, ys[-1] - ys[0] + 1)
             ]
-        pose = picture.poses[name]
-        record["range_m"] = round(float(np.linalg.norm(pose[:3, 3])), 5)
-        record["quat_xyzw"] = [
-            round(float(q), 5) for q in Rotation.from_matrix(pose[:3, :3]).as_quat()
-        ]
+        if name in picture.poses:
+            record |= _pose(picture.poses[name])
         out[name] = record
     return out
+
+
+def _pose(pose: Matrix) -> dict[str, Any]:
+    quat = Rotation.from_matrix(pose[:3, :3]).as_quat()
+    return {
+        "range_m": round(float(np.linalg.norm(pose[:3, 3])), 5),
+        "quat_xyzw": [round(float(q), 5) for q in quat],
+    }
 
 
 def presence_events(name: str, frames: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

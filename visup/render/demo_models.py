@@ -1,0 +1,106 @@
+"""The model database of the demo: 20 objects and 633 views, like the paper's (section 7).
+
+The satellite and the distractors are rendered from all around; the arm, which is never seen whole, is
+known by four exemplars of its silhouettes in the demo's own clip (paper, section 7.2).
+
+Run ``python -m visup.render.demo_models`` to make the shipped file anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from visup.percepts.shape.build import silhouette_views
+from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.shock_graph import shock_graph
+from visup.percepts.shape.silhouette import normalise
+from visup.percepts.shape.storage import NewView
+from visup.percepts.shape.views import render_views, sphere_directions
+from visup.render.demo_clip import shipped_scenario
+from visup.render.meshes import mesh
+from visup.render.renderer import Renderer
+from visup.render.things import THINGS
+
+MODELS = "demo.models"
+"""Name of the shipped file, in ``visup/data``."""
+
+TOTAL = 633
+ARM_VIEWS = 4
+SPARTAN_VIEWS = 22
+EVERY = 10
+"""Frames of the clip between silhouettes of the arm that are clustered."""
+
+
+def view_counts() -> dict[str, int]:
+    """How many views each of the 20 models has: 633 in all."""
+    others = ["payload_bay", *sorted(THINGS)]
+    left = TOTAL - ARM_VIEWS - SPARTAN_VIEWS
+    each, more = divmod(left, len(others))
+    counts = {name: each + (number < more) for number, name in enumerate(others)}
+    return {"spartan": SPARTAN_VIEWS, "arm": ARM_VIEWS, **counts}
+
+
+def rendered_views(name: str, count: int) -> list[NewView]:
+    """Views of one of our meshes from directions spread evenly over the sphere."""
+    solid = mesh(name)
+    body = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
+    views = []
+    for seen in render_views(body, sphere_directions(count)):
+        silhouette = normalise(seen.mask)
+        if silhouette is None:
+            continue
+        x, y, z = (float(c) for c in seen.direction)
+        graph = shock_graph(silhouette)
+        views.append(NewView(name, (x, y, z), seen.area, False, silhouette.contour, graph))
+    return views
+
+
+def arm_masks(every: int = EVERY) -> list[NDArray[np.bool_]]:
+    """Silhouettes of the arm in the demo's clip, (H, W) bool each, cut by the border of the image."""
+    scenario = shipped_scenario("sts87")
+    label = next(o.label for o in scenario.object if o.name == "arm")
+    renderer = Renderer(scenario)
+    return [renderer.mask(k) == label for k in range(0, scenario.frame_count, every)]
+
+
+def demo_views() -> Iterator[list[NewView]]:
+    """The views of each model in turn, in the order of `view_counts`."""
+    for name, count in view_counts().items():
+        if name == "arm":
+            yield silhouette_views(name, arm_masks(), count)
+        else:
+            yield rendered_views(name, count)
+
+
+def build_demo_database(
+    path: Path | str, progress: Callable[[int, int, str], None] | None = None
+) -> ModelDatabase:
+    """Build the demo's model database from the meshes in code.
+
+    Args:
+        path: Where it is written.
+        progress: Told how many models are done, of how many, and the name of the last.
+
+    Returns:
+        The database; the same for every call.
+
+    Raises:
+        DatabaseError: The file cannot be written.
+    """
+    names = list(view_counts())
+    done: list[NewView] = []
+    for number, views in enumerate(demo_views()):
+        done.extend(views)
+        if progress is not None:
+            progress(number + 1, len(names), names[number])
+    return ModelDatabase.create(path, done)
+
+
+if __name__ == "__main__":
+    build_demo_database(Path(str(resources.files("visup") / "data" / MODELS)))
