@@ -195,7 +195,7 @@ def _width(text: str, scale: Scale) -> int:
 
 def _stages(image: Image, mind: Mind, scale: Scale) -> int:
     """The stages of tasks along the bottom, and the time; returns where they begin, pixels."""
-    height, width = image.shape[:2]
+    height, width = int(image.shape[0]), int(image.shape[1])
     time = f"{mind.time:.1f} s"
     shown = mind.tasks[:MOST_TASKS]
     y = height - scale.row * max(1, len(shown))

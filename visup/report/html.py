@@ -1,0 +1,106 @@
+"""The report: one HTML file that opens offline, with its pictures, figures and script inside."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from visup.agent.errors import ExtraMissingError, OutputError
+from visup.report import sections
+from visup.report.figures import (
+    Figure,
+    distance_figures,
+    presence_figure,
+    stage_figure,
+    vote_figures,
+)
+from visup.report.records import RunData
+from visup.report.story import VERDICT_WORDS, title_of
+
+
+def write_report(run: RunData, path: Path) -> None:
+    """Write the report of a run.
+
+    Args:
+        run: From `Collector.finish`.
+        path: The file to write; replaced as a whole when it exists.
+
+    Raises:
+        ExtraMissingError: The run has figures, and Plotly is not installed.
+        OutputError: The file cannot be written.
+    """
+    page = report_page(run)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_text(page, encoding="utf-8")
+        part.replace(path)
+    except OSError as fault:
+        raise OutputError(
+            f"the report cannot be written ({fault.strerror or fault})",
+            where=str(path),
+            hint="choose a folder that exists and that you may write to",
+        ) from fault
+
+
+def report_page(run: RunData) -> str:
+    """The whole page.
+
+    Args:
+        run: From `Collector.finish`.
+
+    Returns:
+        HTML that refers to nothing outside itself; the same run always gives the same page.
+
+    Raises:
+        ExtraMissingError: The run has figures, and Plotly is not installed.
+    """
+    stages, presence = stage_figure(run), presence_figure(run)
+    distances, votes = distance_figures(run), vote_figures(run)
+    drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
+    own = files("visup.report")
+    page = Template((own / "report.html").read_text(encoding="utf-8"))
+    return page.substitute(
+        title=escape(title_of(run)),
+        verdict_word=escape(VERDICT_WORDS[run.verdict][0]),
+        style=(own / "report.css").read_text(encoding="utf-8"),
+        source=escape(run.source),
+        verdict=sections.verdict_badge(run),
+        notices=sections.notices(run),
+        hero=sections.hero(run),
+        narrative=sections.narrative(run),
+        alerts=sections.alerts(run),
+        key_frames=sections.key_frames(run),
+        tasks=sections.tasks(run),
+        stages=sections.figures([stages], "No stage was followed."),
+        presence=sections.figures([presence], "No object was followed."),
+        distances=sections.figures(distances, "No two objects were in view together."),
+        votes=sections.figures(votes, "No object was identified."),
+        similarity=sections.similarity(run),
+        facts=sections.run_facts(run),
+        figures=embedded(drawn),
+        plotly=plotly_source() if drawn else "",
+        script=(own / "report.js").read_text(encoding="utf-8"),
+    )
+
+
+def embedded(figures: list[Figure]) -> str:
+    """Figures as JSON that can stand inside a script element without ever ending it."""
+    values = [{"id": f.key, "data": f.traces, "layout": f.layout} for f in figures]
+    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def plotly_source() -> str:
+    """Plotly's own script, from the installed package.
+
+    Raises:
+        ExtraMissingError: It is not installed.
+    """
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as missing:
+        raise ExtraMissingError("the report", "report") from missing
+    return str(get_plotlyjs())

@@ -1,0 +1,65 @@
+"use strict";
+(() => {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const printing = matchMedia("print");
+  const figures = JSON.parse(document.getElementById("figures").textContent);
+
+  // Colours of text and ground come from the page, so that figures follow light, dark and paper.
+  const themed = (layout) => {
+    const page = getComputedStyle(document.documentElement);
+    const colour = (name) => page.getPropertyValue(name).trim();
+    const axis = { gridcolor: colour("--edge"), linecolor: colour("--edge"), automargin: true };
+    return {
+      ...layout,
+      autosize: true,
+      paper_bgcolor: "rgba(0,0,0,0)",
+      plot_bgcolor: "rgba(0,0,0,0)",
+      font: { color: colour("--ink"), family: "system-ui, sans-serif", size: 13 },
+      legend: { ...layout.legend, font: { color: colour("--ink") } },
+      xaxis: { ...layout.xaxis, ...axis },
+      yaxis: { ...layout.yaxis, ...axis },
+    };
+  };
+
+  const draw = () => {
+    for (const figure of figures) {
+      const place = document.getElementById(figure.id);
+      Plotly.react(place, figure.data, themed(figure.layout), {
+        responsive: true,
+        displaylogo: false,
+        displayModeBar: false,
+      });
+    }
+  };
+  if (figures.length) {
+    draw();
+    dark.addEventListener("change", draw);
+    printing.addEventListener("change", draw);
+  }
+
+  // Enlarged key frames, with the arrow keys to go through them.
+  const viewer = document.getElementById("viewer");
+  const shown = viewer.querySelector("figure");
+  const all = [...document.querySelectorAll(".gallery > figure")];
+  let at = 0;
+  const show = (index) => {
+    at = (index + all.length) % all.length;
+    const copy = all[at].querySelector("img").cloneNode();
+    shown.replaceChildren(copy, all[at].querySelector("figcaption").cloneNode(true));
+  };
+  all.forEach((figure, index) => {
+    figure.querySelector(".open").addEventListener("click", () => {
+      show(index);
+      viewer.showModal();
+    });
+  });
+  viewer.addEventListener("click", (event) => {
+    const key = event.target.closest("button");
+    if (event.target === viewer || (key && "close" in key.dataset)) viewer.close();
+    else if (key) show(at + Number(key.dataset.go));
+  });
+  viewer.addEventListener("keydown", (event) => {
+    if (event.key === "ArrowLeft") show(at - 1);
+    if (event.key === "ArrowRight") show(at + 1);
+  });
+})();
