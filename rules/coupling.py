@@ -17,8 +17,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-import numpy as np
-
 from visup.agent import (
     Coupling,
     Event,
@@ -30,7 +28,7 @@ from visup.agent import (
     Relation,
     Truth,
 )
-from visup.rules.relations import Measured, measured, scale
+from visup.rules.relations import Measured, RelationSettings, at_rest, measured, scale
 from visup.rules.sentences import sentence
 from visup.rules.tracks import tracks
 
@@ -44,14 +42,14 @@ class CouplingSettings:
     """When two bodies count as one.
 
     Attributes:
-        rest_speed: Relative speed below which bodies are at rest to each other, diagonals/s.
-        rest_s: How long that must last, beyond the second over which it is judged.
+        relations: Thresholds of rest; those of the relations.
+        rest_s: How long rest must last, beyond the window over which it is judged.
         merged_s: How long a merged region must last.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
     """
 
-    rest_speed: float = 0.0028
+    relations: RelationSettings = field(default_factory=RelationSettings)
     rest_s: float = 0.08
     merged_s: float = 1.2
     approach_s: float = 6.0
@@ -131,9 +129,7 @@ class Couple:
         if not set(pair) <= set(now.ids):
             return False
         i, j = (now.ids.index(x) for x in pair)
-        still = self.settings.rest_speed * scale(mind.frame_size)
-        halves = (now.early[i] - now.early[j], now.late[i] - now.late[j])
-        return all(float(np.hypot(*v)) < still for v in halves)
+        return bool(at_rest(now, self.settings.relations, scale(mind.frame_size))[i, j])
 
     def _well_apart(self, now: Measured, pair: Pair, mind: Mind) -> bool:
         return now.pair("gap", *pair) > 0.02 * scale(mind.frame_size)

@@ -45,6 +45,31 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     return slope, sigma
 
 
+def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
+    """Means of neighbouring samples, so that a fit over all pairs of them stays cheap.
+
+    Args:
+        times: (T,) seconds, increasing.
+        values: (T, N) any unit; NaN where there is no sample.
+        bins: Most samples wanted.
+
+    Returns:
+        Times and values of at most `bins` means of equally many neighbours; the newest bin is full,
+        the oldest may not be. NaN where a whole bin has no sample.
+    """
+    size = -(-len(times) // bins)
+    if size <= 1:
+        return times, values
+    edges = np.arange(len(times) % size if len(times) % size else size, len(times), size)
+    edges = np.concatenate([[0], edges])
+    known = np.isfinite(values)
+    count = np.add.reduceat(known, edges, axis=0, dtype=float)
+    total = np.add.reduceat(np.where(known, values, 0.0), edges, axis=0)
+    means = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+    sizes = np.diff(np.append(edges, len(times)))
+    return np.add.reduceat(times, edges) / sizes, means
+
+
 def nanmedian(values: Floats) -> Floats:
     """Median along the first axis with NaN left out; much quicker than NumPy's, and without noise.
 

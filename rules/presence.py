@@ -225,12 +225,22 @@ class SeePresence:
             if track is None:
                 work.of[belief.id] = first_sight(belief.region, work.now)
                 continue
+            if track.merged_with is not None:
+                self._part(work, belief)
+                track = work.of[belief.id]
             crowded = belief.id in hosts or any(
                 self._near(belief.region, other.region) for other in seen if other.id != belief.id
             )
             work.of[belief.id] = follow(
                 track, belief.region, work.now, crowded, self.settings.allowed_gap_s
             )
+
+    def _part(self, work: _Work, belief: ObjectBelief) -> None:
+        """An object that went up in another's region has one of its own again."""
+        host = work.mind.objects.get(work.of[belief.id].merged_with or -1)
+        work.put(belief, merged_with=None, changed_at=work.now)
+        if host is not None and host.id in work.of:
+            work.put(host, changed_at=work.now)
 
     def _near(self, a: Region, b: Region) -> bool:
         if box_gap(a.bbox, b.bbox) > self.settings.contact_px:

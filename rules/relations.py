@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome, Presence, Relation, Truth
-from visup.rules.fit import theil_sen, velocity
+from visup.rules.fit import binned, theil_sen, velocity
 from visup.rules.geometry import FAN, RCC8, Floats, hull_separation, outline_gap, rcc8, reach
 from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
 from visup.rules.tracks import merged_pairs, tracks
@@ -39,6 +39,8 @@ class RelationSettings:
     Attributes:
         window_s: Length of the window over which lines are fitted.
         samples: Most samples kept in the window.
+        bins: Most means of neighbouring samples to which lines are fitted.
+        motion_window_s: Length of the window over which velocities are fitted.
         rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
         rate_exit: Trend below which they end, image diagonals per second.
         sigmas: How many standard deviations of the slope a trend must exceed to enter.
@@ -47,13 +49,17 @@ class RelationSettings:
         touch_enter: Outline gap at which bodies touch, image diagonals.
         touch_exit: Outline gap at which they no longer do.
         touch_minimum_s: Least duration of a touch.
-        still_speed: Relative speed below which two bodies are at rest to each other, diagonals/s.
+        still_speed: Relative speed over the window below which two bodies are at rest to each
+            other, image diagonals per second.
+        still_half: The same in each half of the window, where the noise is greater.
         apart_depth: Share of depth by which touching outlines belong to bodies apart in depth.
         image_only_confidence: Most that a relation judged without depth is believed.
     """
 
     window_s: float = 1.5
-    samples: int = 32
+    samples: int = 64
+    bins: int = 16
+    motion_window_s: float = 1.25
     rate_enter: float = 0.002
     rate_exit: float = 0.001
     sigmas: float = 3.0
@@ -62,7 +68,8 @@ class RelationSettings:
     touch_enter: float = 0.0035
     touch_exit: float = 0.006
     touch_minimum_s: float = 0.2
-    still_speed: float = 0.003
+    still_speed: float = 0.0025
+    still_half: float = 0.0045
     apart_depth: float = 0.25
     image_only_confidence: float = 0.8
 
@@ -213,7 +220,9 @@ class Relations:
         slope, sigma = np.full((m, m), np.nan), np.full((m, m), np.nan)
         i, j = np.triu_indices(m, 1)
         if self._covered(h, mind.time) and len(i):
-            slope[i, j], sigma[i, j] = theil_sen(h.times, h.separation[:, i, j])
+            slope[i, j], sigma[i, j] = theil_sen(
+                *binned(h.times, h.separation[:, i, j], self.settings.bins)
+            )
             slope[j, i], sigma[j, i] = slope[i, j], sigma[i, j]
         stale = np.array([mind.time - b.last_seen > 0.5 * self.settings.window_s for b in objects])
         if m:
@@ -241,7 +250,7 @@ class Relations:
         unknown = np.full((m, 2), np.nan)
         if m == 0 or not self._covered(h, now):
             return unknown, unknown, unknown
-        recent = h.times > now - 2.0 / 3.0 * self.settings.window_s
+        recent = h.times > now - self.settings.motion_window_s
         times, support, free = h.times[recent], h.support[recent], h.free[recent]
         cut = len(times) // 2
         return (
@@ -313,7 +322,8 @@ class Relations:
         i, j = i[both], j[both]
         if len(i) == 0 or not self._covered(h, now):
             return codes
-        slope, sigma = theil_sen(h.times, np.abs(h.depth[:, i] - h.depth[:, j]))
+        apart = np.abs(h.depth[:, i] - h.depth[:, j])
+        slope, sigma = theil_sen(*binned(h.times, apart, self.settings.bins))
         typical = 0.5 * np.nanmean(h.depth[:, i] + h.depth[:, j], axis=0)
         least = np.maximum(self.settings.depth_rate * typical, 3.0 * sigma)
         found = np.full(len(i), KEEPING, dtype=np.int8)
@@ -334,14 +344,11 @@ class Relations:
         return wanted
 
     def _wanted_together(self, now: Measured, diagonal: float) -> Codes:
-        """Both move and neither moves relative to the other, in both halves of the last second."""
-        still = self.settings.still_speed * diagonal
-        early = np.linalg.norm(now.early[:, None] - now.early[None], axis=2)
-        late = np.linalg.norm(now.late[:, None] - now.late[None], axis=2)
+        """Both move and neither moves relative to the other."""
         with np.errstate(invalid="ignore"):
-            rigid = (early < still) & (late < still)
-            moves = (now.speed[:, None] > 2 * still) & (now.speed[None] > 2 * still)
-            wanted: Codes = (rigid & moves).astype(np.int8)
+            moves = now.speed > 2 * self.settings.still_speed * diagonal
+        rest = at_rest(now, self.settings, diagonal)
+        wanted: Codes = (rest & moves[:, None] & moves[None]).astype(np.int8)
         wanted[~np.isfinite(now.relative_speed)] = UNKNOWN
         return wanted
 
@@ -398,6 +405,28 @@ class Relations:
         truth = Truth.UNKNOWN if state == UNKNOWN else _truth(state == 1)
         c = 0.0 if state == UNKNOWN else confidence
         return Relation(name, pair, truth, float(latch.since[i, j]), c, _number(value))
+
+
+def at_rest(now: Measured, settings: RelationSettings, diagonal: float) -> NDArray[np.bool_]:
+    """Whether bodies are at rest to each other: over the window, and in both of its halves.
+
+    The halves are looked at so that a body that bounces off, whose mean relative velocity is zero
+    for a moment, is not taken for one that rests.
+
+    Args:
+        now: Velocities.
+        settings: Thresholds.
+        diagonal: Image diagonal, pixels.
+
+    Returns:
+        (M, M) bool; false where a velocity is unknown.
+    """
+    early = np.linalg.norm(now.early[:, None] - now.early[None], axis=2)
+    late = np.linalg.norm(now.late[:, None] - now.late[None], axis=2)
+    with np.errstate(invalid="ignore"):
+        halves = np.maximum(early, late) < settings.still_half * diagonal
+        rest: NDArray[np.bool_] = halves & (now.relative_speed < settings.still_speed * diagonal)
+    return rest
 
 
 def wanted_trend(
