@@ -59,6 +59,7 @@ class PresenceSettings:
         leaving_share: Below this share, going over the border, it has left.
         shown_share: Above this share a hidden object has reappeared.
         shown_s: How long it must show, or stay in the clear, before that is told.
+        whole_share: An object of which less shows was being hidden, and went up in no other.
         contact_px: Regions closer than this may hide parts of each other.
         adopt_s: A new region must be seen this long before it can be a hidden object.
     """
@@ -75,6 +76,7 @@ class PresenceSettings:
     leaving_share: float = 0.12
     shown_share: float = 0.5
     shown_s: float = 0.12
+    whole_share: float = 0.6
     contact_px: float = 4.0
     adopt_s: float = 0.12
 
@@ -187,20 +189,19 @@ class SeePresence:
                 continue
             host = next((b for b in work.seen() if self._grew_by(work, b, track)), None)
             if host is not None:
-                work.put(gone, merged_with=host.id, merged_since=work.now, changed_at=work.now)
-                if host.id in work.of:
-                    work.put(host, changed_at=work.now)
+                again = track.parted_at is not None and work.now - track.parted_at < 0.5
+                since = track.merged_since if again else work.now
+                work.put(gone, merged_with=host.id, merged_since=since)
 
     def _stay_merged(self, work: _Work, gone: ObjectBelief, track: Track) -> None:
         host = work.mind.objects.get(track.merged_with or -1)
         if host is None or host.presence is not Presence.SEEN:
-            work.put(gone, merged_with=None)
+            work.put(gone, merged_with=None, parted_at=work.now)
             return
         before = work.of[host.id].region
         if host.last_seen == work.now and host.region.area < 0.75 * before.area:
             # The host's region is its own again; where the other one is shows in the next frames.
-            work.put(gone, merged_with=None, changed_at=work.now, seen_at=work.now)
-            work.put(host, changed_at=work.now)
+            work.put(gone, merged_with=None, parted_at=work.now, seen_at=work.now)
             return
         dx = host.region.centroid[0] - before.centroid[0]
         dy = host.region.centroid[1] - before.centroid[1]
@@ -208,7 +209,7 @@ class SeePresence:
 
     def _grew_by(self, work: _Work, host: ObjectBelief, gone: Track) -> bool:
         before = work.of.get(host.id)
-        if before is None or not host.confirmed:
+        if before is None or not host.confirmed or gone.visible < self.settings.whole_share:
             return False
         parts = gone.region.area + before.region.area
         if host.region.area < before.region.area + 0.5 * gone.region.area:
@@ -226,7 +227,8 @@ class SeePresence:
                 work.of[belief.id] = first_sight(belief.region, work.now)
                 continue
             if track.merged_with is not None:
-                self._part(work, belief)
+                # It has a region of its own again.
+                work.put(belief, merged_with=None, parted_at=work.now)
                 track = work.of[belief.id]
             crowded = belief.id in hosts or any(
                 self._near(belief.region, other.region) for other in seen if other.id != belief.id
@@ -234,13 +236,6 @@ class SeePresence:
             work.of[belief.id] = follow(
                 track, belief.region, work.now, crowded, self.settings.allowed_gap_s
             )
-
-    def _part(self, work: _Work, belief: ObjectBelief) -> None:
-        """An object that went up in another's region has one of its own again."""
-        host = work.mind.objects.get(work.of[belief.id].merged_with or -1)
-        work.put(belief, merged_with=None, changed_at=work.now)
-        if host is not None and host.id in work.of:
-            work.put(host, changed_at=work.now)
 
     def _near(self, a: Region, b: Region) -> bool:
         if box_gap(a.bbox, b.bbox) > self.settings.contact_px:

@@ -197,7 +197,11 @@ class Relations:
         due = len(history.times) == 0 or mind.time - history.times[-1] >= least - 1e-6
         if not (due and observation.observed("region")):
             return only(history, kept)
-        seen = [b.last_seen == mind.time and b.presence is Presence.SEEN for b in objects]
+        joint = {i for pair in merged_pairs(mind) for i in pair}
+        seen = [
+            b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint
+            for b in objects
+        ]
         reaches = [reach(b.region, mind.frame_size) for b in objects]
         support = np.full((len(ids), FAN), np.nan)
         free = np.zeros((len(ids), FAN), dtype=bool)

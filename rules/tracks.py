@@ -40,8 +40,9 @@ class Track:
         clear_since: Seconds since when most of it shows again, or None.
         merged_with: The object in whose region it went up, or None.
         merged_since: Seconds of that.
-        changed_at: Seconds when its region last changed its nature (merged or parted, taken over);
-            older shapes of it cannot be compared with newer ones.
+        parted_at: Seconds when it last had a region of its own again, or None.
+        changed_at: Seconds when it was given another region; shapes of the older one cannot be
+            compared with those of the new one.
         told: What was told last: '', 'seen', 'occluded', 'lost' or 'left'.
     """
 
@@ -59,6 +60,7 @@ class Track:
     clear_since: float | None = None
     merged_with: int | None = None
     merged_since: float = 0.0
+    parted_at: float | None = None
     changed_at: float = -1.0
     told: str = ""
 
