@@ -19,6 +19,7 @@ from visup.rules import default_thinkers
 from visup.rules.language import load_rules
 from visup.settings import WatchSettings
 from visup.tasks import load_task
+from visup.tasks.structure import task_actors
 from visup.tasks.supervise import finish, task_thinker
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
         VisupError: A task, rules file, model database or behaviour is not as it should be, or an actor is
             bound that no task has or to a model that the database lacks.
     """
-    tasks = [task for name in settings.tasks for task in load_task(name)]
+    tasks = [load_task(name) for name in settings.tasks]
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     return Agent(
@@ -94,7 +95,7 @@ def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
 def _check_actors(
     settings: WatchSettings, tasks: Sequence[Task], database: ModelDatabase | None
 ) -> None:
-    known = {actor for task in tasks for actor in task.actor_names()}
+    known = {actor for task in tasks for actor in task_actors(task)}
     for actor, models in settings.actors.items():
         if tasks and actor not in known:
             raise SettingsError(
