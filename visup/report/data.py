@@ -48,6 +48,7 @@ JPEG_QUALITY = 82
 BEST_MATCHES = 5
 MOST_LOOKS = 4
 MOST_SUBJECTS = 8
+MOST_PAIRED = 5
 MOST_CANDIDATES = 8
 MOVES = ("converging", "diverging", "keeping_distance")
 KIND_WEIGHTS: Mapping[str, int] = {
@@ -264,7 +265,7 @@ def sample_of(mind: Mind) -> Sample:
         for b in objects
         if b.candidates
     }
-    pairs = itertools.combinations(sorted(objects, key=lambda b: b.id), 2)
+    pairs = itertools.combinations(sorted(objects[:MOST_PAIRED], key=lambda b: b.id), 2)
     distances = {(a.id, b.id): _distance(mind, a, b) for a, b in pairs}
     return Sample(mind.time, votes, {k: d for k, d in distances.items() if d is not None})
 

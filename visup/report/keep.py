@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -106,11 +106,3 @@ class Heaviest(Generic[T]):
     def items(self) -> tuple[T, ...]:
         """What was kept, in the order in which it came."""
         return tuple(self._items)
-
-
-def first_seen(items: list[T], key: Callable[[T], Hashable]) -> list[T]:
-    """The items without those whose key came before."""
-    seen: dict[Hashable, T] = {}
-    for item in items:
-        seen.setdefault(key(item), item)
-    return list(seen.values())

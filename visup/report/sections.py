@@ -200,14 +200,14 @@ def similarity(run: RunData) -> str:
 
 
 def _compared(key: KeyFrame) -> str:
-    cards = "".join(_look(look) for look in key.looks)
+    cards = "".join(_look(look, key.time) for look in key.looks)
     return (
         f'<h3><a href="#{_anchor(key)}">{key.time:.1f} s</a> '
         f"<b class=quiet>frame {key.frame_index}</b></h3><div class=looks>{cards}</div>"
     )
 
 
-def _look(look: Look) -> str:
+def _look(look: Look, time: float) -> str:
     colour = css(object_colour(look.object_id)) if look.object_id else css(OBJECT_COLOURS[0])
     rows = "".join(
         f"<tr{' class=agreed' if m.name == look.believed else ''}><td>{i}</td>"
@@ -223,6 +223,8 @@ def _look(look: Look) -> str:
         else "<p class=quiet>No hypothesis.</p>"
     )
     believed = f"{look.believed} {look.share:.0%}".replace("%", " %")
+    if look.matches and abs(look.matched_at - time) > 0.05:
+        believed += f", compared at {look.matched_at:.1f} s"
     return (
         f'<div class=look style="--object:{colour}"><div class=crop><img src="{_data(look.jpeg)}" '
         f'alt="Region {look.region_id} cut out of the frame"></div><div><p><b>Region '
