@@ -75,7 +75,7 @@ def test_spans_follow_stages_moves_and_presence() -> None:
     ]
     (hidden,) = [s for s in data.spans_about("presence") if s.value == "hidden"]
     assert hidden.subject == ("presence", "1")
-    assert (hidden.start, hidden.end) == (pytest.approx(3.2), pytest.approx(3.6))
+    assert [hidden.start, hidden.end] == pytest.approx([3.2, 3.6])
 
 
 def test_memory_is_bounded_whatever_the_length() -> None:
