@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 from visup.agent import Thinker
 from visup.rules.coupling import Couple, CouplingSettings
 from visup.rules.depth import BelieveDepth, DepthSettings
+from visup.rules.formula import Rule
+from visup.rules.language import shipped_rules
 from visup.rules.narrative import NarrativeSettings, TellRelations
 from visup.rules.objects import ObjectSettings, UpdateObjects
 from visup.rules.presence import PresenceSettings, SeePresence
 from visup.rules.relations import Relations, RelationSettings
+from visup.rules.safety import RuleThinker
 from visup.rules.votes import Votes, VoteSettings
 
 
@@ -40,11 +43,14 @@ class RuleSet:
     cogitate: tuple[Thinker, ...]
 
 
-def default_thinkers(settings: RuleSettings | None = None) -> RuleSet:
+def default_thinkers(
+    settings: RuleSettings | None = None, rules: tuple[Rule, ...] | None = None
+) -> RuleSet:
     """The thinkers that ship with visup.
 
     Args:
         settings: Their settings; the defaults when left out.
+        rules: Rules to watch; those of `safety.rules` when left out.
 
     Returns:
         The thinkers of the update and cogitate phases. Each is a pure function of mind and
@@ -60,5 +66,6 @@ def default_thinkers(settings: RuleSettings | None = None) -> RuleSet:
             Relations(s.relations),
             Couple(s.coupling),
             TellRelations(s.narrative),
+            RuleThinker(shipped_rules() if rules is None else rules),
         ),
     )
