@@ -52,20 +52,19 @@ def link_poses(joints: Joints) -> list[NDArray[np.float64]]:
         Each has its origin in its joint and x along its link.
     """
     steps = (
-        (0.0, "z", joints.shoulder_yaw),
-        (0.0, "y", -joints.shoulder_pitch),
-        (UPPER, "y", -joints.elbow_pitch),
-        (LOWER, "y", -joints.wrist_pitch),
-        (WRIST, "z", joints.wrist_yaw),
-        (HAND, "x", joints.wrist_roll),
-        (TOOL, "x", 0.0),
+        ((0.0, 0.0, 0.0), "z", joints.shoulder_yaw),
+        ((0.0, 0.0, FOOT), "y", -joints.shoulder_pitch),
+        ((UPPER, 0.0, 0.0), "y", -joints.elbow_pitch),
+        ((LOWER, 0.0, 0.0), "y", -joints.wrist_pitch),
+        ((WRIST, 0.0, 0.0), "z", joints.wrist_yaw),
+        ((HAND, 0.0, 0.0), "x", joints.wrist_roll),
+        ((TOOL, 0.0, 0.0), "x", 0.0),
     )
     poses, pose = [], np.eye(4)
-    pose[2, 3] = 0.0
-    for number, (length, axis, angle) in enumerate(steps):
+    for offset, axis, angle in steps:
         step = np.eye(4)
         step[:3, :3] = Rotation.from_euler(axis, angle).as_matrix()
-        step[:3, 3] = (0.0, 0.0, FOOT) if number == 1 else (length, 0.0, 0.0)
+        step[:3, 3] = offset
         pose = pose @ step
         poses.append(pose)
     return poses

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from visup.render.scenario import Camera, Earth, Light, Stars
 from visup.render.tracks import spin_about
 
 Floats = NDArray[np.float32]
 EARTH_RADIUS_KM = 6371.0
+MAP_SIDE = 1536
+"""Pixels along each side of the map of clouds."""
+
 AIR_KM = 60.0
 """Height of the air that shows as the bright rim of the Earth."""
 
@@ -72,7 +79,9 @@ def earth(
     points = rays[ground] * distance[:, None] - down * far
     normals = points / EARTH_RADIUS_KM
     lit = np.clip(normals @ sun, 0.0, None) * 0.85 + 0.15
-    cover = clouds(normals @ rotation, settings.clouds, settings.seed)[:, None]
+    extent = float(np.sqrt(1 - (EARTH_RADIUS_KM / far) ** 2))
+    ground_at = normals @ rotation @ _across(down)
+    cover = clouds(ground_at, extent, settings.clouds, settings.seed)[:, None]
     surface = OCEAN * (1 - cover) + CLOUD * cover
     haze = np.clip((closest[ground] / EARTH_RADIUS_KM - 0.97) / 0.03, 0.0, 1.0)[:, None] ** 2 * 0.5
     radiance[ground] = (surface * (1 - haze) + AIR * haze) * lit[:, None]
@@ -85,55 +94,45 @@ def ground_turn(settings: Earth, time: float) -> NDArray[np.float64]:
     return np.asarray(turn.as_matrix())
 
 
-def clouds(points: NDArray[np.float64], amount: float, seed: int) -> Floats:
-    """How much cloud there is over points of the unit sphere.
+def clouds(ground: NDArray[np.float64], extent: float, amount: float, seed: int) -> Floats:
+    """How much cloud there is over places on the ground.
 
     Args:
-        points: (N, 3).
+        ground: (N, 2) places in the plane through the middle of the Earth, across the line of sight to
+            it, in Earth radii; they may lie anywhere, the weather repeats.
+        extent: Half the side of the square that is drawn, Earth radii.
         amount: 0 for a clear sky to 1 for an overcast one.
         seed: Chooses the weather.
 
     Returns:
         (N,) float32, 0 to 1.
     """
-    total = np.zeros(len(points), np.float64)
-    weight, scale = 0.5, 14.0
-    for octave in range(6):
-        total += weight * value_noise(points * scale, seed * 31 + octave)
-        weight, scale = weight * 0.58, scale * 2.1
-    level = 0.62 - 0.3 * (amount - 0.5)
-    return np.asarray(np.clip((total - level + 0.12) / 0.35, 0.0, 1.0), np.float32)
+    drawn = _cloud_map(extent, amount, seed)
+    at = (ground / extent + 1) * (MAP_SIDE - 1) / 2
+    return np.asarray(map_coordinates(drawn, at.T, order=1, mode="mirror"), np.float32)
 
 
-def value_noise(points: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    """Smooth noise in space: random values on the integer grid, blended in between.
-
-    Args:
-        points: (N, 3).
-        seed: Of the values.
-
-    Returns:
-        (N,), 0 to 1.
-    """
-    base = np.floor(points).astype(np.int64)
-    part = points - base
-    blend = part * part * (3 - 2 * part)
-    out = np.zeros(len(points))
-    for corner in range(8):
-        step = np.array([(corner >> k) & 1 for k in range(3)])
-        share = np.prod(np.where(step == 1, blend, 1 - blend), axis=1)
-        out += share * _grid_value(base + step, seed)
-    return out
+@lru_cache(maxsize=4)
+def _cloud_map(extent: float, amount: float, seed: int) -> Floats:
+    """(MAP_SIDE, MAP_SIDE): noise of six sizes added up, thresholded to clouds with soft edges."""
+    random = np.random.default_rng(seed)
+    total = np.zeros((MAP_SIDE, MAP_SIDE), np.float32)
+    weight, cells = 0.5, 30.0
+    for _ in range(6):
+        side = max(4, round(2 * extent * cells))
+        grid = random.random((side, side), dtype=np.float32)
+        total += weight * cv2.resize(grid, (MAP_SIDE, MAP_SIDE), interpolation=cv2.INTER_CUBIC)
+        weight, cells = weight * 0.58, cells * 2.1
+    level = float(np.quantile(total, 1 - amount))
+    return np.asarray(np.clip((total - level) / 0.3 + 0.4, 0.0, 1.0), np.float32)
 
 
-def _grid_value(cells: NDArray[np.int64], seed: int) -> NDArray[np.float64]:
-    """A random value for each cell of the integer grid, by hashing its coordinates."""
-    with np.errstate(over="ignore"):
-        mixed = cells.astype(np.uint64) * np.array([73856093, 19349663, 83492791], np.uint64)
-        h = mixed[:, 0] ^ mixed[:, 1] ^ mixed[:, 2] ^ np.uint64(seed * 2654435761 % 2**32)
-        h = (h ^ (h >> np.uint64(15))) * np.uint64(2246822519)
-        h = (h ^ (h >> np.uint64(13))) * np.uint64(3266489917)
-    return ((h >> np.uint64(16)) & np.uint64(0xFFFF)).astype(np.float64) / 65535.0
+def _across(down: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 2): two directions square to one and to each other."""
+    other = np.eye(3)[int(np.argmin(np.abs(down)))]
+    first = np.cross(down, other)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(down, first)], axis=1)
 
 
 def _splat(

@@ -10,18 +10,12 @@ from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
+from visup.render.library import shipped_scenario
 from visup.render.renderer import Renderer
-from visup.render.scenario import Scenario, parse_scenario
 from visup.render.truth import frame_truth, mission, mission_truth
 from visup.render.writer import VideoWriter
 
 CLIP, RECORD = "sts87.mp4", "sts87.json"
-
-
-def shipped_scenario(name: str) -> Scenario:
-    """A scenario that ships with visup, by its name without ``.toml``."""
-    text = (resources.files("visup.render") / f"{name}.toml").read_text(encoding="utf-8")
-    return parse_scenario(text, f"{name}.toml")
 
 
 def write_demo_clip(folder: Path, progress: Callable[[int, int], None] | None = None) -> None:

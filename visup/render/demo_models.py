@@ -11,18 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from importlib import resources
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from visup.percepts.shape.build import silhouette_views
+from visup.percepts.shape.build import mesh_views, silhouette_views
 from visup.percepts.shape.database import ModelDatabase
-from visup.percepts.shape.shock_graph import shock_graph
-from visup.percepts.shape.silhouette import normalise
 from visup.percepts.shape.storage import NewView
-from visup.percepts.shape.views import render_views, sphere_directions
-from visup.render.demo_clip import shipped_scenario
+from visup.render.library import shipped_scenario
 from visup.render.meshes import mesh
 from visup.render.renderer import Renderer
 from visup.render.things import THINGS
@@ -49,16 +47,11 @@ def view_counts() -> dict[str, int]:
 def rendered_views(name: str, count: int) -> list[NewView]:
     """Views of one of our meshes from directions spread evenly over the sphere."""
     solid = mesh(name)
-    body = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
-    views = []
-    for seen in render_views(body, sphere_directions(count)):
-        silhouette = normalise(seen.mask)
-        if silhouette is None:
-            continue
-        x, y, z = (float(c) for c in seen.direction)
-        graph = shock_graph(silhouette)
-        views.append(NewView(name, (x, y, z), seen.area, False, silhouette.contour, graph))
-    return views
+    with TemporaryDirectory() as folder:
+        # Through a file, as any user's mesh would come, so that both are treated alike.
+        path = Path(folder) / f"{name}.ply"
+        trimesh.Trimesh(solid.vertices, solid.faces, process=False).export(path)
+        return mesh_views(path, count)
 
 
 def arm_masks(every: int = EVERY) -> list[NDArray[np.bool_]]:

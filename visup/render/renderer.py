@@ -160,11 +160,11 @@ class Renderer:
         """(4, 4) from an object's frame to the world's; for an arm, of its foot."""
         if item.attach is not None and time > item.attach.from_s:
             carrier, since = self._objects[item.attach.to], item.attach.from_s
-            carried = inverse(self._grip(carrier, since)) @ self.object_pose(item, since)
-            return np.asarray(self._grip(carrier, time) @ carried)
+            carried = inverse(self.grip(carrier, since)) @ self.object_pose(item, since)
+            return np.asarray(self.grip(carrier, time) @ carried)
         return track_pose(item, time)
 
-    def _grip(self, item: SceneObject, time: float) -> Matrix:
+    def grip(self, item: SceneObject, time: float) -> Matrix:
         """The frame that things attached to an object move with."""
         pose = self.object_pose(item, time)
         return pose @ arm_model.tip_pose(self._joints(item, time)) if item.mesh == "arm" else pose

@@ -6,6 +6,7 @@ The format is told in ``docs/scenarios.md``. World coordinates are metres, right
 from __future__ import annotations
 
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -99,7 +100,7 @@ class Shake(_Model):
 
 def _rising(keys: tuple[Any, ...]) -> tuple[Any, ...]:
     times = [k.at_s for k in keys]
-    if any(b <= a for a, b in zip(times[:-1], times[1:], strict=True)):
+    if any(b <= a for a, b in pairwise(times)):
         raise ValueError("at_s must rise from key to key")
     return keys
 
@@ -273,9 +274,9 @@ class Scenario(_Model):
     @model_validator(mode="after")
     def _names(self) -> Scenario:
         names = [o.name for o in self.object]
-        labels = [o.label for o in self.labelled]
-        for words, kind in ((names, "name"), (labels, "label")):
-            twice = sorted({str(w) for w in words if words.count(w) > 1})  # type: ignore[attr-defined]
+        labels = [str(o.label) for o in self.labelled]
+        for kind, words in (("name", names), ("label", labels)):
+            twice = sorted({w for w in words if words.count(w) > 1})
             if twice:
                 raise ValueError(f"two objects have the {kind} {twice[0]!r}")
         known = set(names)
@@ -320,7 +321,7 @@ def load_scenario(path: Path) -> Scenario:
         raise SettingsError(
             f"the scenario cannot be read: {reason}", where=str(path), expected="a scenario in TOML"
         ) from error
-    return parse_scenario(text, str(path))
+    return _beside(parse_scenario(text, str(path)), path.parent)
 
 
 def parse_scenario(text: str, name: str = "scenario") -> Scenario:
@@ -334,8 +335,28 @@ def parse_scenario(text: str, name: str = "scenario") -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        faults: list[VisupError] = [_fault(dict(e), name, text) for e in error.errors()]
+        faults: list[VisupError] = [_fault(e, name, text) for e in _root_faults(error)]
         raise (faults[0] if len(faults) == 1 else ManyErrors(faults)) from error
+
+
+def _beside(scenario: Scenario, folder: Path) -> Scenario:
+    """The scenario with its mesh files looked for beside the scenario's own file."""
+    items = [
+        o.model_copy(update={"mesh": str(folder / o.mesh)}) if Path(o.mesh).suffix else o
+        for o in scenario.object
+    ]
+    return scenario.model_copy(update={"object": tuple(items)})
+
+
+def _root_faults(error: ValidationError) -> list[dict[str, Any]]:
+    """The faults themselves, without those that only follow: a list is 'too short' once its items fell."""
+    found = [dict(e) for e in error.errors()]
+    places = [e["loc"] for e in found]
+    return [
+        e
+        for e in found
+        if not any(p != e["loc"] and p[: len(e["loc"])] == e["loc"] for p in places)
+    ]
 
 
 def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:

@@ -28,7 +28,7 @@ def expose(
     """
     light = radiance
     if sensor.blur_px > 0:
-        light = cv2.GaussianBlur(light, (0, 0), sensor.blur_px)
+        light = np.asarray(cv2.GaussianBlur(light, (0, 0), sensor.blur_px), np.float32)
     signal = np.clip(light * sensor.exposure, 0.0, 1.0) ** (1.0 / sensor.gamma)
     grey = sensor.black + signal * (255.0 - sensor.black)
     if sensor.noise > 0:

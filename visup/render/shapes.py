@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import trimesh
@@ -44,11 +45,6 @@ class Solid:
         length = np.linalg.norm(n, axis=1, keepdims=True)
         return np.asarray(n / np.where(length > 0, length, 1.0))
 
-    @property
-    def radius(self) -> float:
-        """Greatest distance of a vertex from the origin."""
-        return float(np.linalg.norm(self.vertices, axis=1).max())
-
     def moved(
         self,
         by: ArrayLike = (0.0, 0.0, 0.0),
@@ -74,11 +70,6 @@ class Solid:
         return Solid(
             self.vertices, self.faces, np.tile(np.asarray(colour, float), (len(self.faces), 1))
         )
-
-    def centred(self) -> Solid:
-        """The solid with the middle of its bounding box at the origin."""
-        middle = (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
-        return self.moved(by=-middle)
 
     def transformed(self, pose: NDArray[np.float64]) -> Solid:
         """The solid under a rigid motion, (4, 4)."""
@@ -201,18 +192,8 @@ def rod(
 
 def limb(points: Sequence[Sequence[float]], radii: Sequence[float], colour: Colour = GREY) -> Solid:
     """Rods end to end through points, with a radius at each."""
-    pieces = zip(points[:-1], points[1:], radii[:-1], radii[1:], strict=True)
-    return join(*(rod(a, b, r, s, colour) for a, b, r, s in pieces))
-
-
-def ring(
-    radius: float, thickness: float, colour: Colour = GREY, start: float = 0.0, stop: float = 360.0
-) -> Solid:
-    """A torus about z, or a part of one between two angles in degrees."""
-    steps = max(4, round((stop - start) / 15))
-    angles = np.radians(np.linspace(start, stop, steps + 1))
-    points = [(radius * float(np.cos(a)), radius * float(np.sin(a)), 0.0) for a in angles]
-    return limb(points, [thickness] * len(points), colour)
+    pieces = zip(pairwise(points), pairwise(radii), strict=True)
+    return join(*(rod(a, b, r, s, colour) for (a, b), (r, s) in pieces))
 
 
 def plate(outline: Sequence[tuple[float, float]], thickness: float, colour: Colour = GREY) -> Solid:

@@ -20,7 +20,6 @@ from visup.render.shapes import (
     limb,
     mirrored,
     plate,
-    ring,
     rod,
 )
 

@@ -5,10 +5,8 @@ A pose is a (4, 4) float64 rigid motion from an object's own frame to the world'
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -31,7 +29,7 @@ def inverse(pose: Matrix) -> Matrix:
     return out
 
 
-def look_at(position: Sequence[float], target: Sequence[float], up: Sequence[float]) -> Rotation:
+def look_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Rotation:
     """The rotation of a camera (x right, y down, z forward) that looks at a point.
 
     Args:

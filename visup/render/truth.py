@@ -111,8 +111,10 @@ def mission_truth(renderer: Renderer, frames: Sequence[Mapping[str, Any]]) -> di
     scenario, truth = renderer.scenario, renderer.scenario.truth
     fps = scenario.camera.fps
     events = [e for o in scenario.labelled for e in presence_events(o.name, frames)]
-    for c in truth.coupling:
-        events.append({"kind": c.kind, "objects": list(c.objects), "frame": round(c.at_s * fps)})
+    events += [
+        {"kind": c.kind, "objects": list(c.objects), "frame": round(c.at_s * fps)}
+        for c in truth.coupling
+    ]
     return {
         "name": scenario.name,
         "fps": fps,

@@ -34,10 +34,7 @@ class VideoWriter:
     """
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
-        if path.suffix not in CODECS:
-            raise SettingsError(
-                f"there is no video container {path.suffix!r}", expected=", ".join(sorted(CODECS))
-            )
+        _check_container(path.suffix)
         code = cv2.VideoWriter_fourcc(*CODECS[path.suffix])  # type: ignore[attr-defined]
         self._path = path
         self._writer = cv2.VideoWriter(str(path), code, fps, size)
@@ -65,7 +62,7 @@ def write_mission(
 
     Args:
         scenario: What to render.
-        out: Folder, made when missing: ``video``, ``masks/00000.png``, ``mission.json``, ``truth.json``.
+        out: Folder, new or empty: ``video``, ``masks/00000.png``, ``mission.json``, ``truth.json``.
         container: Suffix of the video, one of `CODECS`.
         progress: Told frames done and frames in all.
 
@@ -73,15 +70,13 @@ def write_mission(
         What stands in ``truth.json``.
 
     Raises:
-        OutputError: The folder cannot be written.
+        OutputError: The folder cannot be written, or something is in it already.
         SettingsError: The scenario cannot be rendered.
     """
+    _check_container(container)
     renderer = Renderer(scenario)
     labels = {o.name: o.label for o in scenario.labelled}
-    try:
-        (out / "masks").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"the folder cannot be made: {error.strerror}", where=str(out)) from error
+    _make_folder(out)
     frames = []
     with VideoWriter(out / f"video{container}", scenario.camera.fps, scenario.camera.size) as video:
         for index in range(scenario.frame_count):
@@ -95,6 +90,26 @@ def write_mission(
     _write_json(out / "truth.json", truth)
     _write_json(out / "mission.json", mission(scenario))
     return truth
+
+
+def _check_container(suffix: str) -> None:
+    if suffix not in CODECS:
+        raise SettingsError(
+            f"there is no video container {suffix!r}", expected=", ".join(sorted(CODECS))
+        )
+
+
+def _make_folder(out: Path) -> None:
+    """Make a folder for a mission; masks of another one would be taken for its own."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise OutputError(
+                "the folder is not empty", where=str(out), expected="a new or an empty folder"
+            )
+        (out / "masks").mkdir()
+    except OSError as error:
+        raise OutputError(f"the folder cannot be made: {error.strerror}", where=str(out)) from error
 
 
 def _write_mask(path: Path, mask: NDArray[np.uint8]) -> None:

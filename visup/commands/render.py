@@ -1,0 +1,76 @@
+"""`visup render`: a scenario file becomes a video with masks and truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SIZE_FORM = "WIDTHxHEIGHT, such as 320x240"
+
+
+def render(
+    scenario: Annotated[
+        str, typer.Argument(help="Scenario file (TOML), or the name of a shipped scenario.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the mission; new or empty.")],
+    container: Annotated[str, typer.Option(help="Kind of video: mp4, avi or webm.")] = "mp4",
+    size: Annotated[
+        str | None, typer.Option(help=f"Another size of the image: {SIZE_FORM}.")
+    ] = None,
+) -> None:
+    """Render a scenario: a video, a mask for each frame, and what is true of it."""
+    needs_renderer()
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from visup.render.library import find_scenario
+    from visup.render.writer import write_mission
+
+    found = find_scenario(scenario)
+    if size is not None:
+        found = found.resized(parse_size(size))
+    with Progress(transient=True) as bar:
+        task = bar.add_task("frames", total=found.frame_count)
+        write_mission(
+            found,
+            out,
+            f".{container.lstrip('.')}",
+            lambda done, _: bar.update(task, completed=done),
+        )
+    Console().print(f"{found.frame_count} frames of {found.name} in {out}", highlight=False)
+
+
+def needs_renderer() -> None:
+    """Check that what renders is installed.
+
+    Raises:
+        ExtraMissingError: It is not.
+    """
+    try:
+        import embreex  # noqa: F401
+        import trimesh  # noqa: F401
+    except ImportError as error:
+        from visup.agent.errors import ExtraMissingError
+
+        raise ExtraMissingError("visup render", "render") from error
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """(width, height) from a text such as ``320x240``.
+
+    Raises:
+        SettingsError: It is something else, or a side is not within 16 and 8192 pixels.
+    """
+    from visup.agent.errors import SettingsError
+
+    width, _, height = text.partition("x")
+    if width.isdecimal() and height.isdecimal():
+        size = int(width), int(height)
+        if all(16 <= side <= 8192 for side in size):
+            return size
+    raise SettingsError(
+        f"the size {text!r} is not one of an image", expected=f"{SIZE_FORM}, from 16 to 8192 pixels"
+    )
