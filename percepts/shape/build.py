@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from visup.agent.errors import DatabaseError, SettingsError
 from visup.percepts.shape.cluster import medoids, similarity_matrix
+from visup.percepts.shape.compare import shape_of
 from visup.percepts.shape.database import ModelDatabase
-from visup.percepts.shape.shock_graph import shock_graph
 from visup.percepts.shape.silhouette import binary_picture, looks_cut, normalise
 from visup.percepts.shape.storage import NewView
 from visup.percepts.shape.views import load_mesh, render_views, sphere_directions
@@ -84,8 +84,7 @@ def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
         silhouette = normalise(seen.mask)
         if silhouette is not None:
             x, y, z = (float(c) for c in seen.direction)
-            graph = shock_graph(silhouette)
-            views.append(NewView(mesh.stem, (x, y, z), seen.area, False, silhouette.contour, graph))
+            views.append(NewView(mesh.stem, (x, y, z), seen.area, shape_of(silhouette)))
     return views
 
 
@@ -98,15 +97,14 @@ def silhouette_views(
         DatabaseError: No mask shows anything.
     """
     found = [normalise(m, cut=looks_cut(m)) for m in masks]
-    shapes = [s for s in found if s is not None]
+    shapes = [shape_of(s) for s in found if s is not None]
     if not shapes:
         raise DatabaseError(
             f"none of {len(masks)} silhouettes for {name!r} shows anything",
             expected="pictures with an object of at least 24 pixels",
         )
-    graphs = [shock_graph(s) for s in shapes]
-    chosen = medoids(similarity_matrix(graphs), clusters)
-    return [NewView(name, None, None, shapes[k].cut, shapes[k].contour, graphs[k]) for k in chosen]
+    chosen = medoids(similarity_matrix(shapes), clusters)
+    return [NewView(name, None, None, shapes[k]) for k in chosen]
 
 
 def build_database(

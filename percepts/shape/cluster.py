@@ -11,16 +11,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.compare import GRAPH_SHARE, Shape, outline_similarities
 from visup.percepts.shape.match import match
-from visup.percepts.shape.shock_graph import ShockGraph
 
 
-def similarity_matrix(graphs: Sequence[ShockGraph]) -> NDArray[np.float64]:
+def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
     """Similarities of all pairs, (N, N) float64 with ones on the diagonal."""
-    out = np.eye(len(graphs))
-    for i, a in enumerate(graphs):
-        for j in range(i):
-            out[i, j] = out[j, i] = match(a, graphs[j]).similarity
+    out = np.eye(len(shapes))
+    for i, shape in enumerate(shapes):
+        others = shapes[:i]
+        outlines = outline_similarities(shape, others)
+        graphs = np.array([match(shape.graph, o.graph).similarity for o in others])
+        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + (1 - GRAPH_SHARE) * outlines
     return out
 
 

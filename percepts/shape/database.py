@@ -5,27 +5,46 @@ Read `storage.py` for the file itself and `build.py` for what goes into it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent.errors import DatabaseError
+from visup.percepts.shape.compare import (
+    GRAPH_SHARE,
+    Likeness,
+    Shape,
+    join,
+    outline_similarities,
+    shape_of,
+)
 from visup.percepts.shape.index import ViewIndex
-from visup.percepts.shape.match import Match, in_plane_rotation, match_nodes
-from visup.percepts.shape.shock_graph import ShockGraph, shock_graph
+from visup.percepts.shape.match import Match, MatchWeights, in_plane_rotation, match_nodes
+from visup.percepts.shape.shock_graph import ShockGraph
 from visup.percepts.shape.silhouette import Silhouette, normalise
 from visup.percepts.shape.storage import (
     NewView,
     View,
-    read_contour,
-    read_graphs,
+    read_shapes,
     read_views,
     write_more,
     write_new,
+)
+
+CANDIDATES = 64
+"""Views whose outlines are compared when no budget asks for fewer."""
+
+PART_SHARE = 0.7
+"""What a perfect match of a cut silhouette with a part of a whole view counts."""
+
+_ROOTS = 400
+_PART_CANDIDATES = 12
+_PART_SCALES = (1.0, 0.8, 0.62, 0.45)
+_PART_WEIGHTS = MatchWeights(
+    kind=0.3, mass=0.0, length=0.8, profile=3.5, context=0.0, signature=0.0, root=0.0
 )
 
 
@@ -35,16 +54,19 @@ class ViewMatch:
 
     Attributes:
         view: The view.
-        similarity: 0 to 1.
+        likeness: How alike the two are, and why; pairs of nodes are (query, view, similarity).
         rotation: In-plane rotation from view to query, radians (positive from x towards y, y down), or
             None when the two have too little in common to tell.
-        match: The corresponding nodes (query, view, similarity).
     """
 
     view: View
-    similarity: float
+    likeness: Likeness
     rotation: float | None
-    match: Match
+
+    @property
+    def similarity(self) -> float:
+        """0 to 1."""
+        return self.likeness.similarity
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,25 +118,17 @@ class ModelDatabase:
         return tuple(dict.fromkeys(v.name for v in self.views))
 
     @cached_property
-    def graphs(self) -> tuple[ShockGraph, ...]:
-        """Shock graphs of all views, in the order of `views`."""
-        found = read_graphs(self.path)
-        lost = [v.id for v in self.views if v.id not in found]
-        if lost:
-            raise DatabaseError(
-                f"this model database is damaged: view {lost[0]} has no shock graph",
-                where=str(self.path),
-                hint="build it anew with 'visup models build'",
-            )
-        return tuple(found[v.id] for v in self.views)
+    def shapes(self) -> tuple[Shape, ...]:
+        """Shapes of all views, in the order of `views`; read when first asked for."""
+        return read_shapes(self.path, self.views)
 
     @cached_property
     def _index(self) -> ViewIndex:
-        return ViewIndex(self.graphs)
+        return ViewIndex([s.graph for s in self.shapes])
 
-    def contour(self, view: View) -> NDArray[np.float32]:
-        """The outline of a view in normal form, (N, 2) float32; y down, unit area."""
-        return read_contour(self.path, view.id)
+    @cached_property
+    def _part_index(self) -> ViewIndex:
+        return ViewIndex([s.graph for s in self.shapes], _PART_WEIGHTS)
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
         """Add views, to names new or known; the database as it is then. See `build.py`.
@@ -127,7 +141,7 @@ class ModelDatabase:
 
     def query(
         self,
-        shape: NDArray[np.bool_] | Silhouette | ShockGraph,
+        shape: NDArray[np.bool_] | Silhouette | Shape,
         *,
         cut: bool = False,
         top: int = 10,
@@ -135,92 +149,145 @@ class ModelDatabase:
         threshold: float = 0.0,
         restrict: Collection[str] | None = None,
         try_first: Collection[str] = (),
-        budget: float = 1.0,
+        budget: float = 0.1,
     ) -> Ranking:
         """Rank the views that a shape looks like.
 
+        A cut shape is compared with cut views as it is, and with whole views as a part of them.
+
         Args:
-            shape: A mask (H, W) bool, a silhouette or a shock graph.
-            cut: Whether the image border cuts the shape; of a silhouette its own mark counts.
+            shape: A mask (H, W) bool, a silhouette or a shape.
+            cut: Whether the image border cuts the mask; a silhouette or shape has its own mark.
             top: How many matches are wanted.
             per_name: How many views of one model may be among them; any number when None.
             threshold: Least similarity.
             restrict: Names that alone are searched; all when None.
-            try_first: Names that are compared in full whatever the index says.
-            budget: Share of the views that may be compared in full, those tried first not counted.
+            try_first: Names whose likeliest views are compared whatever the index says.
+            budget: Share of the views that may be compared in full; at least 16 are.
 
         Returns:
             The matches, best first; empty when the mask shows nothing.
         """
-        graph = as_graph(shape, cut)
-        if graph is None or not self.views:
+        query = as_shape(shape, cut)
+        if query is None or not self.views:
             return Ranking((), 0)
-        among = self._among(restrict)
-        bounds, similar = self._index.compare(graph, among)
-        most = max(1, round(budget * len(self.views)))
-        return self._search(
-            graph, among, bounds, similar, top, per_name, threshold, frozenset(try_first), most
-        )
+        among = self._named(restrict)
+        most = int(min(CANDIDATES, max(16, budget * len(self.views))))
+        wanted = _Wanted(top, per_name, threshold)
+        if not query.cut:
+            return self._whole(query, among, most, frozenset(try_first), wanted)
+        cut_views = np.array([v.cut for v in self.views])[among]
+        alike = self._whole(query, among[cut_views], most, frozenset(try_first), wanted)
+        parts = self._parts(query, among[~cut_views], wanted)
+        matches = wanted.best([*alike.matches, *parts.matches])
+        return Ranking(tuple(matches), alike.compared + parts.compared)
 
-    def _among(self, restrict: Collection[str] | None) -> NDArray[np.intp]:
-        wanted = [k for k, v in enumerate(self.views) if restrict is None or v.name in restrict]
-        return np.array(wanted, dtype=np.intp)
+    def _named(self, names: Collection[str] | None) -> NDArray[np.intp]:
+        """Numbers of the views of these models, rising; of all when None."""
+        views = [k for k, v in enumerate(self.views) if names is None or v.name in names]
+        return np.array(views, dtype=np.intp)
 
-    def _search(
+    def _whole(
         self,
-        graph: ShockGraph,
+        query: Shape,
         among: NDArray[np.intp],
-        bounds: NDArray[np.float64],
-        similar: list[NDArray[np.float32]],
-        top: int,
-        per_name: int | None,
-        threshold: float,
-        first: frozenset[str],
         most: int,
+        first: frozenset[str],
+        wanted: _Wanted,
     ) -> Ranking:
-        """Compare in full, best bound first, until no bound left can change the result."""
-        wanted = [self.views[k].name in first for k in among]
-        order = sorted(range(len(among)), key=lambda k: (not wanted[k], -bounds[k], k))
+        """Candidates by index, their outlines at once, then graphs until no other can do better."""
+        likely = self._index.likeliest(query.graph, among, _ROOTS)
+        if first:
+            own = np.intersect1d(self._named(first), among)
+            likely = np.union1d(likely, self._index.likeliest(query.graph, own, most)).astype(
+                np.intp
+            )
+        bounds, similar = self._index.bounds(query.graph, likely)
+        order = np.argsort(-bounds, kind="stable")
+        favoured = np.array([self.views[k].name in first for k in likely], dtype=bool)
+        chosen = np.concatenate([order[:most], np.flatnonzero(favoured)])
+        chosen = np.array(sorted(set(chosen.tolist())), dtype=np.intp)
+        outlines = outline_similarities(query, [self.shapes[likely[k]] for k in chosen])
+        ceiling = GRAPH_SHARE * bounds[chosen] + (1 - GRAPH_SHARE) * outlines
         found: list[ViewMatch] = []
-        least, compared = threshold, 0
-        for k in order:
-            if not wanted[k] and (bounds[k] < least or compared >= most):
+        for n in np.argsort(-ceiling, kind="stable"):
+            if ceiling[n] < wanted.least(found):
                 break
-            compared += not wanted[k]
-            number = int(among[k])
-            matched = match_nodes(graph, self.graphs[number], similar[k], self._index.weights.root)
-            if matched.similarity < max(threshold, least if not wanted[k] else threshold):
-                continue
-            found.append(self._view_match(graph, number, matched))
-            found = _best(found, top, per_name)
-            if len(found) == top:
-                least = max(threshold, found[-1].similarity)
-        return Ranking(tuple(found), compared + sum(wanted))
+            k = int(chosen[n])
+            graphs = self._match(query, int(likely[k]), similar[k])
+            likeness = join(graphs, float(outlines[n]))
+            found = wanted.best([*found, self._view_match(query, int(likely[k]), likeness)])
+        return Ranking(tuple(found), len(chosen))
 
-    def _view_match(self, graph: ShockGraph, number: int, matched: Match) -> ViewMatch:
-        rotation = in_plane_rotation(self.graphs[number], graph, matched)
-        return ViewMatch(self.views[number], matched.similarity, rotation, matched)
+    def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> Match:
+        """Graphs matched in their own order, so that the result does not depend on who asks."""
+        a, b = query.graph, self.shapes[number].graph
+        root = self._index.weights.root
+        if b.key < a.key:
+            return match_nodes(b, a, similar.T, root).turned()
+        return match_nodes(a, b, similar, root)
+
+    def _parts(self, query: Shape, among: NDArray[np.intp], wanted: _Wanted) -> Ranking:
+        """The query as a part of whole views, at several sizes of the part within the whole."""
+        best: dict[int, Match] = {}
+        compared: set[int] = set()
+        for scale in _PART_SCALES:
+            graph = _scaled(query.graph, scale)
+            bounds, similar = self._part_index.bounds(graph, among, part=True)
+            for k in np.argsort(-bounds, kind="stable")[:_PART_CANDIDATES]:
+                number = int(among[k])
+                compared.add(number)
+                whole = self.shapes[number].graph
+                matched = match_nodes(graph, whole, similar[k], 0.0, part=True)
+                if number not in best or matched.similarity > best[number].similarity:
+                    best[number] = matched
+        found = [
+            self._view_match(query, k, Likeness(PART_SHARE * m.similarity, m.similarity, 0.0, m))
+            for k, m in best.items()
+        ]
+        return Ranking(tuple(wanted.best(found)), len(compared))
+
+    def _view_match(self, query: Shape, number: int, likeness: Likeness) -> ViewMatch:
+        rotation = in_plane_rotation(self.shapes[number].graph, query.graph, likeness.match)
+        return ViewMatch(self.views[number], likeness, rotation)
 
 
-def _best(found: list[ViewMatch], top: int, per_name: int | None) -> list[ViewMatch]:
-    """The best matches, no more than so many of one model."""
-    ranked = sorted(found, key=lambda m: (-m.similarity, m.view.id))
-    if per_name is None:
-        return ranked[:top]
-    seen: dict[str, int] = {}
-    kept = []
-    for m in ranked:
-        seen[m.view.name] = seen.get(m.view.name, 0) + 1
-        if seen[m.view.name] <= per_name:
-            kept.append(m)
-    return kept[:top]
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """How many matches, how many of one model, and how good they must be."""
+
+    top: int
+    per_name: int | None
+    threshold: float
+
+    def best(self, found: Iterable[ViewMatch]) -> list[ViewMatch]:
+        """The best matches, no more than so many of one model."""
+        seen: dict[str, int] = {}
+        kept = []
+        for m in sorted(found, key=lambda m: (-m.similarity, m.view.id)):
+            seen[m.view.name] = seen.get(m.view.name, 0) + 1
+            within = self.per_name is None or seen[m.view.name] <= self.per_name
+            if within and m.similarity >= self.threshold:
+                kept.append(m)
+        return kept[: self.top]
+
+    def least(self, found: Sequence[ViewMatch]) -> float:
+        """What a further match must reach to change the result."""
+        return found[-1].similarity if len(found) >= self.top else self.threshold
 
 
-def as_graph(
-    shape: NDArray[np.bool_] | Silhouette | ShockGraph, cut: bool = False
-) -> ShockGraph | None:
-    """The shock graph of a mask, a silhouette or itself; None when a mask shows nothing."""
-    if isinstance(shape, ShockGraph):
+def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:
+    """The graph of the same shape in a larger unit."""
+    return replace(
+        graph,
+        lengths=graph.lengths * np.float32(scale),
+        profiles=graph.profiles * np.float32(scale),
+    )
+
+
+def as_shape(shape: NDArray[np.bool_] | Silhouette | Shape, cut: bool = False) -> Shape | None:
+    """The shape of a mask, a silhouette or itself; None when a mask shows nothing."""
+    if isinstance(shape, Shape):
         return shape
     silhouette = shape if isinstance(shape, Silhouette) else normalise(shape, cut=cut)
-    return None if silhouette is None else shock_graph(silhouette)
+    return None if silhouette is None else shape_of(silhouette)

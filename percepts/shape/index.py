@@ -1,10 +1,10 @@
 """The index: which views of the database are worth a full comparison.
 
 All nodes of all views lie in one matrix of node features, the topological signatures among them
-(Shokoufandeh et al. 2005). One product with a query's nodes gives each view a bound: every node takes
-its best partner, whoever else wants it and whatever hangs below. The matching of `match.py` can only do
-worse, so views are compared best bound first, and the search ends when no bound left can change the
-result. What is pruned so is not lost, unless the caller sets a budget.
+(Shokoufandeh et al. 2005). The roots alone, one vector for each view, leave the likeliest views; of
+these, one product with all of a query's nodes gives a bound: every node takes its best partner,
+whoever else wants it and whatever hangs below. The matching of `match.py` can only do worse, so that
+views can be matched best bound first until no bound left can change the result.
 """
 
 from __future__ import annotations
@@ -30,46 +30,58 @@ class ViewIndex:
         self.weights = weights
         sizes = np.array([len(g) for g in graphs], dtype=np.intp)
         self._starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
-        self._features = (
-            np.vstack([embed(g, weights) for g in graphs])
-            if graphs
-            else np.empty((0, 0), np.float32)
-        )
-        self._shares = (
-            np.concatenate([g.weights for g in graphs]) if graphs else np.empty(0, np.float32)
-        )
+        empty = np.empty((0, 1), np.float32)
+        self._features = np.vstack([embed(g, weights) for g in graphs]) if graphs else empty
+        self._roots = np.ascontiguousarray(self._features[self._starts[:-1]])
+        self._shares = np.concatenate([g.weights for g in graphs]) if graphs else empty[:, 0]
 
     def __len__(self) -> int:
         return len(self._starts) - 1
 
-    def compare(
-        self, query: ShockGraph, among: NDArray[np.intp] | None = None
+    def likeliest(self, query: ShockGraph, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+        """The views whose roots (their shapes as a whole) are nearest to the query's.
+
+        Args:
+            query: A shock graph.
+            among: Numbers of views, rising.
+            most: How many are wanted.
+
+        Returns:
+            At most so many of the numbers, rising.
+        """
+        if len(among) <= most:
+            return among
+        root = embed(query, self.weights)[:1]
+        similar = node_similarities(root, self._roots[among])[0]
+        nearest = np.argsort(-similar, kind="stable")[:most]
+        return np.sort(among[nearest])
+
+    def bounds(
+        self, query: ShockGraph, among: NDArray[np.intp], *, part: bool = False
     ) -> tuple[NDArray[np.float64], list[NDArray[np.float32]]]:
         """Bound the similarity of a query with views.
 
         Args:
             query: A shock graph of N nodes.
-            among: Numbers of the views to look at, rising; all when None.
+            among: Numbers of the views to look at, rising.
+            part: Whether the query is a part only, so that the views' other nodes do not count.
 
         Returns:
-            (V,) float64, for each view a number that its similarity cannot exceed; and for each view
-            the (N, M) similarities of the query's nodes with the view's.
+            (V,) float64, for each view a number that `match_nodes` cannot exceed; and for each view the
+            (N, M) similarities of the query's nodes with the view's.
         """
-        views = np.arange(len(self)) if among is None else among
-        if not len(views):
+        if not len(among):
             return np.empty(0), []
-        rows, starts = self._rows(views)
-        features = self._features if among is None else self._features[rows]
-        shares = self._shares if among is None else self._shares[rows]
-        similar = node_similarities(embed(query, self.weights), features)
-        inner = similar.copy()
-        inner[0] = 0.0
+        rows, starts = self._rows(among)
+        similar = node_similarities(embed(query, self.weights), self._features[rows])
+        roots = similar[0, starts].astype(np.float64)
+        inner = similar[1:].copy()
         inner[:, starts] = 0.0
-        forth = query.weights @ np.maximum.reduceat(inner, starts, axis=1)
-        back = np.add.reduceat(inner.max(axis=0) * shares, starts)
-        root = self.weights.root
-        bounds = root * similar[0, starts] + (1 - root) * 0.5 * (forth + back)
-        return bounds.astype(np.float64), np.split(similar, starts[1:], axis=1)
+        forth = query.weights[1:] @ np.maximum.reduceat(inner, starts, axis=1)
+        back = np.add.reduceat(inner.max(axis=0) * self._shares[rows], starts)
+        nodes = forth if part else 0.5 * (forth + back)
+        bounds = self.weights.root * roots + (1 - self.weights.root) * nodes
+        return bounds, np.split(similar, starts[1:], axis=1)
 
     def _rows(self, views: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Numbers of the views' nodes, and where each view starts among them."""

@@ -34,13 +34,13 @@ class MatchWeights:
         root: Share of the similarity that the root has: the shape as a whole.
     """
 
-    kind: float = 0.25
-    mass: float = 1.2
-    length: float = 0.8
-    profile: float = 2.5
+    kind: float = 0.2
+    mass: float = 0.8
+    length: float = 0.5
+    profile: float = 2.0
     context: float = 2.0
-    signature: float = 0.08
-    root: float = 0.3
+    signature: float = 0.12
+    root: float = 0.45
 
 
 WEIGHTS = MatchWeights()
@@ -58,6 +58,10 @@ class Match:
     similarity: float
     pairs: tuple[tuple[int, int, float], ...]
 
+    def turned(self) -> Match:
+        """The same with the graphs exchanged."""
+        return Match(self.similarity, tuple((v, u, s) for u, v, s in self.pairs))
+
 
 def embed(graph: ShockGraph, weights: MatchWeights = WEIGHTS) -> NDArray[np.float32]:
     """Nodes as points: their similarity is exp(-squared distance).
@@ -70,13 +74,9 @@ def embed(graph: ShockGraph, weights: MatchWeights = WEIGHTS) -> NDArray[np.floa
     length = np.sqrt(graph.lengths)[:, None] * weights.length
     scale = weights.profile / graph.profiles.shape[1] ** 0.5
     profile = np.sqrt(graph.profiles) * scale
-    context = np.sqrt(_blurred(graph.contexts)) * weights.context
+    context = np.sqrt(graph.contexts) * weights.context
     signature = graph.signatures * weights.signature
     return np.hstack([kind, mass, length, profile, context, signature]).astype(np.float32)
-
-
-def _blurred(contexts: NDArray[np.float32]) -> NDArray[np.float32]:
-    return contexts
 
 
 def node_similarities(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -97,13 +97,19 @@ def match(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) -> Matc
         The similarity, the same whichever comes first, and the corresponding nodes.
     """
     if b.key < a.key:
-        turned = match(b, a, weights)
-        return Match(turned.similarity, tuple((v, u, s) for u, v, s in turned.pairs))
+        return match(b, a, weights).turned()
     similar = node_similarities(embed(a, weights), embed(b, weights))
     return match_nodes(a, b, similar, weights.root)
 
 
-def match_nodes(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> Match:
+def match_nodes(
+    a: ShockGraph,
+    b: ShockGraph,
+    similar: NDArray[np.float32],
+    root: float,
+    *,
+    part: bool = False,
+) -> Match:
     """Match two graphs whose nodes are compared already.
 
     Args:
@@ -111,11 +117,14 @@ def match_nodes(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root
         b: The second graph, M nodes.
         similar: (N, M), similarity of each pair of nodes.
         root: Share of the similarity that the root has.
+        part: Whether the first is a part only; nodes of the second without a partner then cost nothing.
 
     Returns:
-        The match. Each pair counts by the mean of its two nodes' shares of the area.
+        The match. Each pair counts by the mean of its two nodes' shares of the area, or by the first's
+        when it is a part.
     """
-    shares = 0.5 * (a.weights[:, None] + b.weights[None]) * similar
+    theirs = a.weights[:, None] if part else b.weights[None]
+    shares = 0.5 * (a.weights[:, None] + theirs) * similar
     pairs = correspond(a.below, b.below, shares)
     whole = float(similar[0, 0])
     total = float(sum(shares[u, v] for u, v in pairs))

@@ -92,7 +92,7 @@ def _row(database: ModelDatabase, name: str) -> NDArray[np.uint8]:
         cv2.putText(label, text, where, cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
     spread = [own[i * len(own) // _VIEWS_SHOWN] for i in range(_VIEWS_SHOWN)]
     shown = list(dict.fromkeys(spread))
-    tiles = [draw_shape(database.contour(database.views[k]), database.graphs[k]) for k in shown]
+    tiles = [draw_shape(database.shapes[k].contour, database.shapes[k].graph) for k in shown]
     blank = np.full((TILE, TILE, 3), 255, dtype=np.uint8)
     return np.hstack([label, *tiles, *[blank] * (_VIEWS_SHOWN - len(tiles))])
 

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.shocks import Kind, Shock, label_branch
-from visup.percepts.shape.signature import descendants, signatures
+from visup.percepts.shape.signature import descendants
+from visup.percepts.shape.signature import signatures as topological_signatures
 from visup.percepts.shape.silhouette import Silhouette
 from visup.percepts.shape.skeleton import Skeleton, skeletonise
 
@@ -211,6 +212,7 @@ def frozen_graph(
     contexts: NDArray[np.float32],
     positions: NDArray[np.float32],
     directions: NDArray[np.float32],
+    signatures: NDArray[np.float32] | None = None,
 ) -> ShockGraph:
     """A graph from its stored arrays; what follows from them is computed. See `ShockGraph`."""
     digest = hashlib.blake2b(digest_size=12)
@@ -218,7 +220,8 @@ def frozen_graph(
         digest.update(np.ascontiguousarray(array).tobytes())
     size = len(kinds)
     arrays = (kinds, edges, weights, lengths, profiles, contexts, positions, directions)
-    return ShockGraph(*arrays, signatures(edges, size), descendants(edges, size), digest.digest())
+    vectors = topological_signatures(edges, size) if signatures is None else signatures
+    return ShockGraph(*arrays, vectors, descendants(edges, size), digest.digest())
 
 
 def _order(parts: list[_Part], links: list[tuple[int, int]], mass: NDArray[np.intp]) -> list[int]:

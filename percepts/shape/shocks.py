@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +60,7 @@ def label_branch(
 
     Returns:
         Shocks in order along the branch: runs that share their end points, with a neck or a seed
-        between two runs where the radius turns.
+        between two runs where the radius turns; a neck that stays level for long is a bend.
 
     Example:
         >>> along = np.arange(5.0)
@@ -72,15 +71,31 @@ def label_branch(
         >>> [s.kind.name for s in label_branch(np.array([1.0, 1, 1.01, 1, 1]), along)]
         ['BEND']
     """
-    turns = turning_points(radii, tolerance)
-    stops = [0, *turns, len(radii) - 1]
-    shocks: list[Shock] = []
-    for a, b in pairwise(stops):
-        if shocks:
-            kind = Kind.SEED if radii[b] < radii[a] else Kind.NECK
-            shocks.append(Shock(kind, a, a))
-        shocks.extend(_split_run(radii, along, a, b, tolerance))
-    return tuple(shocks)
+    cuts = [0]
+    between: list[list[Shock]] = []
+    for k in turning_points(radii, tolerance):
+        a, b = _level_neck(radii, along, k, tolerance) if radii[k] < radii[cuts[-1]] else (k, k)
+        kind = Kind.BEND if b > a else Kind.NECK if radii[k] < radii[cuts[-1]] else Kind.SEED
+        between.append([Shock(kind, a, b)])
+        cuts += [a, b]
+    cuts.append(len(radii) - 1)
+    runs = [
+        _split_run(radii, along, a, b, tolerance)
+        for a, b in zip(cuts[::2], cuts[1::2], strict=True)
+    ]
+    return tuple(
+        s for pair in zip(runs, [*between, []], strict=True) for part in pair for s in part
+    )
+
+
+def _level_neck(
+    radii: NDArray[np.float64], along: NDArray[np.float64], k: int, tolerance: float
+) -> tuple[int, int]:
+    """The stretch around a least radius that is level and long enough to be a bend, or the point."""
+    level = radii <= radii[k] * (1 + 0.5 * tolerance)
+    a = k - int(np.argmin(level[k::-1])) + 1 if not level[: k + 1].all() else 0
+    b = k + int(np.argmin(level[k:])) - 1 if not level[k:].all() else len(radii) - 1
+    return (a, b) if along[b] - along[a] >= LEAST_BEND * radii[k] else (k, k)
 
 
 def turning_points(radii: NDArray[np.float64], tolerance: float) -> list[int]:

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-SMOOTHING = 0.02
+SMOOTHING = 0.015
 """Standard deviation of the Gaussian, as a share of the square root of the area."""
 
 RESOLUTION = 80

@@ -10,7 +10,7 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.errors import DatabaseError
+from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.shock_graph import (
     CONTEXT,
     MOST_NODES,
@@ -27,6 +28,7 @@ from visup.percepts.shape.shock_graph import (
     ShockGraph,
     frozen_graph,
 )
+from visup.percepts.shape.signature import LENGTH
 
 APPLICATION_ID = 0x76697375
 """'visu' in ASCII, in the header of every database file."""
@@ -59,6 +61,7 @@ _FIELDS: dict[str, tuple[str, int, int]] = {
     "contexts": ("<f4", _N, CONTEXT),
     "positions": ("<f4", _N, 2),
     "directions": ("<f4", _N, 2),
+    "signatures": ("<f4", _N, LENGTH),
 }
 _GRAPH_FIELDS = tuple(f for f in _FIELDS if f != "contour")
 _BUILD_HINT = "build it anew with 'visup models build'"
@@ -88,23 +91,19 @@ class View:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewView:
-    """A view to be stored; fields as in `View`, with its outline and its shock graph.
+    """A view to be stored; fields as in `View`, with its shape.
 
     Attributes:
         name: Name of the model.
         direction: Unit vector from the object to the viewer, or None.
         area: Model units squared, or None.
-        cut: Whether the picture's border cuts the silhouette.
-        contour: (N, 2) outline in normal form.
-        graph: Its shock graph.
+        shape: What it looks like.
     """
 
     name: str
     direction: tuple[float, float, float] | None
     area: float | None
-    cut: bool
-    contour: NDArray[np.float64]
-    graph: ShockGraph
+    shape: Shape
 
 
 def write_new(path: Path, views: Iterable[NewView]) -> None:
@@ -164,7 +163,7 @@ def _insert(file: sqlite3.Connection, views: Iterable[NewView]) -> None:
                 "SELECT coalesce(max(number), -1) + 1 FROM views WHERE name = ?", (view.name,)
             ).fetchone()
             dx, dy, dz = view.direction or (None, None, None)
-            row = (view.name, number, dx, dy, dz, view.area, int(view.cut))
+            row = (view.name, number, dx, dy, dz, view.area, int(view.shape.cut))
             new = file.execute(
                 "INSERT INTO views (name, number, dx, dy, dz, area, cut) VALUES (?,?,?,?,?,?,?)",
                 row,
@@ -174,7 +173,7 @@ def _insert(file: sqlite3.Connection, views: Iterable[NewView]) -> None:
 
 def _array_rows(number: int | None, view: NewView) -> Iterator[tuple[Any, ...]]:
     for field, (dtype, _, _) in _FIELDS.items():
-        value = view.contour if field == "contour" else getattr(view.graph, field)
+        value = view.shape.contour if field == "contour" else getattr(view.shape.graph, field)
         array = np.ascontiguousarray(value, dtype=dtype)
         columns = array.shape[1] if array.ndim == 2 else 0
         yield number, field, dtype, len(array), columns, array.tobytes()
@@ -273,13 +272,13 @@ def _view(row: tuple[Any, ...], path: Path) -> View:
     return View(number, name, within, direction, area, bool(cut))
 
 
-def read_graphs(path: Path) -> dict[int, ShockGraph]:
-    """The shock graphs of all views, by view id.
+def read_shapes(path: Path, views: Sequence[View]) -> tuple[Shape, ...]:
+    """The shapes of views.
 
     Raises:
-        DatabaseError: As `open_checked`; or arrays that are not as they should be.
+        DatabaseError: As `open_checked`; or arrays that are missing or not as they should be.
     """
-    query = "SELECT view, field, dtype, rows, columns, data FROM arrays WHERE field != 'contour'"
+    query = "SELECT view, field, dtype, rows, columns, data FROM arrays"
     found: dict[int, dict[str, NDArray[Any]]] = {}
     with closing(open_checked(path)) as file:
         try:
@@ -288,27 +287,7 @@ def read_graphs(path: Path) -> dict[int, ShockGraph]:
                 found.setdefault(view, {})[field] = array
         except sqlite3.Error as e:
             raise _unreadable(path, e) from e
-    return {view: _checked_graph(path, view, arrays) for view, arrays in found.items()}
-
-
-def read_contour(path: Path, view: int) -> NDArray[np.float32]:
-    """The outline of one view in normal form, (N, 2) float32; y down, unit area.
-
-    Raises:
-        DatabaseError: As `open_checked`; no such view; or an array that is not as it should be.
-    """
-    query = (
-        "SELECT field, dtype, rows, columns, data FROM arrays WHERE view = ? AND field = 'contour'"
-    )
-    with closing(open_checked(path)) as file:
-        try:
-            row = file.execute(query, (view,)).fetchone()
-        except sqlite3.Error as e:
-            raise _unreadable(path, e) from e
-    if row is None:
-        raise _damaged(path, f"view {view}", "an outline")
-    array = _checked_array(path, view, row)[1]
-    return np.asarray(array, dtype=np.float32)
+    return tuple(_checked_shape(path, v, found.get(v.id, {})) for v in views)
 
 
 def _checked_array(path: Path, view: int, row: Iterable[Any]) -> tuple[str, NDArray[Any]]:
@@ -331,11 +310,18 @@ def _checked_array(path: Path, view: int, row: Iterable[Any]) -> tuple[str, NDAr
     return field, array.reshape(rows, width) if width else array
 
 
+def _checked_shape(path: Path, view: View, arrays: dict[str, NDArray[Any]]) -> Shape:
+    """A shape from its arrays, when they are all there and belong together."""
+    missing = [f for f in _FIELDS if f not in arrays]
+    if missing:
+        raise _damaged(path, f"view {view.id} without {', '.join(missing)}", "all arrays of a view")
+    if len(arrays["contour"]) < 8:
+        raise _damaged(path, f"view {view.id} with a degenerate outline", "at least 8 points")
+    return Shape(arrays["contour"], _checked_graph(path, view.id, arrays), view.cut)
+
+
 def _checked_graph(path: Path, view: int, arrays: dict[str, NDArray[Any]]) -> ShockGraph:
     """A graph from its arrays, when they belong together."""
-    missing = [f for f in _GRAPH_FIELDS if f not in arrays]
-    if missing:
-        raise _damaged(path, f"view {view} without {', '.join(missing)}", "all arrays of a graph")
     size = len(arrays["kinds"])
     lengths = {len(arrays[f]) for f in _GRAPH_FIELDS if f != "edges"}
     edges, kinds = arrays["edges"], arrays["kinds"]

@@ -1,0 +1,127 @@
+"""Outlines compared point by point: the second look at views that the shock graph thinks likely.
+
+Every point of an outline is described by how high the rest of the outline stands over the tangent
+there, in order along the outline (height functions; Wang, Bai, You, Liu and Latecki, Shape Matching
+and Classification Using Height Functions, 2012). Two outlines are aligned by dynamic programming in a
+band around the best few rotations, mirrored ones too. Where ours differs: squared distances, so that
+one matrix product compares all points; a band of slopes; and all candidates are aligned at once.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.silhouette import resample_closed
+
+POINTS = 96
+"""Points along an outline."""
+
+HEIGHTS = 24
+"""Heights that describe a point."""
+
+SKIP = 0.2
+"""Cost of a step that is not straight on, per step."""
+
+_ROTATIONS = 3
+_BAND = 12
+_BETA = 0.2
+
+
+def outline_heights(contour: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Height functions of an outline.
+
+    Args:
+        contour: (N, 2) closed outline of unit area.
+
+    Returns:
+        (POINTS, HEIGHTS) float32: for evenly spaced points, the heights of the following stretches of
+        outline over the tangent, each divided by its greatest on this outline. The mirror image of
+        the outline has the same array with both axes reversed.
+    """
+    points = resample_closed(np.asarray(contour, dtype=np.float64), count=POINTS)
+    tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    tangent /= np.hypot(*tangent.T)[:, None] + 1e-12
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    following = (np.arange(POINTS)[:, None] + np.arange(1, POINTS)) % POINTS
+    heights = np.einsum("ijk,ik->ij", points[following] - points[:, None], normal)
+    stops = np.linspace(0, POINTS - 1, HEIGHTS + 1).round().astype(int)
+    means = np.add.reduceat(heights, stops[:-1], axis=1) / np.diff(stops)
+    return np.asarray(means / (np.abs(means).max(axis=0) + 0.05), dtype=np.float32)
+
+
+def complexity(heights: NDArray[np.float32]) -> float:
+    """How much an outline varies: differences between plain outlines weigh more."""
+    return float(heights.std(axis=-2).mean())
+
+
+def outline_distances(
+    first: NDArray[np.float32], second: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Distances of pairs of outlines, each at its best rotation, mirrored or not.
+
+    Args:
+        first: (B, POINTS, HEIGHTS) or, for one that is compared with all, (1, POINTS, HEIGHTS).
+        second: The same, of the other outlines.
+
+    Returns:
+        (B,) float64, 0 for equal outlines; about 0.2 within a class and 0.45 between.
+    """
+    count = max(len(first), len(second))
+    both = np.stack([second, second[:, ::-1, ::-1]], axis=1)
+    costs = _point_costs(first[:, None], both)
+    costs = np.broadcast_to(costs, (count, 2, POINTS, POINTS)).reshape(count * 2, -1)
+    shifted = costs[:, _shifts()].reshape(count, 2 * POINTS, POINTS)
+    distance = _align(shifted)
+    varied = _complexities(first) + _complexities(second)
+    return np.asarray(distance / (_BETA + varied), dtype=np.float64)
+
+
+def _complexities(heights: NDArray[np.float32]) -> NDArray[np.float64]:
+    return np.asarray(heights.std(axis=1).mean(axis=1), dtype=np.float64)
+
+
+def _point_costs(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Root mean squared difference of heights between all points of both."""
+    squares = (a**2).sum(axis=-1)[..., :, None] + (b**2).sum(axis=-1)[..., None, :]
+    squares = (squares - 2 * np.matmul(a, b.swapaxes(-1, -2))) / HEIGHTS
+    # Below this, single precision cannot tell a difference from none.
+    return np.asarray(np.sqrt(np.where(squares > 1e-6, squares, 0.0)), dtype=np.float32)
+
+
+@lru_cache(maxsize=1)
+def _shifts() -> NDArray[np.intp]:
+    """Where the diagonals lie in a flat cost matrix: row d holds (i, i + d) for all i."""
+    i, d = np.arange(POINTS), np.arange(POINTS)
+    return np.asarray(i[None] * POINTS + (i[None] + d[:, None]) % POINTS, dtype=np.intp).ravel()
+
+
+def _align(shifted: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Least mean cost of an alignment, (B,), from (B, 2 * POINTS, POINTS) costs by diagonal."""
+    count = len(shifted)
+    starts = _best_diagonals(shifted.sum(axis=-1).reshape(count, 2, POINTS))
+    side, diagonal = starts // POINTS, starts % POINTS
+    band = (diagonal[..., None] + np.arange(-_BAND, _BAND + 1)) % POINTS + side[..., None] * POINTS
+    rows = np.arange(count)[:, None, None]
+    lanes = np.ascontiguousarray(np.moveaxis(shifted[rows, band], -1, 0))
+    return _descend(lanes).min(axis=(1, 2)).astype(np.float64) / POINTS
+
+
+def _best_diagonals(sums: NDArray[np.float32]) -> NDArray[np.intp]:
+    """The best few local minima (B, R) among the sums along diagonals, (B, 2, POINTS)."""
+    lower = (sums <= np.roll(sums, 1, axis=2)) & (sums <= np.roll(sums, -1, axis=2))
+    candidates = np.where(lower, sums, np.inf).reshape(len(sums), -1)
+    return np.argsort(candidates, axis=1, kind="stable")[:, :_ROTATIONS]
+
+
+def _descend(lanes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Dynamic programming along (POINTS, B, R, lanes): straight on, or one lane aside for a price."""
+    total = lanes[0].copy()
+    for costs in lanes[1:]:
+        best = total.copy()
+        np.minimum(best[..., 1:], total[..., :-1] + SKIP, out=best[..., 1:])
+        np.minimum(best[..., :-1], total[..., 1:] + SKIP, out=best[..., :-1])
+        total = best + costs
+    return total
