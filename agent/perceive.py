@@ -14,7 +14,7 @@ from graphlib import CycleError, TopologicalSorter
 
 from visup.agent.behaviour import Behaviour
 from visup.agent.errors import BehaviourError
-from visup.agent.records import Directive, Frame, Observation, Percept, Report, ReportState
+from visup.agent.records import Directive, Frame, Observation, Percept, Region, Report, ReportState
 
 PATIENCE = 3
 FIRST_SUSPENSION_S = 1.0
@@ -104,7 +104,7 @@ def _run(slot: Slot, frame: Frame, seen: Observation, directives: Sequence[Direc
     begin = time.perf_counter()
     try:
         percepts = tuple(slot.behaviour.perceive(frame, seen, directives))
-        _check(slot.behaviour, percepts)
+        _check(slot.behaviour, percepts, frame.size)
     except Exception as fault:
         # Containment: whatever a plug-in raises is its own failure, never the supervisor's.
         slot.failures += 1
@@ -116,7 +116,7 @@ def _run(slot: Slot, frame: Frame, seen: Observation, directives: Sequence[Direc
     return replace(idle, state=ReportState.RAN, percepts=percepts, elapsed_ms=_ms(begin))
 
 
-def _check(behaviour: Behaviour, percepts: Sequence[Percept]) -> None:
+def _check(behaviour: Behaviour, percepts: Sequence[Percept], size: tuple[int, int]) -> None:
     contract = behaviour.contract
     for percept in percepts:
         if not isinstance(percept, Percept):
@@ -129,6 +129,18 @@ def _check(behaviour: Behaviour, percepts: Sequence[Percept]) -> None:
                 f"behaviour '{contract.name}' reported '{percept.kind}'",
                 expected=f"one of its contract's kinds: {', '.join(contract.gives)}",
             )
+        if isinstance(percept.value, Region):
+            _check_region(percept.value, size)
+
+
+def _check_region(region: Region, size: tuple[int, int]) -> None:
+    x, y, w, h = region.bbox
+    inside = x >= 0 and y >= 0 and w > 0 and h > 0 and x + w <= size[0] and y + h <= size[1]
+    if not inside or region.mask.shape != (h, w):
+        raise BehaviourError(
+            f"region {region.id} has box {region.bbox} and a mask of {region.mask.shape}",
+            expected=f"a box within {size} and a mask of (height, width) of the box",
+        )
 
 
 def _ms(begin: float) -> float:

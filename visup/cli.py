@@ -10,7 +10,13 @@ import typer
 
 import visup
 from visup.agent.errors import VisupError
-from visup.commands import doctor, evaluate, models, render, step, task, watch
+from visup.commands.doctor import doctor
+from visup.commands.evaluate import app as evaluate_app
+from visup.commands.models import app as models_app
+from visup.commands.render import render
+from visup.commands.step import step
+from visup.commands.task import app as task_app
+from visup.commands.watch import demo, watch
 
 BAD_INPUT = 2
 
@@ -21,14 +27,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("watch")(watch.watch)
-app.command("demo")(watch.demo)
-app.command("step")(step.step)
-app.command("render")(render.render)
-app.command("doctor")(doctor.doctor)
-app.add_typer(task.app, name="task", help="Check, show and list task files.")
-app.add_typer(models.app, name="models", help="Build, extend, list and query model databases.")
-app.add_typer(evaluate.app, name="eval", help="Compute figures against ground truth.")
+app.command("watch")(watch)
+app.command("demo")(demo)
+app.command("step")(step)
+app.command("render")(render)
+app.command("doctor")(doctor)
+app.add_typer(task_app, name="task", help="Check, show and list task files.")
+app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
+app.add_typer(evaluate_app, name="eval", help="Compute figures against ground truth.")
 
 
 def _version(wanted: bool) -> None:

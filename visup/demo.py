@@ -12,10 +12,10 @@ def demo_settings(every: int = 2) -> WatchSettings:
     """Settings for the shipped clip, as a user would give them to `visup watch`."""
     data = Path(str(files("visup"))) / "data"
     return WatchSettings(
-        source=str(data / "sts87.webm"),
+        source=str(data / "sts87.mp4"),
         tasks=("dock",),
         models=data / "demo.models",
-        actors={"satellite": ("spartan201",), "arm": ("rms_arm",)},
+        actors={"satellite": ("spartan",), "arm": ("arm",)},
         every=every,
         fov_vertical_deg=38.0,
     )

@@ -6,13 +6,15 @@ import json
 from dataclasses import dataclass
 
 from rich.console import Console
-from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
 
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.agent import Step
 from visup.agent.encode import event_line
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
+MARK = {Severity.INFO: " ", Severity.WARNING: "!", Severity.CRITICAL: "‼"}
 VERDICT_STYLE = {
     Verdict.SUCCEEDED: "bold green",
     Verdict.IN_PROGRESS: "bold cyan",
@@ -51,14 +53,18 @@ class Narrator:
         if self.as_json:
             print(json.dumps(event_line(event), ensure_ascii=False, sort_keys=True), flush=True)
         else:
-            self.console.print(line(event), highlight=False, soft_wrap=False)
+            self.console.print(line(event))
 
 
-def line(event: Event) -> str:
-    """One event as a line of rich markup: time, mark, sentence."""
+def line(event: Event) -> Table:
+    """One event as a row: time, mark, sentence; long sentences go on below themselves."""
     style = STYLE[event.severity]
-    mark = {Severity.INFO: " ", Severity.WARNING: "!", Severity.CRITICAL: "‼"}[event.severity]
-    return f"[dim]{event.time:7.1f} s[/dim] [{style}]{mark} {escape(event.text)}[/{style}]"
+    row = Table.grid(padding=(0, 1), expand=False)
+    row.add_column(justify="right", min_width=8, style="dim", no_wrap=True)
+    row.add_column(width=1, style=style)
+    row.add_column(style=style)
+    row.add_row(f"{event.time:.1f} s", MARK[event.severity], Text(event.text))
+    return row
 
 
 def verdict_line(verdict: Verdict | None) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import visup
 from visup.agent import Frame, Severity, Verdict
@@ -17,6 +17,9 @@ from visup.agent.journal import Journal, export_events
 from visup.percepts.video import Source
 from visup.settings import WatchSettings
 from visup.supervisor import build_agent, final_verdict, open_video
+
+if TYPE_CHECKING:
+    from visup.report.records import RunData
 
 Progress = Callable[[int, int | None], None]
 """Told after each step how many frames are done and how many there are (None when not known)."""
@@ -116,13 +119,18 @@ def supervise(
         try:
             for steps, _ in enumerate(agent.steps(source), start=1):
                 if progress:
-                    progress(steps, source.frame_count)
+                    progress(steps, _steps_of(source, settings))
         except KeyboardInterrupt:
             tally.stopped = True
         verdict = final_verdict(agent.mind) if agent.mind.tasks else tally.verdict
         problem = "stopped by the user" if tally.stopped else source.problem
         result = RunResult(verdict, steps, problem, folder)
         return recorder.finish(result, agent.mind.tasks) if recorder else result
+
+
+def _steps_of(source: Source, settings: WatchSettings) -> int | None:
+    count = source.frame_count
+    return None if count is None else -(-count // settings.every)
 
 
 class _Tally:
@@ -165,15 +173,24 @@ class _Recorder:
             "settings": plain(settings),
         }
         self.journal.note(**self.facts)
+        self.notes = source.notes
         self.collector = Collector()
         path = folder / "annotated.webm"
         self.video = AnnotatedVideo(path, source.fps / settings.every) if video else None
+        self._derived = {"report": self.collector.add}
+        if self.video:
+            self._derived["annotated video"] = self.video.add
 
     def __call__(self, step: Step, frame: Frame) -> None:
         self.journal.record(step, frame)
-        self.collector.add(step, frame)
-        if self.video:
-            self.video.add(step, frame)
+        for name, add in list(self._derived.items()):
+            try:
+                add(step, frame)
+            except Exception as fault:
+                # What is derived may be lost; supervision and the journal go on.
+                del self._derived[name]
+                said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
+                self.notes = (*self.notes, said)
 
     def finish(self, result: RunResult, tasks: Sequence[Any]) -> RunResult:
         """Everything that is made once the last frame was seen."""
@@ -190,7 +207,12 @@ class _Recorder:
 
         path = self.folder / "report.html"
         try:
-            write_report(self.collector.finish(result.verdict, self.facts), path)
+            write_report(self._run_data(result), path)
         except ExtraMissingError as missing:
             return None, (str(missing),)
         return path, ()
+
+    def _run_data(self, result: RunResult) -> RunData:
+        return self.collector.finish(
+            result.verdict, self.facts, problem=result.problem, notes=self.notes
+        )

@@ -46,7 +46,7 @@ class Session:
         self.console = console or Console(highlight=False)
         self._frames = iter(frames)
         self._last: Step | None = None
-        self._events: list[str] = []
+        self._events: list[RenderableType] = []
         self._commands: dict[str, Callable[[Sequence[str]], RenderableType | None]] = {
             "step": self._step,
             "run": self._run,
@@ -55,7 +55,7 @@ class Session:
             "relations": lambda words: relations_table(self.agent.mind, _number(words)),
             "tasks": lambda _: tasks_tree(self.agent.mind),
             "alerts": lambda _: alerts_list(self.agent.mind),
-            "events": lambda _: Text.from_markup("\n".join(self._events[-10:]) or "none yet"),
+            "events": lambda _: Group(*self._events[-10:]) if self._events else Text("none yet"),
             "behaviours": lambda _: behaviours_table(self._last),
             "help": lambda _: Text(HELP),
         }

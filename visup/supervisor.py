@@ -15,8 +15,8 @@ from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.video import Source, open_source
-from visup.rules import default_thinkers
 from visup.rules.language import load_rules
+from visup.rules.thinkers import default_thinkers
 from visup.settings import WatchSettings
 from visup.tasks import load_task
 from visup.tasks.structure import task_actors
@@ -86,7 +86,7 @@ def _behaviours(settings: WatchSettings, database: ModelDatabase | None) -> list
 
 
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
-    rules = [rule for path in settings.rules for rule in load_rules(path)]
+    rules = tuple(rule for path in settings.rules for rule in load_rules(path))
     interpreting = default_thinkers(rules=rules or None)
     match = (task_thinker(tasks),) if tasks else ()
     return Thinkers(interpreting.update, interpreting.cogitate, match)

@@ -2,12 +2,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.agent.scripted import Scripted, frames
-from visup.agent import Percept, ReportState
+from visup.agent import Percept, Region, ReportState
 from visup.agent.errors import BehaviourError
 from visup.agent.perceive import FIRST_SUSPENSION_S, PATIENCE, in_order, perceive
 
@@ -99,3 +100,13 @@ def test_a_behaviour_runs_no_more_often_than_it_asks_for() -> None:
         f.index for f in frames(20) if perceive(slots, f, ()).reports[0].state is ReportState.RAN
     ]
     assert ran == [0, 5, 10, 15]
+
+
+@pytest.mark.parametrize(
+    "bbox", [(-1, 0, 2, 2), (5, 0, 2, 2), (0, 3, 2, 2), (0, 0, 3, 2), (0, 0, 0, 2)]
+)
+def test_a_region_that_is_not_in_the_image_is_a_failure(bbox: tuple[int, int, int, int]) -> None:
+    region = Region(1, bbox, np.ones((2, 2), bool), np.zeros((0, 2), np.float32), (0, 0), 4)
+    seen = perceive(in_order([Scripted("eye", ("region",), lambda _: region)]), next(frames(1)), ())
+    assert seen.reports[0].state is ReportState.FAILED
+    assert "region 1" in seen.reports[0].error
