@@ -105,7 +105,7 @@ _TABLE = (
         entry=("decoupled", "diverging"),
         progress=("diverging",),
         expects=("diverging", "touching"),
-        text="no longer coupled",
+        text="decoupled",
     ),
     Meaning("apart", holds=("apart",), hold_s=0.5, expects=("diverging",), text="apart"),
     Meaning("present", holds=("present",), arity=1, hold_s=0.5, text="present"),

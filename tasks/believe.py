@@ -91,7 +91,7 @@ def believe(
         return TaskBelief(
             name,
             verdict,
-            tuple(StageBelief(s, Status.PENDING, now) for s in stage_names(follower.task)),
+            tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task)),
             bindings=scene.bindings,
             expected=_expected(follower, scene, follower.start(now)),
             evidence=interrupted or _missing(scene),
@@ -121,6 +121,8 @@ def _stages(
     for leaf in leaves(reading.state):
         under_way.setdefault(leaf.step.stage, []).append(leaf)
     for stage, steps in under_way.items():
+        if stage in told and told[stage].status is Status.FAILED:
+            continue  # one of its steps has failed for good
         told[stage] = _stage(follower, stage, steps, reading.finished, now, sure)
     pending = {s: StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task)}
     return tuple(told.get(s, belief) for s, belief in pending.items())

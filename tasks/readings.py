@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from visup.agent import StageBelief, Status, Truth
+from visup.agent import Relation, StageBelief, Status, Truth
 from visup.tasks.actions import Meaning
 from visup.tasks.course import (
     Leaf,
@@ -34,7 +34,9 @@ from visup.tasks.verify import BAD, Watch, entered, over, update
 
 CONTRARY, IDLE, UNOBSERVED, WAITING = 1.0, 0.2, 0.05, 0.02  # cost per second of one step
 STAYED = 0.5  # cost of staying, once, when what comes next was seen to begin
+GUESSED = 0.4  # cost of going on when what comes next is seen to come nearer, not yet to begin
 SKIPPED = 1.5  # cost of leaving a step that was not seen through
+SHARPNESS = 5.0  # how fast a reading loses credit with its cost
 WORST = 6.0  # a reading that costs so much more than the best is given up
 
 See = Callable[[Step], Sighting]
@@ -142,8 +144,7 @@ class Follower:
             if price is None or way.state is None:
                 continue
             forced = forced or all(self._over(x) for x in way.left)
-            seen = all(self._enters(x.step, way.left, see, now) for x in way.entered)
-            tempted = tempted or (price == 0.0 and seen)
+            tempted = tempted or (price == 0.0 and self._seen(way, see, now))
             yield self._moved(reading, way.state, way, price, see, now)
         if ends or not forced:
             if tempted and not reading.stayed:
@@ -157,16 +158,23 @@ class Follower:
         """What a move costs, or None when nothing speaks for it."""
         if all(self._over(x) for x in way.left):
             return 0.0
-        if not all(self._enters(x.step, way.left, see, now) for x in way.entered):
-            return None
-        return SKIPPED * sum(not x.watch.fulfilled for x in way.left)
+        skipped = SKIPPED * sum(not x.watch.fulfilled for x in way.left)
+        if self._seen(way, see, now):
+            return skipped
+        nearer = all(self._enters(x.step, way.left, see(x.step).helps, now) for x in way.entered)
+        return skipped + GUESSED if nearer else None
 
-    def _enters(self, step: Step, left: tuple[Leaf[Watch], ...], see: See, now: float) -> bool:
-        """Whether a step is seen to begin; one like that before it only once that has ceased."""
+    def _seen(self, way: Move[Watch], see: See, now: float) -> bool:
+        """Whether all that a move enters is seen to begin."""
+        return all(self._enters(x.step, way.left, see(x.step).entry, now) for x in way.entered)
+
+    def _enters(
+        self, step: Step, left: tuple[Leaf[Watch], ...], sign: Relation | None, now: float
+    ) -> bool:
+        """Whether a sign of a step lasts; one like that before it begins only when that ceased."""
         if any(step.same_as(x.step) and not x.watch.ceased for x in left):
             return False
-        entry = see(step).entry
-        return entry is not None and now - entry.since >= self.settings.enter_s - 1e-9
+        return sign is not None and now - sign.since >= self.settings.enter_s - 1e-9
 
     def _moved(
         self,
@@ -205,4 +213,6 @@ class Follower:
 
 def confidence(readings: tuple[Reading, ...]) -> float:
     """How sure the best reading is against the others, 0 to 1."""
-    return 1.0 / sum(math.exp(readings[0].cost - r.cost) for r in readings) if readings else 0.0
+    if not readings:
+        return 0.0
+    return 1.0 / sum(math.exp(SHARPNESS * (readings[0].cost - r.cost)) for r in readings)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from visup.agent import Status, Verdict
 from visup.tasks.actions import Meaning
 from visup.tasks.course import Step
-from visup.tasks.verify import Watch, overdue
+from visup.tasks.verify import Watch
 
 
 def names(words: Sequence[str]) -> str:
@@ -28,17 +28,21 @@ def evidence(step: Step, meaning: Meaning, watch: Watch, now: float, actions: Wo
     """
     who, have = names(step.actors), "has" if len(step.actors) == 1 else "have"
     match watch.status:
-        case Status.FAILING | Status.FAILED if watch.contrary_since is not None:
-            what = _say(watch.contrary or "", actions)
+        case Status.FAILED if watch.late:
+            due = next(d for d in step.deadlines if now > d.at)
+            return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
+        case Status.FAILING | Status.FAILED if watch.contrary is not None:
+            what = _say(watch.contrary, actions)
             return (
                 f"{who} {have} been {what} since {watch.contrary_since:.1f} s; "
                 f"`{step.stage}` asks for {step.action}"
             )
-        case Status.FAILED if overdue(step, now):
-            due = next(d for d in step.deadlines if now > d.at)
-            return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
-        case Status.FAILING | Status.FAILED:
-            return f"{who} {have} not been {meaning.text} again since {watch.since:.1f} s"
+        case Status.FAILING | Status.FAILED if watch.fault is not None:
+            was, what = ("was" if have == "has" else "were"), _say(watch.fault, actions)
+            return (
+                f"{who} {was} {what} at {watch.fault_since:.1f} s and {have} not recovered; "
+                f"`{step.stage}` asks for {step.action}"
+            )
         case Status.PROGRESSING if watch.helped_since is not None:
             what = _say(watch.helped_by or "", actions)
             return f"{who} {have} been {what} since {max(0.0, watch.helped_since):.1f} s"
@@ -57,7 +61,7 @@ def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Sta
         UNKNOWN when it was never seen.
     """
     who, was = names(step.actors), "was" if len(step.actors) == 1 else "were"
-    if any(now > d.at for d in step.deadlines) and watch.status is Status.FAILED:
+    if watch.late:
         due = next(d for d in step.deadlines if now > d.at)
         return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
     if step.hold_s is not None and not watch.fulfilled:

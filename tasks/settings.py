@@ -13,6 +13,8 @@ class TaskSettings:
         bind_at: An object may play an actor when this share of its votes is for the actor's models.
         keep_bonus: What is added to the strength of a pair that is already bound, so that bindings
             do not flicker.
+        switch_s: Another object must be the better match for so long before an actor, whose object
+            is still there, changes hands.
         enter_s: A relation must be true so long before it counts as the entry to a stage.
         contrary_s: The contrary of an action must hold so long before a begun stage fails.
         contrary_early_s: The same for a stage that has not begun yet.
@@ -29,6 +31,7 @@ class TaskSettings:
 
     bind_at: float = 0.1
     keep_bonus: float = 0.25
+    switch_s: float = 2.0
     enter_s: float = 0.2
     contrary_s: float = 0.5
     contrary_early_s: float = 2.0

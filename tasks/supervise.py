@@ -11,11 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from visup.agent import (
+    Binding,
     Concern,
     Event,
     Mind,
     Observation,
     Outcome,
+    Presence,
     Severity,
     StageBelief,
     Status,
@@ -27,7 +29,7 @@ from visup.agent import (
 from visup.tasks.actions import ACTIONS, Meaning
 from visup.tasks.believe import Scene, believe
 from visup.tasks.course import Step, leaves
-from visup.tasks.matching import match, unexplained
+from visup.tasks.matching import match, strength, unexplained
 from visup.tasks.readings import Follower, Reading
 from visup.tasks.settings import DEFAULT_SETTINGS, TaskSettings
 from visup.tasks.structure import stage_names
@@ -51,6 +53,8 @@ class TaskMemory:
         interrupted: Why the task was interrupted, or empty; once set it stays.
         strange_since: Since when objects have been unexplained, by id.
         broken_since: Since when each invariant has been broken, or None.
+        rival: A matching that would change who plays whom, by actor; empty when there is none.
+        rival_since: Since when it has been the better one.
     """
 
     time: float
@@ -59,6 +63,8 @@ class TaskMemory:
     interrupted: str = ""
     strange_since: tuple[tuple[int, float], ...] = ()
     broken_since: tuple[float | None, ...] = ()
+    rival: tuple[int | None, ...] = ()
+    rival_since: float = 0.0
 
 
 def task_thinker(
@@ -123,15 +129,15 @@ def _recall(mind: Mind, followers: tuple[Follower, ...]) -> tuple[TaskMemory, ..
 
 
 def _blank(follower: Follower, now: float) -> TaskMemory:
-    stages = tuple(StageBelief(s, Status.PENDING, now) for s in stage_names(follower.task))
+    stages = tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task))
     belief = TaskBelief(follower.task.name, Verdict.UNKNOWN, stages)
     return TaskMemory(now, (), belief, broken_since=(None,) * len(follower.task.invariants))
 
 
 def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
     """One step of one task: bind its actors, follow its readings, judge, tell."""
-    task, settings, now = follower.task, follower.settings, mind.time
-    bindings = match(task, mind, memory.belief.bindings, _current_actors(memory), settings)
+    settings, now = follower.settings, mind.time
+    bindings, rival, rival_since = _bind(follower, memory, mind)
     scene = Scene(mind, bindings, follower.actions)
     readings = memory.readings or _start(follower, scene)
     if readings:
@@ -143,12 +149,45 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
     belief = believe(follower, scene, readings, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     belief = replace(belief, unexplained=lasting)
-    new = TaskMemory(now, readings, belief, interrupted, strange, broken)
+    new = TaskMemory(now, readings, belief, interrupted, strange, broken, rival, rival_since)
     events = (
         *stage_events(memory.belief, belief, mind),
         *_invariant_events(follower, memory, new, mind),
     )
     return _Step(new, events, (*stage_concerns(belief), *_invariant_concerns(follower, new, scene)))
+
+
+def _bind(
+    follower: Follower, memory: TaskMemory, mind: Mind
+) -> tuple[tuple[Binding, ...], tuple[int | None, ...], float]:
+    """The bindings now, and the rival matching with the time since when it has been better.
+
+    A matching that takes an actor from an object that is still there must last to be believed.
+    """
+    before = memory.belief.bindings
+    found = match(follower.task, mind, before, _current_actors(memory), follower.settings)
+    if not any(_changes_hands(a, b, mind) for a, b in zip(before, found, strict=False)):
+        return found, (), mind.time
+    rival = tuple(b.object_id for b in found)
+    since = memory.rival_since if rival == memory.rival else mind.time
+    if mind.time - since >= follower.settings.switch_s:
+        return found, (), mind.time
+    return tuple(_refreshed(b, mind) for b in before), rival, since
+
+
+def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
+    if before.object_id is None or before.object_id == now.object_id:
+        return False
+    belief = mind.objects.get(before.object_id)
+    return belief is not None and belief.presence is not Presence.LEFT
+
+
+def _refreshed(binding: Binding, mind: Mind) -> Binding:
+    """The same binding with the strength that it has now."""
+    belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
+    if belief is None:
+        return replace(binding, object_id=None, strength=0.0)
+    return replace(binding, strength=strength(belief, binding.models))
 
 
 def _start(follower: Follower, scene: Scene) -> tuple[Reading, ...]:

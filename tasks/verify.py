@@ -31,6 +31,9 @@ class Watch:
         better_since: Since when it holds or comes nearer without a break, or None.
         contrary: Name of the contrary relation that is true now, or None.
         contrary_since: Since when.
+        fault: The contrary by which it last failed, or None.
+        fault_since: Since when that was so.
+        late: Whether a `within` ran out before the step was over; there is no way back from that.
         ceased: Whether it once held and then was seen not to.
         unseen_since: Since when nothing is known about it, or None.
         confidence: Of the last sighting, 0 to 1.
@@ -49,6 +52,9 @@ class Watch:
     better_since: float | None = None
     contrary: str | None = None
     contrary_since: float | None = None
+    fault: str | None = None
+    fault_since: float = 0.0
+    late: bool = False
     ceased: bool = False
     unseen_since: float | None = None
     confidence: float = 1.0
@@ -83,14 +89,24 @@ def update(
         What is kept now, with the new status.
     """
     noted = _note_contrary(_note_progress(watch, step, meaning, seen, now, dt, settings), seen, now)
-    status = _status(noted, step, meaning, seen, now, settings)
+    late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
+    noted = replace(noted, late=late)
+    status = _status(noted, seen, now, settings)
     if status is noted.status:
         return noted
     if status is not Status.FAILING:
         return replace(noted, status=status, since=now)
     # What had been reached is lost; the step fails since the contrary began, not since it was sure.
     since = now if noted.contrary_since is None else noted.contrary_since
-    return replace(noted, status=status, since=since, fulfilled=False, held_s=0.0)
+    return replace(
+        noted,
+        status=status,
+        since=since,
+        fault=noted.contrary,
+        fault_since=since,
+        fulfilled=False,
+        held_s=0.0,
+    )
 
 
 def over(watch: Watch, step: Step, meaning: Meaning) -> bool:
@@ -153,15 +169,8 @@ def _note_contrary(watch: Watch, seen: Sighting, now: float) -> Watch:
     return replace(watch, contrary=seen.contrary.name, contrary_since=since, confidence=confidence)
 
 
-def _status(
-    watch: Watch,
-    step: Step,
-    meaning: Meaning,
-    seen: Sighting,
-    now: float,
-    settings: TaskSettings,
-) -> Status:
-    if overdue(step, now) and not over(watch, step, meaning):
+def _status(watch: Watch, seen: Sighting, now: float, settings: TaskSettings) -> Status:
+    if watch.late:
         return Status.FAILED
     if not seen.observed:
         return _status_unseen(watch, now, settings)
