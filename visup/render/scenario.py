@@ -350,7 +350,7 @@ def _beside(scenario: Scenario, folder: Path) -> Scenario:
 
 def _root_faults(error: ValidationError) -> list[dict[str, Any]]:
     """The faults themselves, without those that only follow: a list is 'too short' once its items fell."""
-    found = [dict(e) for e in error.errors()]
+    found: list[dict[str, Any]] = [dict(e) for e in error.errors()]
     places = [e["loc"] for e in found]
     return [
         e
