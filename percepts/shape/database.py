@@ -37,10 +37,9 @@ from visup.percepts.shape.storage import (
 CANDIDATES = 64
 """Views whose outlines are compared when no budget asks for fewer."""
 
-PART_SHARE = 0.7
+PART_SHARE = 0.55
 """What a perfect match of a cut silhouette with a part of a whole view counts."""
 
-_ROOTS = 400
 _PART_CANDIDATES = 12
 _PART_SCALES = (1.0, 0.8, 0.62, 0.45)
 _PART_WEIGHTS = MatchWeights(
@@ -61,7 +60,7 @@ class ViewMatch:
 
     view: View
     likeness: Likeness
-    rotation: float | None
+    rotation: float | None = None
 
     @property
     def similarity(self) -> float:
@@ -172,12 +171,24 @@ class ModelDatabase:
         if query is None or not self.views:
             return Ranking((), 0)
         among = self._named(restrict)
-        most = int(min(CANDIDATES, max(16, budget * len(self.views))))
+        most = candidates_wanted(len(self.views), budget)
         wanted = _Wanted(top, per_name, threshold)
+        found = self._whole_or_part(query, among, most, frozenset(try_first), wanted)
+        matches = tuple(self._with_rotation(query, m) for m in found.matches)
+        return Ranking(matches, found.compared)
+
+    def _whole_or_part(
+        self,
+        query: Shape,
+        among: NDArray[np.intp],
+        most: int,
+        first: frozenset[str],
+        wanted: _Wanted,
+    ) -> Ranking:
         if not query.cut:
-            return self._whole(query, among, most, frozenset(try_first), wanted)
+            return self._whole(query, among, most, first, wanted)
         cut_views = np.array([v.cut for v in self.views])[among]
-        alike = self._whole(query, among[cut_views], most, frozenset(try_first), wanted)
+        alike = self._whole(query, among[cut_views], most, first, wanted)
         parts = self._parts(query, among[~cut_views], wanted)
         matches = wanted.best([*alike.matches, *parts.matches])
         return Ranking(tuple(matches), alike.compared + parts.compared)
@@ -196,28 +207,18 @@ class ModelDatabase:
         wanted: _Wanted,
     ) -> Ranking:
         """Candidates by index, their outlines at once, then graphs until no other can do better."""
-        likely = self._index.likeliest(query.graph, among, _ROOTS)
-        if first:
-            own = np.intersect1d(self._named(first), among)
-            likely = np.union1d(likely, self._index.likeliest(query.graph, own, most)).astype(
-                np.intp
-            )
-        bounds, similar = self._index.bounds(query.graph, likely)
-        order = np.argsort(-bounds, kind="stable")
-        favoured = np.array([self.views[k].name in first for k in likely], dtype=bool)
-        chosen = np.concatenate([order[:most], np.flatnonzero(favoured)])
-        chosen = np.array(sorted(set(chosen.tolist())), dtype=np.intp)
-        outlines = outline_similarities(query, [self.shapes[likely[k]] for k in chosen])
-        ceiling = GRAPH_SHARE * bounds[chosen] + (1 - GRAPH_SHARE) * outlines
+        favoured = np.intersect1d(self._named(first), among) if first else None
+        likely = self._index.candidates(query.graph, among, most, favoured)
+        outlines = outline_similarities(query, [self.shapes[k] for k in likely.numbers])
+        ceilings = GRAPH_SHARE * likely.bounds + (1 - GRAPH_SHARE) * outlines
         found: list[ViewMatch] = []
-        for n in np.argsort(-ceiling, kind="stable"):
-            if ceiling[n] < wanted.least(found):
+        for n in np.argsort(-ceilings, kind="stable"):
+            if ceilings[n] < wanted.least(found):
                 break
-            k = int(chosen[n])
-            graphs = self._match(query, int(likely[k]), similar[k])
-            likeness = join(graphs, float(outlines[n]))
-            found = wanted.best([*found, self._view_match(query, int(likely[k]), likeness)])
-        return Ranking(tuple(found), len(chosen))
+            number = int(likely.numbers[n])
+            likeness = join(self._match(query, number, likely.similar[n]), float(outlines[n]))
+            found = wanted.best([*found, ViewMatch(self.views[number], likeness)])
+        return Ranking(tuple(found), len(likely.numbers))
 
     def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> Match:
         """Graphs matched in their own order, so that the result does not depend on who asks."""
@@ -242,14 +243,14 @@ class ModelDatabase:
                 if number not in best or matched.similarity > best[number].similarity:
                     best[number] = matched
         found = [
-            self._view_match(query, k, Likeness(PART_SHARE * m.similarity, m.similarity, 0.0, m))
+            ViewMatch(self.views[k], Likeness(PART_SHARE * m.similarity, m.similarity, 0.0, m))
             for k, m in best.items()
         ]
         return Ranking(tuple(wanted.best(found)), len(compared))
 
-    def _view_match(self, query: Shape, number: int, likeness: Likeness) -> ViewMatch:
-        rotation = in_plane_rotation(self.shapes[number].graph, query.graph, likeness.match)
-        return ViewMatch(self.views[number], likeness, rotation)
+    def _with_rotation(self, query: Shape, found: ViewMatch) -> ViewMatch:
+        own = self.shapes[self.views.index(found.view)].graph
+        return replace(found, rotation=in_plane_rotation(own, query.graph, found.likeness.match))
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,6 +275,11 @@ class _Wanted:
     def least(self, found: Sequence[ViewMatch]) -> float:
         """What a further match must reach to change the result."""
         return found[-1].similarity if len(found) >= self.top else self.threshold
+
+
+def candidates_wanted(views: int, budget: float = 0.1) -> int:
+    """How many of so many views are compared in full: a share of them, but 16 to `CANDIDATES`."""
+    return int(min(CANDIDATES, max(16, budget * views)))
 
 
 def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:

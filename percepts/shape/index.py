@@ -10,12 +10,31 @@ views can be matched best bound first until no bound left can change the result.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.match import WEIGHTS, MatchWeights, embed, node_similarities
 from visup.percepts.shape.shock_graph import ShockGraph
+
+ROOTS = 400
+"""Views whose nodes are looked at."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Views worth a full comparison.
+
+    Attributes:
+        numbers: (C,) numbers of the views, rising.
+        bounds: (C,) what the similarity of the graphs cannot exceed.
+        similar: For each view the (N, M) similarities of the query's nodes with the view's.
+    """
+
+    numbers: NDArray[np.intp]
+    bounds: NDArray[np.float64]
+    similar: list[NDArray[np.float32]]
 
 
 class ViewIndex:
@@ -55,6 +74,30 @@ class ViewIndex:
         similar = node_similarities(root, self._roots[among])[0]
         nearest = np.argsort(-similar, kind="stable")[:most]
         return np.sort(among[nearest])
+
+    def candidates(
+        self,
+        query: ShockGraph,
+        among: NDArray[np.intp],
+        most: int,
+        favoured: NDArray[np.intp] | None = None,
+    ) -> Candidates:
+        """The views that are worth a full comparison.
+
+        Args:
+            query: A shock graph.
+            among: Numbers of views, rising.
+            most: How many are wanted.
+            favoured: Numbers of views of which as many come along, whatever their bounds.
+        """
+        likely = self.likeliest(query, among, ROOTS)
+        extra = among[:0] if favoured is None else self.likeliest(query, favoured, most)
+        likely = np.union1d(likely, extra).astype(np.intp)
+        bounds, similar = self.bounds(query, likely)
+        chosen = np.zeros(len(likely), dtype=bool)
+        chosen[np.argsort(-bounds, kind="stable")[:most]] = True
+        kept = np.flatnonzero(chosen | np.isin(likely, extra))
+        return Candidates(likely[kept], bounds[kept], [similar[k] for k in kept])
 
     def bounds(
         self, query: ShockGraph, among: NDArray[np.intp], *, part: bool = False

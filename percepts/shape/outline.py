@@ -106,7 +106,8 @@ def _align(shifted: NDArray[np.float32]) -> NDArray[np.float64]:
     band = (diagonal[..., None] + np.arange(-_BAND, _BAND + 1)) % POINTS + side[..., None] * POINTS
     rows = np.arange(count)[:, None, None]
     lanes = np.ascontiguousarray(np.moveaxis(shifted[rows, band], -1, 0))
-    return _descend(lanes).min(axis=(1, 2)).astype(np.float64) / POINTS
+    least = _descend(lanes).min(axis=(1, 2))
+    return np.asarray(least, dtype=np.float64) / POINTS
 
 
 def _best_diagonals(sums: NDArray[np.float32]) -> NDArray[np.intp]:
@@ -118,7 +119,7 @@ def _best_diagonals(sums: NDArray[np.float32]) -> NDArray[np.intp]:
 
 def _descend(lanes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Dynamic programming along (POINTS, B, R, lanes): straight on, or one lane aside for a price."""
-    total = lanes[0].copy()
+    total: NDArray[np.float32] = lanes[0].copy()
     for costs in lanes[1:]:
         best = total.copy()
         np.minimum(best[..., 1:], total[..., :-1] + SKIP, out=best[..., 1:])
