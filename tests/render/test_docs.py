@@ -1,0 +1,24 @@
+"""The example in the documentation is a scenario, and the list of meshes is complete."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from visup.render.meshes import MESHES
+from visup.render.renderer import Renderer
+from visup.render.scenario import parse_scenario
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+
+
+def test_the_example_renders() -> None:
+    example = PAGE.split("```toml\n")[1].split("```")[0]
+    scenario = parse_scenario(example).resized((96, 72))
+    mask = Renderer(scenario).mask(100)
+    assert {o.label for o in scenario.labelled} <= set(mask.ravel().tolist())
+
+
+def test_every_mesh_is_listed() -> None:
+    listed = PAGE.split("Meshes: ")[1].split("\n\n")[0].replace("\n", " ")
+    words = {w.strip(",.` ") for w in listed.split()}
+    assert set(MESHES) | {"arm"} <= words
