@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.percepts.motion.constraints import Constraints
 from visup.percepts.motion.image import Floats
@@ -14,8 +16,63 @@ from visup.percepts.motion.layers import (
     Affine,
     distances,
     fit_dominant,
+    log_likelihood,
     spread_weights,
 )
+
+
+def slack_of(model: Affine, c: Constraints) -> float:
+    """Error to allow for a background motion, pixels: a wide scene is not quite a plane."""
+    if not len(c):
+        return 0.1
+    return 0.1 + 0.03 * float(np.median(np.hypot(*model.at(c.xy).T)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """Which of two background motions prevails where: the planet above, the sill below.
+
+    Without it, an arm that pauses before a drifting planet would be taken for something fixed.
+
+    Attributes:
+        votes: (2, rows, cols) float32, how often each motion was seen in each part of the image.
+        shape: (h, w) of the image.
+    """
+
+    votes: Floats
+    shape: tuple[int, int]
+
+    def log_prior(self, xy: Floats, models: int) -> Floats:
+        """(models, N) float32, at most 0; 0 where nothing is known."""
+        if models != 2:
+            return np.zeros((models, len(xy)), dtype=np.float32)
+        smooth = np.stack([cv2.GaussianBlur(v, (5, 5), 1.0) for v in self.votes]) + 0.5
+        chance = smooth / smooth.max(axis=0)
+        row, col = self._place(xy)
+        return np.asarray(np.log(np.maximum(chance, 0.02))[:, row, col], dtype=np.float32)
+
+    def seen(self, c: Constraints, outside: Floats, models: tuple[Affine, ...]) -> Ground:
+        """The same after more constraints of the background."""
+        if len(models) != 2:
+            return self
+        fit = np.stack([distances(m, c, 0.1) for m in models])
+        row, col = self._place(c.xy)
+        votes = self.votes * 0.95
+        for i in range(2):
+            sure = (outside > 0.5) & (fit[i] < 6) & (fit[1 - i] > fit[i] + 9)
+            np.add.at(votes[i], (row[sure], col[sure]), 1.0)
+        return Ground(votes, self.shape)
+
+    def _place(self, xy: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        rows, cols = self.votes.shape[1:]
+        row = np.clip(xy[:, 1] * rows / self.shape[0], 0, rows - 1).astype(np.int64)
+        col = np.clip(xy[:, 0] * cols / self.shape[1], 0, cols - 1).astype(np.int64)
+        return row, col
+
+
+def bare_ground(shape: tuple[int, int]) -> Ground:
+    """Nothing known yet."""
+    return Ground(np.zeros((2, 12, 16), dtype=np.float32), shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,21 +80,37 @@ class Background:
     """The motions of the background over one baseline.
 
     Attributes:
-        models: The dominant one first.
+        models: The one that follows the camera last.
         scale: How much wider than expected its errors are (parallax, a bent scene), at least 1.
         fixed: Whether something is seen to be fixed to the camera while the rest moves; None when
             the baseline is too short to tell.
+        ground: Which motion prevails where.
     """
 
     models: tuple[Affine, ...]
     scale: float
     fixed: bool | None
+    ground: Ground
 
     def distances(self, c: Constraints) -> Floats:
-        """Squared distance of each constraint to the nearest background motion, (N,) float32."""
-        slack = [0.1 + 0.03 * m.sigma for m in self.models]
-        nearest = np.min([distances(m, c, s) for m, s in zip(self.models, slack, strict=True)], 0)
-        return np.asarray(nearest / self.scale**2, dtype=np.float32)
+        """Squared distance of each constraint to the likeliest background motion, (N,) float32."""
+        prior = self.ground.log_prior(c.xy, len(self.models))
+        each = [distances(m, c, slack_of(m, c)) / self.scale**2 for m in self.models]
+        return np.asarray(np.min(np.stack(each) - 2 * prior, axis=0), dtype=np.float32)
+
+    def moves_as(self, model: Affine, where: tuple[float, float]) -> bool:
+        """Whether a layer moves as one of the background's motions does at a position."""
+        at = np.asarray([where], dtype=np.float32)
+        ways = [np.hypot(*(model.at(at)[0] - m.at(at)[0])) for m in self.models]
+        size = float(np.hypot(*model.at(at)[0]))
+        return bool(min(ways) < 0.3 + 0.1 * size)
+
+    def log_likelihood(self, c: Constraints) -> Floats:
+        """Log likelihood of each constraint under the nearest background motion, (N,) float32."""
+        extra = 0.15 * (self.scale - 1)
+        prior = self.ground.log_prior(c.xy, len(self.models))
+        each = np.stack([log_likelihood(m, c, slack_of(m, c) + extra) for m in self.models])
+        return np.asarray(np.max(each + prior, axis=0), dtype=np.float32)
 
 
 def find_background(
@@ -46,6 +119,7 @@ def find_background(
     shape: tuple[int, int],
     guess: Affine,
     still_too: bool,
+    ground: Ground,
     seed: int,
 ) -> Background:
     """Fit the background to the constraints that belong to no object.
@@ -56,6 +130,7 @@ def find_background(
         shape: (h, w) of the image.
         guess: Camera motion as predicted.
         still_too: Whether things fixed to the camera are background as well.
+        ground: Which motion prevailed where before.
         seed: For random samples.
 
     Returns:
@@ -63,18 +138,22 @@ def find_background(
     """
     weight, cell = spread_weights(c.xy, shape, outside)
     still = Affine(STILL)
-    dominant = fit_dominant(c, weight, (still, guess), seed)
-    models = [dominant]
-    to_dominant = distances(dominant, c, 0.15)
-    fixed = _is_fixed(c, outside, to_dominant)
-    if still_too or fixed:
-        models.append(still)
-    rest = np.minimum(to_dominant, distances(still, c, 0.1) if len(models) > 1 else np.inf)
-    second = _second(c, outside * (rest > 16), shape, seed)
-    if second is not None:
-        models.append(second)
-        rest = np.minimum(rest, distances(second, c, 0.15))
-    return Background(tuple(models), _scale(rest, weight, cell), fixed)
+    to_still = distances(still, c, 0.1)
+    if still_too:
+        # What is fixed comes first, or a bending fit would swallow it with what drifts.
+        moving = _wide(c, outside * (to_still > 9), shape, seed)
+        models = [still, moving or fit_dominant(c, weight, (still, guess), seed)]
+    else:
+        models = [fit_dominant(c, weight, (still, guess), seed)]
+        away = distances(models[0], c, 0.15) > 16
+        second = _wide(c, outside * away, shape, seed)
+        models = models if second is None else [second, models[0]]
+    fixed = _is_fixed(c, outside, distances(models[-1], c, 0.15))
+    if fixed and not still_too:
+        models.insert(0, still)
+    rest = np.min([distances(m, c, 0.15) for m in models], axis=0)
+    ground = ground.seen(c, outside, tuple(models))
+    return Background(tuple(models), _scale(rest, weight, cell), fixed, ground)
 
 
 def _is_fixed(c: Constraints, outside: Floats, to_dominant: Floats) -> bool | None:
@@ -84,8 +163,8 @@ def _is_fixed(c: Constraints, outside: Floats, to_dominant: Floats) -> bool | No
     return bool(np.count_nonzero(tight) >= 8)
 
 
-def _second(c: Constraints, weight: Floats, shape: tuple[int, int], seed: int) -> Affine | None:
-    """A second wide motion, such as a planet behind; an object is narrower than a quarter of all."""
+def _wide(c: Constraints, weight: Floats, shape: tuple[int, int], seed: int) -> Affine | None:
+    """A motion that spans the image, such as a planet behind; objects are narrower than that."""
     if np.count_nonzero(weight) < 30:
         return None
     balanced, cell = spread_weights(c.xy, shape, weight)

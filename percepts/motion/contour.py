@@ -44,10 +44,19 @@ def outline(share: Floats, size: tuple[int, int], least: float) -> Outline | Non
         The outline, or None when too little is left.
     """
     width, height = size
-    smooth = cv2.GaussianBlur(share, (3, 3), 0.8)
-    full = cv2.resize(smooth, (width, height), interpolation=cv2.INTER_LINEAR) > 0.5
-    mask = clean(full, least)
-    return None if mask is None else describe(mask)
+    x, y, w, h = cv2.boundingRect((share > 0.5).astype(np.uint8))
+    if w == 0:
+        return None
+    # Only the part around the region is enlarged, with a margin for the smoothing.
+    scale = width / share.shape[1], height / share.shape[0]
+    left, top = max(x - 3, 0), max(y - 3, 0)
+    right, bottom = min(x + w + 3, share.shape[1]), min(y + h + 3, share.shape[0])
+    smooth = cv2.GaussianBlur(share[top:bottom, left:right], (3, 3), 0.8)
+    x0, y0 = round(left * scale[0]), round(top * scale[1])
+    x1, y1 = round(right * scale[0]), round(bottom * scale[1])
+    part = cv2.resize(smooth, (x1 - x0, y1 - y0), interpolation=cv2.INTER_LINEAR) > 0.5
+    mask = clean(part, least)
+    return None if mask is None else describe(mask, (x0, y0), size)
 
 
 def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
@@ -74,21 +83,30 @@ def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
     return np.asarray(keep[labels])
 
 
-def describe(mask: NDArray[np.bool_]) -> Outline:
-    """Box, contour, centroid and area of a mask that is not empty."""
+def describe(mask: NDArray[np.bool_], origin: tuple[int, int], size: tuple[int, int]) -> Outline:
+    """Box, contour, centroid and area of a mask that is not empty.
+
+    Args:
+        mask: (H, W) bool, part of the frame.
+        origin: (x, y) of the part in the frame.
+        size: (width, height) of the frame.
+
+    Returns:
+        The outline.
+    """
     x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
     crop = np.ascontiguousarray(mask[y : y + h, x : x + w])
+    x, y = x + origin[0], y + origin[1]
     found, _ = cv2.findContours(
         crop.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(x, y)
     )
     largest = max(found, key=cv2.contourArea)
     ys, xs = np.nonzero(crop)
-    height, width = mask.shape
     return Outline(
         bbox=(x, y, w, h),
         mask=crop,
         contour=largest.reshape(-1, 2).astype(np.float32),
         centroid=(float(xs.mean()) + x, float(ys.mean()) + y),
         area=float(len(xs)),
-        cut=bool(x == 0 or y == 0 or x + w == width or y + h == height),
+        cut=bool(x == 0 or y == 0 or x + w == size[0] or y + h == size[1]),
     )

@@ -8,15 +8,22 @@ evidence stays between the labels.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from visup.percepts.motion.appearance import appearance
 from visup.percepts.motion.constraints import Points
-from visup.percepts.motion.image import Floats
+from visup.percepts.motion.image import Floats, WorkImage
+from visup.percepts.motion.layers import Affine
+from visup.percepts.motion.scene import Scene
+from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels
+from visup.percepts.motion.tracking import Track
 
 REACH = 2.0  # pixels on either side of a point: an edge may belong to either of its sides
 CLIP = 5.0
@@ -29,7 +36,12 @@ def flow_back(new: NDArray[np.uint8], old: NDArray[np.uint8], engine: cv2.DISOpt
 
 
 def gather(
-    cells: Superpixels, points: Points, likelihood: Floats, has: NDArray[np.bool_], prior: Floats
+    cells: Superpixels,
+    points: Points,
+    likelihood: Floats,
+    has: NDArray[np.bool_],
+    prior: Floats,
+    more: Floats,
 ) -> tuple[Floats, Floats]:
     """Bayes' rule in each superpixel: the prior times the likelihood of its constraints.
 
@@ -39,6 +51,7 @@ def gather(
         likelihood: (N, K) float32 log likelihood of each label.
         has: (N,) bool, whether a point has a constraint.
         prior: (count, K) float32 label shares before.
+        more: (count, K) float32 dense log likelihood.
 
     Returns:
         (count, K) float32 label shares, and (count,) float32 the weight of the evidence, 0 to 1.
@@ -54,11 +67,12 @@ def gather(
         for k in range(likelihood.shape[1]):
             totals[:, k] += np.bincount(where, weights=likelihood[has, k], minlength=cells.count)
     totals /= np.maximum(np.sqrt(number), 1)[:, None]
+    totals += more
     totals -= totals.max(axis=1, keepdims=True)
     sure = np.minimum(-totals.min(axis=1), CLIP) / CLIP
     share = (prior + LEAST) * np.exp(np.maximum(totals, -2 * CLIP))
     share /= share.sum(axis=1, keepdims=True)
-    return share.astype(np.float32), (sure * (number > 0)).astype(np.float32)
+    return share.astype(np.float32), (sure * ((number > 0) | more.any(axis=1))).astype(np.float32)
 
 
 def spread(
@@ -87,6 +101,131 @@ def spread(
     degree = np.asarray(cells.link.sum(axis=1)).ravel()
     diagonal = degree + weight + persistence + bias
     system = sparse.diags(diagonal).astype(np.float64) - cells.link
-    out = splu(system.tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right.astype(np.float64))
+    out = splu(
+        system.tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    ).solve(right.astype(np.float64))
     out = np.maximum(out, 0)
     return np.asarray(out / out.sum(axis=1, keepdims=True), dtype=np.float32)
+
+
+def compare(
+    new: WorkImage,
+    old: WorkImage,
+    models: Sequence[Affine],
+    box: tuple[int, int, int, int],
+    noise: float,
+) -> Floats:
+    """Log likelihood of pixels when the old image is warped by a layer's motions (the best counts).
+
+    Args:
+        new: The newest image.
+        old: The older image.
+        models: Displacements from old to new.
+        box: (x, y, width, height) of the part to compare.
+        noise: Standard deviation of grey values.
+
+    Returns:
+        (height, width) float32, from -4.5 to 0.
+    """
+    x, y, w, h = box
+    here = new.grey[y : y + h, x : x + w].astype(np.float32)
+    slope = np.hypot(new.gx[y : y + h, x : x + w], new.gy[y : y + h, x : x + w])
+    sigma2 = (1.5 * noise) ** 2 + (0.35 * slope) ** 2
+    best = np.full((h, w), np.inf, dtype=np.float32)
+    for model in models:
+        back = np.eye(2, 3) - model.matrix
+        back[:, 2] += back[:, :2] @ np.array([x, y]) - np.array([0, 0])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        there = cv2.warpAffine(old.grey, back, (w, h), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        off = cv2.blur(np.abs(here - there.astype(np.float32)), (3, 3))
+        best = np.minimum(best, off * off)
+    return np.asarray(-0.5 * np.minimum(best / sigma2, 9.0), dtype=np.float32)
+
+
+def warped(
+    scene: Scene, tracks: Sequence[Track], old: WorkImage, near: NDArray[np.bool_], noise: float
+) -> Floats:
+    """Dense evidence: which motion brings the older image to look like the newest one.
+
+    Args:
+        scene: The frame; its longest baseline is used.
+        tracks: K tracks.
+        old: The image at the other end of that baseline.
+        near: (count, K) bool, the cells that each track can reach.
+        noise: Standard deviation of grey values.
+
+    Returns:
+        (count, K + 2) float32 log likelihood of each label in each cell.
+    """
+    cells, m = scene.cells, scene.measured[-1]
+    c = m.constraints
+    out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
+    any_near = near.any(axis=1)
+    if not any_near.any():
+        return out
+    height, width = cells.labels.shape
+    box = _box_of(any_near[cells.labels])
+    zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, noise), box)
+    out[any_near, 0] = zero[any_near]
+    out[any_near, 1:] = -4.5
+    for k, t in enumerate(tracks, 1):
+        mine = near[:, k - 1]
+        if mine.any():
+            box = _box_of(mine[cells.labels])
+            fit = compare(scene.image, old, t.predicted(c.lag, c.span_s), box, noise)
+            out[mine, k] = _cell_mean(cells, fit, box)[mine]
+    out[any_near, -1] = out[any_near, :-1].max(axis=1)
+    return out
+
+
+def _box_of(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
+    return x, y, w, h
+
+
+def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
+    x, y, w, h = box
+    where = cells.labels[y : y + h, x : x + w].ravel()
+    total = np.bincount(where, weights=values.ravel(), minlength=cells.count)
+    number = np.bincount(where, minlength=cells.count)
+    return np.asarray(total / np.maximum(number, 1), dtype=np.float32)
+
+
+def label(
+    cells: Superpixels,
+    points: Points,
+    likelihood: Floats,
+    has: NDArray[np.bool_],
+    prior: Floats,
+    more: Floats,
+    settings: MotionSettings,
+) -> Floats:
+    """The posterior of each superpixel from motion, appearance and what was there before.
+
+    Args:
+        cells: The superpixels.
+        points: N points.
+        likelihood: (N, K) float32 log likelihood of labels at the points.
+        has: (N,) bool, whether a point was measured.
+        prior: (count, K) float32 label shares expected.
+        more: (count, K) float32 dense log likelihood.
+        settings: Weights.
+
+    Returns:
+        (count, K) float32.
+    """
+    share, weight = gather(cells, points, likelihood, has, prior, more)
+    look = prior * appearance(cells, prior)
+    look /= np.maximum(look.sum(axis=1, keepdims=True), 1e-6)
+    trust = np.full(cells.count, settings.persistence, dtype=np.float32)
+    bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
+    bias[_border(cells.labels)] *= 10
+    return spread(cells, share, settings.evidence * weight, look, trust, bias)
+
+
+def _border(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Superpixels at the border of the image: what is seen there more often lies behind."""
+    return np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))

@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.background import Background
 from visup.percepts.motion.constraints import Constraints
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, distances, fit_affine
-from visup.percepts.motion.tracking import Rate, Track
+from visup.percepts.motion.tracking import Rate
 
-LEAST_POINTS = 6
+LEAST_POINTS = 8
 ALIKE = 6.0  # median squared Mahalanobis distance under which two motions are one
-
-
-def unexplained(
-    c: Constraints, background: Background, tracks: Sequence[Track], owner: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """Which constraints outside all tracks move as no layer does, (N,) bool."""
-    x, y = c.xy.astype(np.int64).T
-    out = (owner[y, x] == 0) & (background.distances(c) > 16)
-    for t in tracks:
-        if out.any():
-            model = t.predicted(c.lag, c.span_s)
-            reach = cv2.dilate((t.memory > 0.5).astype(np.uint8), np.ones((33, 33), np.uint8))
-            out &= ~((distances(model, c, 0.15) < 16) & (reach[y, x] > 0))
-    return np.asarray(out)
 
 
 def groups(xy: Floats, shape: tuple[int, int], cell: int) -> NDArray[np.int32]:
@@ -38,14 +21,14 @@ def groups(xy: Floats, shape: tuple[int, int], cell: int) -> NDArray[np.int32]:
     row, col = (xy[:, 1] // cell).astype(np.int64), (xy[:, 0] // cell).astype(np.int64)
     taken = np.zeros((rows, cols), dtype=np.uint8)
     taken[row, col] = 1
-    bridged = cv2.dilate(taken, np.ones((4, 4), np.uint8))
+    bridged = cv2.dilate(taken, np.ones((5, 5), np.uint8))
     _, labels = cv2.connectedComponents(bridged, connectivity=8)
     return np.asarray(labels[row, col], dtype=np.int32)
 
 
 def discover(
     c: Constraints, free: NDArray[np.bool_], shape: tuple[int, int], cell: int
-) -> list[tuple[Affine, Floats]]:
+) -> list[tuple[Affine, NDArray[np.int64]]]:
     """Motions of groups of constraints that belong together.
 
     Args:
@@ -55,8 +38,7 @@ def discover(
         cell: Spacing of the constraints, pixels.
 
     Returns:
-        For each new layer its displacement over the baseline and a (h, w) float32 map of where its
-        constraints lie.
+        For each new layer its displacement over the baseline and which constraints it rests on.
     """
     out = []
     index = np.flatnonzero(free)
@@ -71,13 +53,29 @@ def discover(
                 break
             weight = np.zeros(len(c), dtype=np.float32)
             weight[left] = 1
-            model = fit_affine(c, weight, _middle(c, left), rigidity=10.0, rounds=6)
-            fits = distances(model, c, 0.15)[left] < 9
-            if np.count_nonzero(fits) < LEAST_POINTS:
+            start = _middle(c, left)
+            slack = slack_of(start)
+            model = fit_affine(c, weight, start, rigidity=10.0, rounds=6, slack=slack)
+            fits = distances(model, c, slack)[left] < 9
+            if np.count_nonzero(fits) < max(LEAST_POINTS, 0.5 * len(left)):
                 break
-            out.append((model, _place(c.xy[left[fits]], shape, cell)))
+            out.append((model, left[fits]))
             left = left[~fits]
     return out
+
+
+def slack_of(model: Affine, where: tuple[float, float] = (0.0, 0.0)) -> float:
+    """Error to allow for a layer, pixels: what moves far seldom moves quite as a plane does.
+
+    Args:
+        model: The layer's displacement over a baseline.
+        where: (x, y) about which the layer lies, pixels.
+
+    Returns:
+        Standard deviation, pixels.
+    """
+    moved = model.at(np.asarray([where], dtype=np.float32))[0]
+    return 0.15 + 0.05 * float(np.hypot(*moved))
 
 
 def _middle(c: Constraints, index: NDArray[np.int64]) -> Affine:
@@ -87,40 +85,28 @@ def _middle(c: Constraints, index: NDArray[np.int64]) -> Affine:
     return Affine(matrix)
 
 
-def _place(xy: Floats, shape: tuple[int, int], cell: int) -> Floats:
-    out = np.zeros(shape, dtype=np.uint8)
-    x, y = xy.astype(np.int64).T
-    out[y, x] = 1
-    size = 2 * cell + 1
-    return np.asarray(cv2.dilate(out, np.ones((size, size), np.uint8)), dtype=np.float32) * 0.7
-
-
 def rate_of(model: Affine, c: Constraints, now: float) -> Rate:
     """A displacement over a baseline as a motion per second."""
     return Rate(model.matrix / c.span_s, max(model.sigma, 0.02) / c.span_s, now, c.span_s)
 
 
 def same_motion(
-    a: Track, b: Track, c: Constraints, owner: NDArray[np.int64], keys: tuple[int, int]
+    c: Constraints, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], start: Affine, slack: float
 ) -> bool | None:
     """Whether one motion explains the constraints of two tracks.
 
     Args:
-        a: One track.
-        b: The other.
         c: Constraints over one baseline.
-        owner: (h, w) labels.
-        keys: The labels of the two tracks.
+        in_a: (N,) bool, those of one track.
+        in_b: (N,) bool, those of the other.
+        start: Motion to start from.
+        slack: Error to allow, pixels.
 
     Returns:
         None when there is too little to tell.
     """
-    x, y = c.xy.astype(np.int64).T
-    at = owner[y, x]
-    in_a, in_b = at == keys[0], at == keys[1]
-    if min(in_a.sum(), in_b.sum()) < 4:
+    if min(np.count_nonzero(in_a), np.count_nonzero(in_b)) < 4:
         return None
-    start = a.predicted(c.lag, c.span_s)
-    both = fit_affine(c, (in_a | in_b).astype(np.float32), start)
-    m2 = distances(both, c, 0.15)
+    both = fit_affine(c, (in_a | in_b).astype(np.float32), start, slack=slack)
+    m2 = distances(both, c, slack)
     return bool(np.median(m2[in_a]) < ALIKE and np.median(m2[in_b]) < ALIKE)

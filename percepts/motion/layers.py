@@ -57,6 +57,28 @@ def distances(model: Affine, c: Constraints, slack: float = 0.0) -> Floats:
     return mahalanobis(model.at(c.xy) - c.moved, widened(c.information, slack))
 
 
+def log_likelihood(model: Affine, c: Constraints, slack: float) -> Floats:
+    """Log likelihood of each constraint under a layer, relative to one that is exactly known.
+
+    A layer that is allowed a wide error pays for it, or it would explain everything.
+
+    Args:
+        model: The layer's displacement over the baseline of the constraints.
+        c: N constraints.
+        slack: Standard deviation to allow for the model itself, pixels.
+
+    Returns:
+        (N,) float32, 0 at best.
+    """
+    wide = widened(c.information, slack)
+    width = np.log(
+        np.maximum(wide[:, 0] + wide[:, 2], 1e-9)
+        / (c.information[:, 0] + c.information[:, 2] + 1e-9)
+    )
+    m2 = mahalanobis(model.at(c.xy) - c.moved, wide)
+    return np.asarray(0.5 * width - 0.5 * m2, dtype=np.float32)
+
+
 def widened(information: Floats, sigma: float) -> Floats:
     """Information after adding an isotropic variance to the covariance, (N, 3) float32."""
     if sigma <= 0:

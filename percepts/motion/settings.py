@@ -15,6 +15,7 @@ class MotionSettings:
         work_size: Longer side of the image that is worked on; larger frames are reduced to it.
         cell: Spacing of motion constraints and of superpixels.
         lags_s: Baselines in time over which motion is measured, seconds; 0 means one frame.
+        contrast: Difference of tone at which neighbouring superpixels count as unlike.
         noise: Least standard deviation of grey values that is assumed, grey levels.
         outlier: Mahalanobis distance at which a motion is no longer explained by a layer.
         min_area: Least area of a region, share of the image.
@@ -22,7 +23,6 @@ class MotionSettings:
         evidence: Weight of one superpixel's evidence in a frame.
         background_bias: Weight of the belief that what shows nothing is background.
         confirm_s: How long a new region must be seen before it is reported, seconds.
-        merge_s: How long after its birth a region may still join a neighbour that moves alike.
         memory_s: How long a hidden region is remembered, seconds.
         max_regions: Most regions that are followed at once.
     """
@@ -30,14 +30,14 @@ class MotionSettings:
     work_size: int = 512
     cell: int = 8
     lags_s: tuple[float, ...] = (0.0, 0.16, 0.48, 1.2, 2.4)
+    contrast: float = 8.0
     noise: float = 1.0
     outlier: float = 3.5
     min_area: float = 0.0012
-    persistence: float = 0.3
-    evidence: float = 0.4
-    background_bias: float = 0.03
-    confirm_s: float = 0.12
-    merge_s: float = 2.0
+    persistence: float = 0.2
+    evidence: float = 0.6
+    background_bias: float = 0.02
+    confirm_s: float = 0.4
     memory_s: float = 12.0
     max_regions: int = 32
 

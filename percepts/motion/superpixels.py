@@ -15,7 +15,8 @@ from scipy import sparse
 
 from visup.percepts.motion.image import Floats, WorkImage
 
-STIFF = 15.0  # cells that look the same are nearly one: a whole sky, a whole face of a box
+STIFF = 15.0  # flat cells of one tone are nearly one: a whole sky, a whole face of a box
+CALM = 1.0  # mean gradient up to which a cell is flat, grey levels per pixel
 LOOSE = 0.05
 
 
@@ -27,6 +28,7 @@ class Superpixels:
         labels: (h, w) int32, 0 to count - 1.
         count: How many.
         area: (count,) float32 pixels.
+        centre: (count, 2) float32 mean (x, y).
         tone: (count, 3) float32 mean tone.
         link: (count, count) sparse float32, symmetric, affinity of neighbours by the length of
             their common border and the likeness of their tones.
@@ -35,8 +37,17 @@ class Superpixels:
     labels: NDArray[np.int32]
     count: int
     area: Floats
+    centre: Floats
     tone: Floats
     link: sparse.csr_matrix
+
+    def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+        """Which cells lie within some steps of the members; (count, K) bool from the same."""
+        near = members.astype(np.float32)
+        for _ in range(steps):
+            near = np.minimum(near + self.link @ near, 1.0)
+            near = (near > 0).astype(np.float32)
+        return np.asarray(near > 0)
 
     def mean(self, values: Floats) -> Floats:
         """Mean of an (h, w) map in each cell, (count,) float32."""
@@ -69,7 +80,15 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     planes = cv2.split(image.tone)
     sums = [np.bincount(flat, weights=p.ravel(), minlength=count) for p in planes]
     tone = (np.stack(sums, axis=1) / area[:, None]).astype(np.float32)
-    return Superpixels(filled, count, area, tone, _links(filled, count, tone, contrast, cell))
+    h_index, w_index = np.divmod(np.arange(height * width), width)
+    centre = np.stack(
+        [np.bincount(flat, weights=w, minlength=count) / area for w in (w_index, h_index)], axis=1
+    ).astype(np.float32)
+    busy = np.abs(image.gx) + np.abs(image.gy)
+    mean = np.bincount(flat, weights=busy.ravel(), minlength=count) / area
+    calm = np.exp(-0.5 * (mean / CALM) ** 2).astype(np.float32)
+    link = _links(filled, count, tone, calm, contrast, cell)
+    return Superpixels(filled, count, area, centre, tone, link)
 
 
 def _seeds(image: WorkImage, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -84,7 +103,7 @@ def _seeds(image: WorkImage, cell: int) -> tuple[NDArray[np.int64], NDArray[np.i
 
 
 def _links(
-    labels: NDArray[np.int32], count: int, tone: Floats, contrast: float, cell: int
+    labels: NDArray[np.int32], count: int, tone: Floats, calm: Floats, contrast: float, cell: int
 ) -> sparse.csr_matrix:
     pairs = []
     for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
@@ -96,7 +115,8 @@ def _links(
     border = sparse.coo_matrix((ones, (i, j)), shape=(count, count)).tocsr()
     border = (border + border.T).tocoo()
     unlike = np.abs(tone[border.row] - tone[border.col]).max(axis=1)
-    alike = STIFF * np.exp(-0.5 * (unlike / contrast) ** 2) + LOOSE
+    stiff = 1 + STIFF * calm[border.row] * calm[border.col]
+    alike = stiff * np.exp(-0.5 * (unlike / contrast) ** 2) + LOOSE
     length = np.minimum(border.data, 2.0)
     link = sparse.coo_matrix((length * alike, (border.row, border.col)), shape=(count, count))
     return link.tocsr()

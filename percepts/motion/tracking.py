@@ -1,17 +1,26 @@
-"""What is remembered of each moving object between frames: identity, motion, shape, appearance."""
+"""What is remembered of each moving object between frames: identity, motion, shape, what hides it.
+
+Masks are kept as one share for each superpixel; what another object hides is kept as a map, since
+it moves with its own motion under an occluder that moves with another.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, Doubles
+from visup.percepts.motion.superpixels import Superpixels
+
+Indices = NDArray[np.int64]
+FADE = 0.4  # share of the memory of where a track was that is left after a second
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +39,58 @@ class Rate:
     time: float
     span_s: float
 
+    def velocity(self, where: tuple[float, float]) -> Doubles:
+        """(vx, vy) at a position, pixels per second."""
+        return np.asarray(self.matrix[:, :2] @ np.asarray(where) + self.matrix[:, 2])
 
-NO_RATES = MappingProxyType({})
+
+def _nothing() -> Mapping[int, float]:
+    return MappingProxyType({})
+
+
+def _no_rates() -> Mapping[int, Rate]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """The motion of one rigid part, by baseline.
+
+    Attributes:
+        rates: By baseline in frames.
+        support: How many constraints it rested on last.
+    """
+
+    rates: Mapping[int, Rate] = field(default_factory=_no_rates)
+    support: float = 0.0
+
+    def predicted(self, lag: int, span_s: float, where: tuple[float, float]) -> Affine:
+        """Its displacement over a baseline, from the best rate that is known."""
+        best = self.best_rate(where)
+        if best is None:
+            return Affine(np.zeros((2, 3)))
+        own = self.rates.get(lag)
+        newest = max(r.time for r in self.rates.values())
+        rate = own if own is not None and newest - own.time < 0.5 else best
+        return Affine(rate.matrix * span_s, rate.sigma * span_s)
+
+    def best_rate(self, where: tuple[float, float]) -> Rate | None:
+        """The surest rate that agrees with those over shorter baselines at a position."""
+        if not self.rates:
+            return None
+        newest = max(r.time for r in self.rates.values())
+        fresh = [r for r in self.rates.values() if newest - r.time < 0.5 + 0.25 * r.span_s]
+        fresh.sort(key=lambda r: r.span_s)
+        best = fresh[0]
+        for rate in fresh[1:]:
+            gap = float(np.hypot(*(rate.velocity(where) - best.velocity(where))))
+            if gap < 3 * (rate.sigma + best.sigma) and rate.sigma < best.sigma:
+                best = rate
+        return best
+
+    def with_rate(self, lag: int, rate: Rate, support: float) -> Motion:
+        """The same motion with one rate renewed."""
+        return Motion(MappingProxyType({**self.rates, lag: rate}), support)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,95 +102,101 @@ class Track:
         id: Public number from 1, 0 until confirmed.
         born: Seconds.
         seen: Seconds when it was last visible.
-        visible: (h, w) float32, probability that the pixel shows it.
-        memory: (h, w) float32, the same with what others hide of it.
-        rates: By baseline in frames.
+        share: (count,) float32, probability that each superpixel shows it.
+        hidden: (h, w) float32, where others hide it; None when they do not.
+        motions: Of its rigid parts; an arm has several.
+        recent: (count,) float32, where it was of late: parts that turn up there are its own.
         evidence: How much better its own motion explains it than the background's did (log
             likelihood, running sum).
         frames: In how many frames it was visible.
-        drift: (x, y) of motion not yet applied to the memory, pixels.
+        centre: (x, y) centroid when last visible, working pixels.
+        drift: (x, y) of motion not yet applied to `hidden`, pixels.
+        apart: Seconds for which it was seen apart from other tracks, by key.
+        alike: Votes that it is one with another track, by key.
     """
 
     key: int
     id: int
     born: float
     seen: float
-    visible: Floats
-    memory: Floats
-    rates: Mapping[int, Rate] = field(default_factory=lambda: NO_RATES)
+    share: Floats
+    hidden: Floats | None = None
+    motions: tuple[Motion, ...] = ()
+    recent: Floats | None = None
     evidence: float = 0.0
     frames: int = 0
+    centre: tuple[float, float] = (0.0, 0.0)
     drift: tuple[float, float] = (0.0, 0.0)
+    apart: Mapping[int, float] = field(default_factory=_nothing)
+    alike: Mapping[int, float] = field(default_factory=_nothing)
 
-    def predicted(self, lag: int, span_s: float) -> Affine:
-        """Its displacement over a baseline, from the best rate that is known."""
-        rate = self.rates.get(lag)
-        chosen = rate if rate is not None else self.best_rate()
-        if chosen is None:
-            return Affine(np.zeros((2, 3)))
-        return Affine(chosen.matrix * span_s, chosen.sigma * span_s)
+    def predicted(self, lag: int, span_s: float) -> tuple[Affine, ...]:
+        """The displacement of each part over a baseline."""
+        return tuple(m.predicted(lag, span_s, self.centre) for m in self.motions)
 
     def best_rate(self) -> Rate | None:
-        """The rate over the longest baseline that agrees with the shorter ones."""
-        if not self.rates:
+        """The rate of the part with most support."""
+        if not self.motions:
             return None
-        newest = max(r.time for r in self.rates.values())
-        fresh = sorted(
-            (r for r in self.rates.values() if newest - r.time < 0.5 + 0.25 * r.span_s),
-            key=lambda r: r.span_s,
-        )
-        best = fresh[0]
-        where = self.centre()
-        for rate in fresh[1:]:
-            gap = float(np.hypot(*(velocity_at(rate, where) - velocity_at(best, where))))
-            if gap < 3 * (rate.sigma + best.sigma):
-                best = rate if rate.sigma < best.sigma else best
-        return best
-
-    def centre(self) -> tuple[float, float]:
-        """Centroid of what is visible, or of what is remembered; working pixels."""
-        for shape in (self.visible, self.memory):
-            m = cv2.moments((shape > 0.5).astype(np.uint8), binaryImage=True)
-            if m["m00"] > 0:
-                return m["m10"] / m["m00"], m["m01"] / m["m00"]
-        return shape.shape[1] / 2, shape.shape[0] / 2
-
-    def with_rate(self, lag: int, rate: Rate) -> Track:
-        """The same track with one rate renewed."""
-        return replace(self, rates=MappingProxyType({**self.rates, lag: rate}))
+        main = max(self.motions, key=lambda m: m.support)
+        return main.best_rate(self.centre)
 
 
-def velocity_at(rate: Rate, where: tuple[float, float]) -> Doubles:
-    """(vx, vy) of a rate at a position, pixels per second."""
-    return np.asarray(rate.matrix[:, :2] @ np.asarray(where) + rate.matrix[:, 2])
+def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -> sparse.csr_matrix:
+    """Which superpixels of the last frame each new one comes from, following the flow.
+
+    Args:
+        old: Superpixels of the last frame.
+        new: Superpixels of the newest frame.
+        flow: (h, w, 2) float32, from the newest image back to the last.
+        grid: (h, w, 2) float32 positions of pixels.
+
+    Returns:
+        (new count, old count) sparse shares; rows sum to 1, or less where the image came into view.
+    """
+    from_where = cv2.remap(
+        old.labels.astype(np.float32),
+        grid + flow,
+        None,
+        cv2.INTER_NEAREST,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=-1,
+    )
+    i, j = new.labels.ravel(), from_where.ravel().astype(np.int64)
+    known = j >= 0
+    i, j = i[known], j[known]
+    joint = sparse.coo_matrix((np.ones(len(i), np.float32), (i, j)), (new.count, old.count)).tocsr()
+    return sparse.diags(1.0 / new.area).astype(np.float32) @ joint
 
 
-def carry(track: Track, flow: Floats, grid: Floats, seconds: float) -> Track:
-    """Bring a track's masks to the next frame.
+def carry(track: Track, step: sparse.csr_matrix, seconds: float) -> Track:
+    """Bring a track to the next frame: the visible goes with the flow, the hidden with its motion.
 
-    What is visible goes with the flow; what is hidden goes with the object's own motion, by whole
-    pixels so that it is not blurred by being moved again and again.
+    Hidden parts are moved by whole pixels, so that they are not blurred by many small moves.
 
     Args:
         track: The track as of the frame before.
-        flow: (h, w, 2) float32, from the newest image back to the one before.
-        grid: (h, w, 2) float32 positions of pixels.
+        step: The transition between superpixels.
         seconds: Between the two frames.
 
     Returns:
-        The track with masks predicted for the newest image.
+        The track as predicted for the newest image.
     """
-    visible = cv2.remap(track.visible, grid + flow, None, cv2.INTER_LINEAR)
+    share = np.asarray(step @ track.share, dtype=np.float32)
+    if track.recent is not None:
+        recent = FADE**seconds * np.asarray(step @ track.recent, dtype=np.float32)
+        track = replace(track, recent=np.maximum(recent, share))
+    if track.hidden is None:
+        return replace(track, share=share)
     rate = track.best_rate()
-    step = velocity_at(rate, track.centre()) * seconds if rate is not None else np.zeros(2)
-    drift = np.asarray(track.drift) + step
+    moved = rate.velocity(track.centre) * seconds if rate is not None else np.zeros(2)
+    drift = np.asarray(track.drift) + moved
     whole = np.round(drift)
-    memory = shift(track.memory, int(whole[0]), int(whole[1]))
     rest = drift - whole
     return replace(
         track,
-        visible=np.asarray(visible, dtype=np.float32),
-        memory=np.maximum(memory, visible).astype(np.float32),
+        share=share,
+        hidden=shift(track.hidden, int(whole[0]), int(whole[1])),
         drift=(float(rest[0]), float(rest[1])),
     )
 
@@ -145,71 +210,77 @@ def shift(image: Floats, dx: int, dy: int) -> Floats:
     return np.asarray(cv2.warpAffine(image, matrix, size, flags=cv2.INTER_NEAREST))
 
 
-def priors(tracks: tuple[Track, ...], shape: tuple[int, int]) -> Floats:
+def priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
     """Label shares expected in the newest image.
 
     Args:
         tracks: Carried tracks.
-        shape: (h, w).
+        cells: Superpixels of the newest image.
 
     Returns:
-        (K + 2, h, w) float32: background, each track, and unknown motion (zero).
+        (count, K + 2) float32: background, each track, and unknown motion (zero).
     """
-    out = np.zeros((len(tracks) + 2, *shape), dtype=np.float32)
+    out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
     for k, track in enumerate(tracks, 1):
-        out[k] = track.visible
-    free = np.clip(1 - out.sum(axis=0), 0, 1)
+        out[:, k] = track.share
+    free = np.clip(1 - out.sum(axis=1), 0, 1)
     for k, track in enumerate(tracks, 1):
-        # What was hidden is expected back where its occluder has gone.
-        hidden = np.maximum(track.memory - track.visible, 0)
-        out[k] += free * hidden
-    total = out.sum(axis=0)
-    out /= np.maximum(total, 1)
-    out[0] = np.clip(1 - out.sum(axis=0), 0, 1)
-    return out
+        if track.hidden is not None:
+            # What was hidden is expected back where its occluder has gone.
+            out[:, k] += free * np.maximum(cells.mean(track.hidden) - out[:, k], 0)
+    out /= np.maximum(out.sum(axis=1, keepdims=True), 1)
+    out[:, 0] = np.clip(1 - out.sum(axis=1), 0, 1)
+    return sharpen(out)
 
 
 def sharpen(shares: Floats) -> Floats:
-    """Push label shares towards their winner, so that beliefs do not fade by being carried.
-
-    Args:
-        shares: (K, h, w) float32, summing to 1 over K.
-
-    Returns:
-        The same shape.
-    """
+    """Push label shares (count, K) towards their winner, lest beliefs fade by being carried."""
     squared = shares * shares
-    return np.asarray(squared / np.maximum(squared.sum(axis=0), 1e-6), dtype=np.float32)
+    return np.asarray(squared / np.maximum(squared.sum(axis=1, keepdims=True), 1e-6))
 
 
-def remember(track: Track, visible: Floats, others: Floats, now: float, least: float) -> Track:
-    """Update a track's masks after the posterior is known.
+def remember(
+    track: Track,
+    share: Floats,
+    winner: Indices,
+    label: int,
+    cells: Superpixels,
+    now: float,
+    least: float,
+) -> Track:
+    """Update a track after the posterior is known.
 
     Args:
         track: The carried track.
-        visible: (h, w) float32, its posterior.
-        others: (h, w) float32, posterior of all other objects.
+        share: (count,) float32, its posterior.
+        winner: (count,) the label that has each superpixel.
+        label: The track's label.
+        cells: The superpixels.
         now: Seconds.
         least: Least visible area to count as seen, working pixels.
 
     Returns:
-        The track with what is hidden by others kept, and what is seen to be background dropped.
+        The track; what others took over is hidden, what is seen to be background is forgotten.
     """
-    memory = np.where(others > 0.5, track.memory, visible).astype(np.float32)
-    seen = float(np.count_nonzero(visible > 0.5)) >= least
-    if not seen:
-        # Nothing of it is in view: the memory of the whole is all there is.
-        memory = np.maximum(memory, 0.98 * track.memory).astype(np.float32)
+    mine = winner == label
+    area = float(cells.area[mine].sum())
+    seen = area >= least
+    centre = track.centre
+    if seen:
+        where = (cells.centre[mine] * cells.area[mine, None]).sum(axis=0) / area
+        centre = (float(where[0]), float(where[1]))
+    covered = track.share > 0.5
+    if track.hidden is not None:
+        covered |= cells.mean(track.hidden) > 0.5
+    covered &= (winner > 0) & ~mine
+    hidden = covered.astype(np.float32)[cells.labels] if covered.any() else None
     return replace(
         track,
-        visible=visible,
-        memory=memory,
+        share=share,
+        recent=share if track.recent is None else np.maximum(track.recent, share),
+        hidden=hidden,
         seen=now if seen else track.seen,
         frames=track.frames + int(seen),
+        centre=centre,
+        drift=track.drift if hidden is not None else (0.0, 0.0),
     )
-
-
-def overlap(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    """Share of `a` that lies in `b`, 0 to 1."""
-    size = int(a.sum())
-    return float((a & b).sum()) / size if size else 0.0

@@ -1,0 +1,256 @@
+"""The life of tracks: born, updated, grown, joined, confirmed, forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from visup.percepts.motion.dense import CLIP
+from visup.percepts.motion.discovery import discover, rate_of, same_motion, slack_of
+from visup.percepts.motion.image import Floats
+from visup.percepts.motion.layers import distances
+from visup.percepts.motion.scene import Measured, Scene
+from visup.percepts.motion.settings import MotionSettings
+from visup.percepts.motion.tracking import Indices, Motion, Track, remember
+
+Tracks = tuple[Track, ...]
+NEAR_STEPS = 4
+APART_S = 1.5
+VOTES = 3.0
+MOST_PARTS = 3
+
+
+def least_area(scene: Scene, settings: MotionSettings) -> float:
+    """Least area of a region, working pixels."""
+    return settings.min_area * scene.image.grey.size
+
+
+def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> Tracks:
+    """Add tracks for groups of constraints that no layer explains.
+
+    Args:
+        tracks: Those known.
+        scene: The frame.
+        settings: Gives the most tracks.
+        born: How many were born before.
+
+    Returns:
+        The known tracks, then the new ones.
+    """
+    out = list(tracks)
+    owned = scene.owner > 0
+    for m in scene.measured:
+        c = m.constraints
+        free = _unexplained(m, out, scene, owned)
+        for model, index in discover(c, free, scene.image.shape, settings.cell):
+            if len(out) >= settings.max_regions:
+                return tuple(out)
+            share = np.zeros(scene.cells.count, dtype=np.float32)
+            share[scene.cell_of(c.xy[index])] = 1
+            share = scene.cells.reach(share[:, None] > 0, 1)[:, 0] * 0.7 * ~owned
+            born += 1
+            middle = c.xy[index].mean(axis=0)
+            motion = Motion().with_rate(c.lag, rate_of(model, c, scene.time), float(len(index)))
+            t = Track(
+                born,
+                0,
+                scene.time,
+                scene.time,
+                share.astype(np.float32),
+                motions=(motion,),
+                centre=(float(middle[0]), float(middle[1])),
+            )
+            host = _territory(out, share > 0)
+            if host is None:
+                out.append(t)
+            else:
+                out[host] = _joined(out[host], t)
+            owned = owned | (share > 0)
+    return tuple(out)
+
+
+def _territory(tracks: Sequence[Track], where: NDArray[np.bool_]) -> int | None:
+    """The track that was of late in most of these cells."""
+    for i, t in enumerate(tracks):
+        if t.id and t.recent is not None and np.mean(t.recent[where] > 0.3) > 0.5:
+            return i
+    return None
+
+
+def _unexplained(
+    m: Measured, tracks: Sequence[Track], scene: Scene, owned: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    c = m.constraints
+    at = scene.cell_of(c.xy)
+    out = ~owned[at] & (m.background.distances(c) > 16)
+    for t in tracks:
+        if not out.any():
+            break
+        parts = t.predicted(c.lag, c.span_s)
+        off = np.min([distances(p, c, slack_of(p, t.centre)) for p in parts], axis=0)
+        near = scene.cells.reach((t.share > 0.3)[:, None], NEAR_STEPS)[:, 0]
+        out &= ~((off < 16) & near[at])
+    return np.asarray(out)
+
+
+def update(
+    tracks: Tracks,
+    scene: Scene,
+    posterior: Floats,
+    winner: Indices,
+    likelihood: Floats,
+    settings: MotionSettings,
+) -> Tracks:
+    """Bring each track's shape and evidence up to date with the posterior."""
+    least = 0.3 * least_area(scene, settings)
+    at = winner[scene.cell_of(scene.points.xy)]
+    out = []
+    for k, t in enumerate(tracks, 1):
+        gain = np.clip(likelihood[:, k] - likelihood[:, 0], -CLIP, CLIP)[at == k]
+        t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
+        out.append(remember(t, posterior[:, k], winner, k, scene.cells, scene.time, least))
+    return tuple(out)
+
+
+def absorb(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:
+    """Parts that move as no layer does and touch a track join it: limbs, wheels, shadows."""
+    unknown = np.flatnonzero(winner == len(tracks) + 1)
+    if not len(unknown):
+        return tracks
+    out = list(tracks)
+    count, number = connected_components(scene.cells.link[unknown][:, unknown], directed=False)
+    for i in range(count):
+        part = np.zeros(scene.cells.count, dtype=bool)
+        part[unknown[number == i]] = True
+        ring = scene.cells.reach(part[:, None], 1)[:, 0] & ~part
+        beside = winner[ring]
+        for k, t in enumerate(out, 1):
+            if np.mean(beside == k) > 0.3:
+                share = np.where(part, 1, t.share).astype(np.float32)
+                out[k - 1] = replace(t, share=share)
+                break
+    return tuple(out)
+
+
+def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:
+    """Join tracks that were never seen apart and again and again move as one.
+
+    Two objects that came together stay two, however rigidly they are coupled: they have been seen
+    apart. Pieces of one object, born side by side, become one.
+    """
+    if len(tracks) < 2:
+        return tracks
+    members = np.stack([winner == k for k in range(1, len(tracks) + 1)], axis=1)
+    near = scene.cells.reach(members, NEAR_STEPS)
+    touch = (near.astype(np.float32).T @ members.astype(np.float32)) > 0
+    out = list(tracks)
+    for j in range(len(tracks) - 1, 0, -1):
+        for i in range(j):
+            a, b = out[i], out[j]
+            if a.id < 0 or not (members[:, i].any() and members[:, j].any()):
+                continue
+            apart = a.apart.get(b.key, 0.0)
+            if not touch[i, j] and not touch[j, i]:
+                out[i] = replace(a, apart=_with(a.apart, b.key, apart + scene.seconds))
+                continue
+            if apart > APART_S:
+                continue
+            votes = a.alike.get(b.key, 0.0) + _vote(scene, a, members[:, i], members[:, j])
+            votes = max(votes, -VOTES)
+            out[i] = replace(a, alike=_with(a.alike, b.key, votes))
+            if votes >= VOTES:
+                out[i] = _joined(out[i], b)
+                out[j] = replace(b, id=-1)
+                break
+    return tuple(t for t in out if t.id >= 0)
+
+
+def _with(
+    values: "MappingProxyType[int, float] | object", key: int, value: float
+) -> "MappingProxyType[int, float]":
+    return MappingProxyType({**values, key: value})  # type: ignore[dict-item]
+
+
+def _vote(scene: Scene, a: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_]) -> float:
+    votes = 0.0
+    for m in scene.measured:
+        c = m.constraints
+        if c.lag == 1 and len(scene.measured) > 1:
+            continue
+        at = scene.cell_of(c.xy)
+        start = a.predicted(c.lag, c.span_s)[0]
+        mine, other = in_a[at], in_b[at]
+        if not (_moves(m, mine) and _moves(m, other)):
+            continue
+        same = same_motion(c, mine, other, start, slack_of(start, a.centre))
+        votes += 0.0 if same is None else (1.0 if same else -1.0)
+    return votes
+
+
+def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:
+    """Whether these constraints tell that something moves against the background."""
+    if np.count_nonzero(which) < 4:
+        return False
+    return bool(np.quantile(m.background.distances(m.constraints)[which], 0.7) > 9)
+
+
+def _joined(a: Track, b: Track) -> Track:
+    ids = [i for i in (a.id, b.id) if i]
+    apart = {k: max(a.apart.get(k, 0.0), b.apart.get(k, 0.0)) for k in {*a.apart, *b.apart}}
+    return replace(
+        a,
+        id=min(ids) if ids else 0,
+        born=min(a.born, b.born),
+        share=np.clip(a.share + b.share, 0, 1),
+        motions=_parts(a.motions + b.motions),
+        evidence=a.evidence + b.evidence,
+        frames=max(a.frames, b.frames),
+        apart=MappingProxyType(apart),
+    )
+
+
+def _parts(motions: tuple[Motion, ...]) -> tuple[Motion, ...]:
+    """The best supported motions, few enough that they do not explain everything."""
+    keep = sorted(range(len(motions)), key=lambda i: -motions[i].support)[:MOST_PARTS]
+    return tuple(motions[i] for i in sorted(keep))
+
+
+def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
+    """Drop what was never confirmed and is gone, and what has been hidden too long."""
+    out = []
+    for t in tracks:
+        gone = scene.time - t.seen
+        if t.id == 0:
+            keep = gone <= 0.2 and t.evidence > -20
+        else:
+            keep = gone <= (settings.memory_s if t.hidden is not None else 0.5)
+        if keep:
+            out.append(t)
+    return tuple(out)
+
+
+def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) -> tuple[Tracks, int]:
+    """Give public ids to tracks that have lasted and surely move.
+
+    Args:
+        tracks: All tracks.
+        scene: The frame.
+        ids: The last public id given.
+        settings: Says how long is lasting.
+
+    Returns:
+        The tracks and the last public id given.
+    """
+    out = []
+    for t in tracks:
+        lasted = scene.time - t.born >= settings.confirm_s and t.frames >= 3
+        if not t.id and lasted and t.evidence > 60 and t.seen == scene.time:
+            ids += 1
+            t = replace(t, id=ids)
+        out.append(t)
+    return tuple(out), ids

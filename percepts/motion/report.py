@@ -1,0 +1,121 @@
+"""What is reported of the tracks, and how directives are obeyed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Directive, Region
+from visup.percepts.motion.contour import Outline, outline
+from visup.percepts.motion.image import Floats
+from visup.percepts.motion.life import least_area
+from visup.percepts.motion.scene import Scene
+from visup.percepts.motion.settings import MotionSettings
+from visup.percepts.motion.tracking import Track
+
+LOOK = 2.0  # log likelihood by which motion is believed more readily where asked to look
+
+
+def obey(directives: Sequence[Directive], scene: Scene, likelihood: Floats) -> Floats:
+    """Shift evidence where cogitation asks: 'look_at' favours motion, 'ignore' forbids it.
+
+    Args:
+        directives: Their boxes are in frame pixels.
+        scene: The frame.
+        likelihood: (N, K) float32 log likelihood of labels at the points.
+
+    Returns:
+        (N, K) float32.
+    """
+    out = likelihood
+    for directive in directives:
+        box = _box(directive.data)
+        if box is None or directive.kind not in ("look_at", "ignore"):
+            continue
+        inside = _inside(scene.points.xy / scene.image.scale, box)
+        out = out.copy()
+        if directive.kind == "look_at":
+            out[inside, 0] -= LOOK
+        else:
+            out[inside, 1:] = out[inside].min() - 10
+    return out
+
+
+def report(
+    tracks: Sequence[Track],
+    scene: Scene,
+    size: tuple[int, int],
+    directives: Sequence[Directive],
+    settings: MotionSettings,
+) -> tuple[Region, ...]:
+    """Regions of the confirmed tracks that are in view.
+
+    Args:
+        tracks: All tracks.
+        scene: The frame.
+        size: (width, height) of the frame.
+        directives: 'expect_regions' keeps the surest, 'ignore' leaves out what lies in its box.
+        settings: Gives the least area.
+
+    Returns:
+        Regions by id.
+    """
+    scale = scene.image.scale
+    least = least_area(scene, settings) / scale**2
+    out = []
+    for t in tracks:
+        if t.id > 0 and t.seen == scene.time:
+            shape = outline(t.share[scene.cells.labels], size, least)
+            if shape is not None and not _ignored(shape, directives):
+                out.append(_region(t, shape, scale))
+    out = _best(out, directives)
+    return tuple(sorted(out, key=lambda r: r.id))
+
+
+def _best(regions: list[Region], directives: Sequence[Directive]) -> list[Region]:
+    counts = [d.data.get("count") for d in directives if d.kind == "expect_regions"]
+    wanted = [int(c) for c in counts if isinstance(c, int) and c >= 0]
+    if not wanted:
+        return regions
+    surest = sorted(regions, key=lambda r: (-round(r.confidence, 2), r.id))
+    return surest[: max(wanted)]
+
+
+def _ignored(shape: Outline, directives: Sequence[Directive]) -> bool:
+    boxes = [_box(d.data) for d in directives if d.kind == "ignore"]
+    centre = np.asarray([shape.centroid])
+    return any(bool(_inside(centre, box)[0]) for box in boxes if box is not None)
+
+
+def _box(data: Mapping[str, Any]) -> tuple[float, float, float, float] | None:
+    box = data.get("bbox")
+    if box is None or len(box) != 4:
+        return None
+    x, y, w, h = (float(v) for v in box)
+    return x, y, w, h
+
+
+def _inside(xy: NDArray[Any], box: tuple[float, float, float, float]) -> NDArray[np.bool_]:
+    x, y, w, h = box
+    return np.asarray((xy[:, 0] >= x) & (xy[:, 0] < x + w) & (xy[:, 1] >= y) & (xy[:, 1] < y + h))
+
+
+def _region(t: Track, shape: Outline, scale: float) -> Region:
+    rate = t.best_rate()
+    centre = (shape.centroid[0] * scale, shape.centroid[1] * scale)
+    speed = rate.velocity(centre) / scale if rate is not None else np.zeros(2)
+    return Region(
+        id=t.id,
+        bbox=shape.bbox,
+        mask=shape.mask,
+        contour=shape.contour,
+        centroid=shape.centroid,
+        area=shape.area,
+        velocity=(float(speed[0]), float(speed[1])),
+        velocity_sigma=rate.sigma / scale if rate is not None else float("inf"),
+        cut=shape.cut,
+        confidence=float(1 - np.exp(-max(t.evidence, 0.0) / 100.0)),
+    )

@@ -1,0 +1,153 @@
+"""What one frame shows: points, superpixels, and motions measured over several baselines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.background import Background
+from visup.percepts.motion.constraints import Constraints, Points
+from visup.percepts.motion.discovery import rate_of, slack_of
+from visup.percepts.motion.image import Floats, WorkImage
+from visup.percepts.motion.layers import Affine, distances, fit_affine, log_likelihood
+from visup.percepts.motion.settings import MotionSettings
+from visup.percepts.motion.superpixels import Superpixels
+from visup.percepts.motion.tracking import Indices, Track
+
+REACH_STEPS = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """Motion over one baseline.
+
+    Attributes:
+        constraints: Where it was measured.
+        background: The motions of the background.
+    """
+
+    constraints: Constraints
+    background: Background
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """One frame as measured.
+
+    Attributes:
+        image: The working image.
+        points: Points with structure.
+        cells: Superpixels.
+        owner: (count,) label that each superpixel is expected to have; 0 is background.
+        seconds: Since the frame before.
+        measured: Motions, the shortest baseline first.
+    """
+
+    image: WorkImage
+    points: Points
+    cells: Superpixels
+    owner: Indices
+    seconds: float
+    measured: tuple[Measured, ...]
+
+    @property
+    def time(self) -> float:
+        """Seconds."""
+        return self.image.time
+
+    def cell_of(self, xy: Floats) -> NDArray[np.int32]:
+        """Number of the superpixel at each of (N, 2) positions."""
+        x, y = xy.astype(np.int64).T
+        return np.asarray(self.cells.labels[y, x])
+
+
+def outside(scene: Scene) -> Floats:
+    """(N,) float32: 1 for points away from all objects, 0 for those in or beside one."""
+    owner = scene.owner > 0
+    near = scene.cells.reach(owner[:, None], 1)[:, 0] if owner.any() else owner
+    return (~near[scene.cell_of(scene.points.xy)]).astype(np.float32)
+
+
+def expected(
+    scene: Scene, tracks: tuple[Track, ...], camera: Affine, lag: int, span: float
+) -> Floats:
+    """Where each point is expected in an older image, (N, 2) float32."""
+    at = scene.owner[scene.cell_of(scene.points.xy)]
+    moved = camera.at(scene.points.xy)
+    for k, t in enumerate(tracks, 1):
+        mine = at == k
+        if mine.any():
+            main = max(range(len(t.motions)), key=lambda i: t.motions[i].support)
+            moved[mine] = t.predicted(lag, span)[main].at(scene.points.xy[mine])
+    return np.asarray(scene.points.xy - moved)
+
+
+def fit_tracks(tracks: tuple[Track, ...], scene: Scene) -> tuple[Track, ...]:
+    """Renew each track's motion from the constraints inside its outline."""
+    for m in scene.measured:
+        c = m.constraints
+        at = scene.owner[scene.cell_of(c.xy)]
+        tracks = tuple(_fit(t, m, at == k, scene.time) for k, t in enumerate(tracks, 1))
+    return tracks
+
+
+def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
+    """Each part takes the constraints that it explains best, and is fitted to them.
+
+    A part that has come to move as the background does is given up while others remain, lest the
+    background be swallowed.
+    """
+    c = m.constraints
+    models = t.predicted(c.lag, c.span_s)
+    if not mine.any():
+        return t
+    off = np.stack([distances(m, c, slack_of(m, t.centre)) for m in models])
+    nearest = off.argmin(axis=0)
+    motions = []
+    for i, (motion, start) in enumerate(zip(t.motions, models, strict=True)):
+        weight = (mine & (nearest == i)).astype(np.float32)
+        fit = fit_affine(c, weight, start, slack=slack_of(start, t.centre))
+        if fit.support >= 5:
+            motion = motion.with_rate(c.lag, rate_of(fit, c, now), fit.support)
+            if len(t.motions) > 1 and c.span_s > 0.3 and m.background.moves_as(fit, t.centre):
+                continue
+        motions.append(motion)
+    motions = motions or [t.motions[0]]
+    return replace(t, motions=tuple(motions))
+
+
+def explain(
+    scene: Scene, tracks: tuple[Track, ...], prior: Floats, settings: MotionSettings
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Log likelihood of every point under every label (the E step).
+
+    Args:
+        scene: The frame.
+        tracks: K tracks.
+        prior: (count, K + 2) float32 label shares expected.
+        settings: Gives the distance at which a motion no longer explains.
+
+    Returns:
+        (N, K + 2) float32 for background, tracks and unknown motion; (N,) bool, whether anything
+        was measured at the point.
+    """
+    n = len(scene.points)
+    out = np.zeros((n, len(tracks) + 2), dtype=np.float32)
+    has = np.zeros(n, dtype=bool)
+    at = scene.cell_of(scene.points.xy)
+    near = scene.cells.reach(prior[:, 1:-1] > 0.3, REACH_STEPS)[at]
+    least = -0.5 * settings.outlier**2
+    for m in scene.measured:
+        c = m.constraints
+        has[c.index] = True
+        zero = m.background.log_likelihood(c)
+        for k, t in enumerate(tracks, 1):
+            parts = t.predicted(c.lag, c.span_s)
+            fit = np.max([log_likelihood(p, c, slack_of(p, t.centre)) for p in parts], axis=0)
+            fit = np.where(near[c.index, k - 1], fit, 3 * least)
+            out[c.index, k] += np.maximum(fit, 3 * least)
+        out[c.index, 0] += np.maximum(zero, 3 * least)
+        out[c.index, -1] += least
+    return out, has
