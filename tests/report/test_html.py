@@ -24,7 +24,7 @@ from visup.report.figures import distance_figures, fitted_lines, vote_figures
 from visup.report.html import embedded, plotly_source, report_page, write_report
 from visup.report.records import RunData, Span
 from visup.report.sections import flat, narrative, nearest
-from visup.report.story import summary, title_of
+from visup.report.story import summary, title_of, verdict_words
 
 EVIL = "<script>alert('x')</script> & \"quotes\""
 VOID = frozenset({"meta", "img", "br", "link", "input", "hr"})
@@ -295,6 +295,30 @@ def test_events_lead_to_the_nearest_key_frame() -> None:
     event = Event("entry", 5.9, 29, "x")
     assert nearest(keys, event) == next(k for k in keys if k.frame_index == 30)
     assert nearest((), event) is None
+
+
+def test_a_coupling_is_a_band_and_has_no_line() -> None:
+    coupled = Span(("relation", "1", "2"), "coupled", 8.0, 9.5)
+    (figure,) = distance_figures(replace(data(), spans=(*data().spans, coupled)))
+    bands = [s for s in figure.layout["shapes"] if s["type"] == "rect"]
+    assert [(b["x0"], b["x1"]) for b in bands] == [(8.0, 9.5)]
+    assert "coupled from 8.0 to 9.5 s" in figure.caption
+    assert len(figure.traces) == len(distance_figures(data())[0].traces)
+
+
+def test_a_run_that_was_not_judged_claims_nothing() -> None:
+    judged = replace(data(), verdict=Verdict.SUCCEEDED)
+    assert verdict_words(judged)[0] == "Succeeded"
+    assert verdict_words(replace(judged, verdict=None))[0] == "No verdict"
+    quiet = replace(judged, verdict=None, tasks=(), alerts=())
+    assert verdict_words(quiet)[0] == "Nothing to report"
+
+
+def test_the_summary_is_made_of_sentences() -> None:
+    tasks = tuple(replace(t, evidence="they were apart ") for t in data().tasks)
+    assert " They were apart. One alert was raised, at 7.0 s: " in summary(
+        replace(data(), tasks=tasks)
+    )
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,8 @@ def label_of(belief: ObjectBelief) -> str:
     """What an object is called in a picture, such as '2 spartan 87 %'."""
     if not belief.candidates:
         return f"{belief.id} unknown"
-    return f"{belief.id} {belief.name} {belief.strength:.0%}".replace("%", " %")
+    name = belief.name.replace("_", " ")
+    return f"{belief.id} {name} {belief.strength:.0%}".replace("%", " %")
 
 
 def _points(belief: ObjectBelief) -> NDArray[np.int32]:

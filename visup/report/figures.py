@@ -111,7 +111,13 @@ def _distance_figure(run: RunData, pair: tuple[int, int]) -> Figure:
     lines = fitted_lines(times, gaps, spans)
     traces = [*_band(points), _series(known, "distance")]
     traces += [_line_trace(line, lines[:i]) for i, line in enumerate(lines)]
-    told = "; ".join(f"{span_sentence(x.span)} at {x.slope:+.1f} px/s" for x in lines)
+    coupled = [s for s in run.spans if s.subject == subject and s.value == "coupled"]
+    told = "; ".join(
+        [f"{span_sentence(x.span)} at {x.slope:+.1f} px/s" for x in lines]
+        + [span_sentence(s) for s in coupled]
+    )
+    layout = _layout("gap in the image, px", run, rangemode="tozero")
+    layout["shapes"] += [_shaded(s) for s in coupled]
     names = [called(run, i) for i in pair]
     return Figure(
         f"distance-{pair[0]}-{pair[1]}",
@@ -119,8 +125,25 @@ def _distance_figure(run: RunData, pair: tuple[int, int]) -> Figure:
         f"From {gaps[0]:.0f} px at {times[0]:.1f} s to {gaps[-1]:.0f} px at {times[-1]:.1f} s"
         + (f"; {told}." if told else "; no lasting way of moving was told."),
         traces,
-        _layout("gap in the image, px", run, rangemode="tozero"),
+        layout,
     )
+
+
+def _shaded(span: Span) -> dict[str, Any]:
+    """A stretch of time in which a pair was one body, as a band behind the lines."""
+    return {
+        "type": "rect",
+        "xref": "x",
+        "yref": "paper",
+        "x0": _short(span.start),
+        "x1": _short(span.end),
+        "y0": 0,
+        "y1": 1,
+        "line": {"width": 0},
+        "fillcolor": "rgba(0,114,178,0.14)",
+        "layer": "below",
+        "label": {"text": "coupled", "textposition": "top left", "font": {"size": 12}},
+    }
 
 
 def _series(known: list[tuple[float, Any]], name: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from visup.report.figures import (
     vote_figures,
 )
 from visup.report.records import RunData
-from visup.report.story import VERDICT_WORDS, title_of
+from visup.report.story import title_of, verdict_words
 
 
 def write_report(run: RunData, path: Path) -> None:
@@ -64,7 +64,7 @@ def report_page(run: RunData) -> str:
     page = Template((own / "report.html").read_text(encoding="utf-8"))
     return page.substitute(
         title=escape(title_of(run)),
-        verdict_word=escape(VERDICT_WORDS[run.verdict][0]),
+        verdict_word=escape(verdict_words(run)[0]),
         style=(own / "report.css").read_text(encoding="utf-8"),
         source=escape(run.source),
         verdict=sections.verdict_badge(run),

@@ -11,7 +11,14 @@ from visup.agent import Alert, Event, Severity, StageBelief, TaskBelief
 from visup.report.figures import Figure
 from visup.report.palette import OBJECT_COLOURS, css, object_colour
 from visup.report.records import KeyFrame, Look, RunData
-from visup.report.story import SEVERITY_WORDS, VERDICT_WORDS, called, picture_words, summary
+from visup.report.story import (
+    SEVERITY_WORDS,
+    called,
+    picture_words,
+    spoken,
+    summary,
+    verdict_words,
+)
 
 MARKS = {Severity.INFO: "•", Severity.WARNING: "▲", Severity.CRITICAL: "◆"}
 MOST_COMPARED = 10
@@ -28,7 +35,7 @@ def hero(run: RunData) -> str:
 
 def verdict_badge(run: RunData) -> str:
     """The verdict as a badge, and what it means."""
-    word, meaning = VERDICT_WORDS[run.verdict]
+    word, meaning = verdict_words(run)
     kind = run.verdict.value if run.verdict else "none"
     return (
         f'<p class="verdict verdict-{kind}"><strong>{escape(word)}</strong> '
@@ -222,7 +229,7 @@ def _look(look: Look, time: float) -> str:
         if rows
         else "<p class=quiet>No hypothesis.</p>"
     )
-    believed = f"{look.believed} {look.share:.0%}".replace("%", " %")
+    believed = f"{spoken(look.believed)} {look.share:.0%}".replace("%", " %")
     if look.matches and abs(look.matched_at - time) > 0.05:
         believed += f", compared at {look.matched_at:.1f} s"
     return (

@@ -28,6 +28,14 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight",
 MOST_NAMED = 4
 
 
+def verdict_words(run: RunData) -> tuple[str, str]:
+    """The verdict in a word, and what it means."""
+    grave = any(a.severity > Severity.INFO for a in run.alerts)
+    if run.verdict is None and (run.tasks or grave or not run.frames):
+        return "No verdict", "The run was not judged."
+    return VERDICT_WORDS[run.verdict]
+
+
 def title_of(run: RunData) -> str:
     """What the page is about, short: the last two parts of a path, or the source as it is."""
     parts = PurePath(run.source).parts
@@ -42,8 +50,13 @@ def summary(run: RunData) -> str:
 
 def name_of(subject: Subject) -> str:
     """What an object is called on the page, such as 'Object 2, spartan'."""
-    known = subject.name and subject.name != UNKNOWN_OBJECT
-    return f"Object {subject.id}, {subject.name}" if known else f"Object {subject.id}"
+    known = subject.name != UNKNOWN_OBJECT
+    return f"Object {subject.id}, {spoken(subject.name)}" if known else f"Object {subject.id}"
+
+
+def spoken(name: str) -> str:
+    """A model's name as it is said: 'payload_bay' is 'payload bay'."""
+    return name.replace("_", " ")
 
 
 def called(run: RunData, object_id: int) -> str:
@@ -92,12 +105,12 @@ def _followed(run: RunData) -> str:
     if not named:
         return f"{text}."
     best = sorted(named, key=lambda s: (-s.share, s.id))[:MOST_NAMED]
-    names = [f"{s.name} ({s.share:.0%})".replace("%", " %") for s in best]
+    names = [f"{spoken(s.name)} ({s.share:.0%})".replace("%", " %") for s in best]
     return f"{text}, believed to be {_listed(names)}."
 
 
 def _why(run: RunData) -> list[str]:
-    return [t.evidence for t in run.tasks if t.evidence]
+    return [_sentence(t.evidence) for t in run.tasks if t.evidence]
 
 
 def _alerted(alerts: tuple[Alert, ...]) -> str:
@@ -108,7 +121,13 @@ def _alerted(alerts: tuple[Alert, ...]) -> str:
     verb = "was" if len(grave) == 1 else "were"
     begins = "" if len(grave) == 1 else "the first "
     text = f"{count(len(grave), 'alert')} {verb} raised, {begins}at {first.opened:.1f} s: "
-    return text[0].upper() + text[1:] + first.cause
+    return _sentence(text + first.cause)
+
+
+def _sentence(text: str) -> str:
+    """With a capital and a full stop."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 def _listed(names: list[str]) -> str:
