@@ -23,6 +23,8 @@ class Meaning:
             than being over once it has held long enough (`coupled`).
         hold_s: Seconds for which it must have held to count as done, unless `for` says otherwise.
         entry: It is seen to begin when one of these is true; `holds` when empty.
+        while_not: A touch does not make it begin while one of these is still true: what draws
+            nearer has not met yet, however little lies between in the image.
         progress: Further relations that bring it nearer although it does not hold yet.
         contrary: Relations that say that it fails.
         expects: Further relations that are no reason for worry while it is asked for.
@@ -35,6 +37,7 @@ class Meaning:
     lasts: bool = False
     hold_s: float = 1.0
     entry: tuple[str, ...] = ()
+    while_not: tuple[str, ...] = ()
     progress: tuple[str, ...] = ()
     contrary: tuple[str, ...] = ()
     expects: tuple[str, ...] = ()
@@ -92,7 +95,8 @@ _TABLE = (
     Meaning(
         "coupled",
         holds=("coupled",),
-        entry=("touching", "coupled"),
+        entry=("coupled", "touching"),
+        while_not=("converging",),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),

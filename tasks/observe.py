@@ -17,6 +17,7 @@ class Sighting:
         holds: Whether the action holds.
         helps: A true relation by which it holds or comes nearer, or None.
         entry: A true relation by which it begins, or None.
+        not_yet: Whether the entry does not count yet (`while_not`).
         contrary: A true relation that says that it fails, or None.
         observed: Whether anything at all is known about it; False while an actor is not found
             or its object is hidden.
@@ -25,6 +26,7 @@ class Sighting:
     holds: Truth = Truth.UNKNOWN
     helps: Relation | None = None
     entry: Relation | None = None
+    not_yet: bool = False
     contrary: Relation | None = None
     observed: bool = False
 
@@ -92,13 +94,16 @@ def observe(meaning: Meaning, objects: tuple[int | None, ...], relations: Relati
     ids = tuple(o for o in objects if o is not None)
     if len(ids) < len(objects):
         return UNSEEN
+    holds = _holds(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
     known = (*meaning.helps, *meaning.contrary)
     return Sighting(
-        holds=_holds(meaning, ids, relations),
+        holds=holds,
         helps=helps,
         entry=relations.first_true(meaning.begins, ids),
+        not_yet=holds is not Truth.TRUE
+        and relations.first_true(meaning.while_not, ids) is not None,
         contrary=contrary,
         observed=relations.known(known, ids),
     )

@@ -51,6 +51,7 @@ class Reading:
         cost: How badly it fits, 0 for the best.
         past: Stages that lie behind it, the latest word on each.
         finished: When the task was done by it, or None.
+        met: Steps that may come next and whose entry was seen, with the time when it last was.
         stayed: Whether it has paid for staying where it is.
     """
 
@@ -58,6 +59,7 @@ class Reading:
     cost: float = 0.0
     past: tuple[StageBelief, ...] = ()
     finished: float | None = None
+    met: tuple[tuple[tuple[Step, ...], float], ...] = ()
     stayed: bool = False
 
     @property
@@ -135,16 +137,17 @@ class Follower:
     def _go_on(self, reading: Reading, see: See, now: float) -> Iterator[Reading]:
         """A reading and those that come out of it by leaving a step."""
         ways = list(moves(self.task, reading.state, entered(now), now))
+        reading = replace(reading, met=self._met(reading, ways, see, now))
         ends = any(w.state is None and self._may_end(w) for w in ways)
         if ends and reading.finished is None:
             reading = replace(reading, finished=now)
         forced = tempted = False
         for way in ways:
-            price = None if way.state is None else self._price(way, see, now)
+            price = None if way.state is None else self._price(reading, way, see, now)
             if price is None or way.state is None:
                 continue
             forced = forced or all(self._over(x) for x in way.left)
-            tempted = tempted or (price == 0.0 and self._seen(way, see, now))
+            tempted = tempted or (price == 0.0 and self._seen(reading, way, see, now))
             yield self._moved(reading, way.state, way, price, see, now)
         if ends or not forced:
             if tempted and not reading.stayed:
@@ -154,19 +157,32 @@ class Follower:
     def _may_end(self, way: Move[Watch]) -> bool:
         return all(x.watch.fulfilled and x.watch.status not in BAD for x in way.left)
 
-    def _price(self, way: Move[Watch], see: See, now: float) -> float | None:
+    def _price(self, reading: Reading, way: Move[Watch], see: See, now: float) -> float | None:
         """What a move costs, or None when nothing speaks for it."""
         if all(self._over(x) for x in way.left):
             return 0.0
         skipped = SKIPPED * sum(not x.watch.fulfilled for x in way.left)
-        if self._seen(way, see, now):
+        if self._seen(reading, way, see, now):
             return skipped
         nearer = all(self._enters(x.step, way.left, see(x.step).helps, now) for x in way.entered)
         return skipped + GUESSED if nearer else None
 
-    def _seen(self, way: Move[Watch], see: See, now: float) -> bool:
-        """Whether all that a move enters is seen to begin."""
-        return all(self._enters(x.step, way.left, see(x.step).entry, now) for x in way.entered)
+    def _seen(self, reading: Reading, way: Move[Watch], see: See, now: float) -> bool:
+        """Whether all that a move enters has been seen to begin, and nothing says "not yet"."""
+        if any(see(x.step).not_yet for x in way.entered):
+            return False
+        return now - dict(reading.met).get(_steps(way), -math.inf) <= self.settings.contact_s
+
+    def _met(
+        self, reading: Reading, ways: list[Move[Watch]], see: See, now: float
+    ) -> tuple[tuple[tuple[Step, ...], float], ...]:
+        """When the entry to each move was last seen, with what is seen now."""
+        met = dict(reading.met)
+        for way in ways:
+            signs = ((x.step, see(x.step).entry) for x in way.entered)
+            if way.entered and all(self._enters(s, way.left, sign, now) for s, sign in signs):
+                met[_steps(way)] = now
+        return tuple(met.items())
 
     def _enters(
         self, step: Step, left: tuple[Leaf[Watch], ...], sign: Relation | None, now: float
@@ -209,6 +225,10 @@ class Follower:
         least = ranked[0].cost
         kept = (replace(r, cost=r.cost - least) for r in ranked if r.cost - least <= WORST)
         return tuple(kept)
+
+
+def _steps(way: Move[Watch]) -> tuple[Step, ...]:
+    return tuple(x.step for x in way.entered)
 
 
 def confidence(readings: tuple[Reading, ...]) -> float:

@@ -16,6 +16,7 @@ class TaskSettings:
         switch_s: Another object must be the better match for so long before an actor, whose object
             is still there, changes hands.
         enter_s: A relation must be true so long before it counts as the entry to a stage.
+        contact_s: A contact that ended no longer ago still counts as the entry to a stage.
         contrary_s: The contrary of an action must hold so long before a begun stage fails.
         contrary_early_s: The same for a stage that has not begun yet.
         recover_s: A failing stage must make progress so long before it counts as recovered.
@@ -33,6 +34,7 @@ class TaskSettings:
     keep_bonus: float = 0.25
     switch_s: float = 2.0
     enter_s: float = 0.2
+    contact_s: float = 1.5
     contrary_s: float = 0.5
     contrary_early_s: float = 2.0
     recover_s: float = 1.0
@@ -41,7 +43,7 @@ class TaskSettings:
     gap_s: float = 0.5
     failed_s: float = 8.0
     regret_s: float = 10.0
-    unexplained_s: float = 0.3
+    unexplained_s: float = 0.0
     familiar: float = 0.35
     most_courses: int = 24
 

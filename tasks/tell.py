@@ -38,7 +38,12 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind) -> Iterator[Ev
 
 
 def stage_concerns(belief: TaskBelief) -> Iterator[Concern]:
-    """A concern for each stage that is failing or has failed."""
+    """A concern for each stage that is failing or has failed.
+
+    A task that was interrupted is not expected to go on, so its stages are no concern any more.
+    """
+    if belief.verdict is Verdict.INTERRUPTED:
+        return
     for stage in belief.stages:
         if stage.status in BAD:
             cause = stage_sentence("stage_failing", stage.stage, belief.task, stage.evidence)
@@ -68,7 +73,7 @@ def _worth_telling(was: Verdict, now: Verdict) -> bool:
 
 
 def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) -> Event:
-    bad = kind in ("stage_failing", "stage_failed")
+    bad = kind in ("stage_failing", "stage_failed") and belief.verdict is not Verdict.INTERRUPTED
     return Event(
         kind,
         mind.time,
