@@ -259,8 +259,8 @@ def test_json_in_the_page_never_ends_its_script() -> None:
 
 
 @given(
-    slope=st.floats(-50, 50),
-    start=st.floats(0, 300),
+    slope=st.floats(-20, 50),
+    start=st.floats(300, 600),
     count=st.integers(3, 60),
     noise=st.floats(0, 3),
 )
@@ -273,6 +273,25 @@ def test_fitted_lines_find_the_speed(slope: float, start: float, count: int, noi
     spread = np.sqrt(((times - times.mean()) ** 2).sum())
     assert abs(line.slope - slope) <= 6 * noise / spread + 1e-6
     assert line.end - line.start == pytest.approx(line.slope * (times[-1] - times[0]), abs=1e-6)
+
+
+def test_moments_of_touch_do_not_bend_the_line() -> None:
+    times = [float(t) for t in range(20)]
+    gaps = [max(0.0, 50.0 - 10.0 * t) for t in times]
+    span = Span(("relation", "1", "2"), "converging", 0.0, 19.0)
+    (line,) = fitted_lines(times, gaps, [span])
+    assert line.slope == pytest.approx(-10.0)
+    assert line.times == (0.0, 4.0)
+    assert fitted_lines(times, [0.0] * 20, [span]) == ()
+
+
+def test_votes_that_were_not_kept_are_unknown() -> None:
+    samples = [
+        replace(s, votes={1: {"a": 1.0}} if i % 2 else {1: {"b": 1.0}})
+        for i, s in enumerate(data().samples)
+    ]
+    figure = vote_figures(replace(data(), samples=tuple(samples)))[0]
+    assert {y for t in figure.traces for y in t["y"]} == {None, 1.0}
 
 
 def test_spans_with_too_few_points_have_no_line() -> None:

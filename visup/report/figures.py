@@ -69,18 +69,21 @@ def fitted_lines(
 ) -> tuple[Line, ...]:
     """Least-squares lines through distances, one for each span (paper, section 7.4).
 
+    A gap of 0 only says that the outlines touch, not how deep one body is before the other, so that
+    such moments tell nothing about the speed and are left out.
+
     Args:
         times: Seconds, growing.
         gaps: Pixels.
         spans: How the pair moved, and when.
 
     Returns:
-        A line for each span with at least three points.
+        A line for each span with at least three distances above 0.
     """
     t, y = np.asarray(times, float), np.asarray(gaps, float)
     lines = []
     for span in spans:
-        inside = (t >= span.start) & (t <= span.end)
+        inside = (t >= span.start) & (t <= span.end) & (y > 0)
         if inside.sum() < FEWEST_POINTS:
             continue
         x = t[inside] - t[inside][0]
@@ -233,7 +236,7 @@ def _vote_trace(samples: list[tuple[float, Any]], name: str, i: int) -> dict[str
         "mode": "lines",
         "name": html.escape(name),
         "x": [_short(t) for t, _ in samples],
-        "y": [None if v is None else _short(v.get(name, 0.0)) for _, v in samples],
+        "y": [_known(v, name) for _, v in samples],
         "line": {
             "color": CANDIDATE_COLOURS[i % len(CANDIDATE_COLOURS)],
             "dash": DASHES[i % len(DASHES)],
@@ -242,6 +245,12 @@ def _vote_trace(samples: list[tuple[float, Any]], name: str, i: int) -> dict[str
         "connectgaps": False,
         "hovertemplate": f"{html.escape(name)}: %{{y:.2f}} at %{{x:.1f}} s<extra></extra>",
     }
+
+
+def _known(votes: Mapping[str, float] | None, name: str) -> float | None:
+    """Votes for a name; those that were not kept are unknown, not zero."""
+    value = (votes or {}).get(name)
+    return None if value is None else _short(value)
 
 
 def stage_figure(run: RunData) -> Figure | None:
