@@ -3,7 +3,8 @@
 Two bodies are believed coupled when, for a while,
 - they touch, came together before that, and are now at rest to each other; or
 - they touch and move together rigidly; or
-- the number of regions fell and the region that is left is like the union of the two.
+- the number of regions fell, the region that is left is like the union of the two, and it keeps
+  that shape.
 
 Rest and rigid motion are judged by the velocities of both outlines in the two halves of the last
 second, so that a body that bounces off (whose mean relative velocity is zero for a moment) is not
@@ -25,12 +26,14 @@ from visup.agent import (
     Observation,
     Outcome,
     Presence,
+    Region,
     Relation,
     Truth,
 )
 from visup.rules.relations import Measured, RelationSettings, at_rest, measured, scale
+from visup.rules.rigid import shape_change
 from visup.rules.sentences import sentence
-from visup.rules.tracks import tracks
+from visup.rules.tracks import merged_pairs
 
 COUPLING = "rules.coupling"
 Pair = tuple[int, int]
@@ -44,19 +47,23 @@ class CouplingSettings:
     Attributes:
         relations: Thresholds of rest; those of the relations.
         rest_s: How long rest must last, beyond the window over which it is judged.
-        merged_s: How long a merged region must last.
+        merged_s: How long a merged region must keep its shape.
+        merged_lag_s: How far apart the shapes are that are compared.
+        merged_change: Share of the area that may differ.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
     rest_s: float = 0.08
-    merged_s: float = 1.2
+    merged_s: float = 0.9
+    merged_lag_s: float = 1.0
+    merged_change: float = 0.025
     approach_s: float = 6.0
     part_s: float = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pending:
     """What is remembered of one pair: seconds since when each holds, or None.
 
@@ -64,11 +71,15 @@ class Pending:
         converged_at: When they last were converging.
         rest_since: Since when they touch and are at rest.
         apart_since: Since when they are apart.
+        shapes: (time, region) of the region in which they are merged, at most six.
+        rigid_since: Since when that region keeps its shape.
     """
 
     converged_at: float | None = None
     rest_since: float | None = None
     apart_since: float | None = None
+    shapes: tuple[tuple[float, Region], ...] = ()
+    rigid_since: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +134,21 @@ class Couple:
             mind.time if converging else before.converged_at,
             _since(before.rest_since, rest, mind.time),
             _since(before.apart_since, apart, mind.time),
+            *self._shapes(before, pair, mind),
         )
+
+    def _shapes(
+        self, before: Pending, pair: Pair, mind: Mind
+    ) -> tuple[tuple[tuple[float, Region], ...], float | None]:
+        """Shapes of the merged region, four a second, and since when they are alike."""
+        s, now = self.settings, mind.time
+        host = _host(pair, mind)
+        shapes = tuple(x for x in before.shapes if now - x[0] <= s.merged_lag_s + 0.3)
+        if host is None or host.last_seen < now or (shapes and now - shapes[-1][0] < 0.25 - 1e-6):
+            return shapes, before.rigid_since if shapes else None
+        old = [r for t, r in shapes if now - t >= s.merged_lag_s - 1e-6]
+        alike = bool(old) and shape_change(old[-1], host.region) < s.merged_change
+        return (*shapes, (now, host.region))[-6:], _since(before.rigid_since, alike, now)
 
     def _at_rest(self, now: Measured, pair: Pair, mind: Mind) -> bool:
         if not set(pair) <= set(now.ids):
@@ -136,8 +161,7 @@ class Couple:
 
     def _joined(self, p: Pending, pair: Pair, mind: Mind) -> bool:
         s = self.settings
-        a, b = (mind.objects[i] for i in pair)
-        if self._merged(a, b, mind):
+        if _host(pair, mind) is not None and _lasts(p.rigid_since, s.merged_s, mind.time):
             return True
         if not _lasts(p.rest_since, s.rest_s, mind.time):
             return False
@@ -145,16 +169,6 @@ class Couple:
         if together is not None and together.truth is Truth.TRUE:
             return True
         return p.converged_at is not None and mind.time - p.converged_at <= s.approach_s
-
-    def _merged(self, a: ObjectBelief, b: ObjectBelief, mind: Mind) -> bool:
-        of = tracks(mind).of
-        if a.presence is not Presence.SEEN or b.presence is not Presence.SEEN:
-            return False
-        for x, y in ((a, b), (b, a)):
-            track = of.get(x.id)
-            if track is not None and track.merged_with == y.id:
-                return _lasts(track.merged_since, self.settings.merged_s, mind.time)
-        return False
 
     def _relation(
         self,
@@ -169,6 +183,14 @@ class Couple:
         unknown = hidden or held.get(("touching", pair)) is Truth.UNKNOWN
         truth = Truth.UNKNOWN if unknown else Truth.FALSE
         return Relation("coupled", pair, truth, mind.time, 0.0 if unknown else 0.9)
+
+
+def _host(pair: Pair, mind: Mind) -> ObjectBelief | None:
+    """The object in whose region the two are merged now, or None."""
+    for gone, host in merged_pairs(mind):
+        if {gone, host} == set(pair):
+            return mind.objects.get(host)
+    return None
 
 
 def _since(before: float | None, holds: bool, now: float) -> float | None:

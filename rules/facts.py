@@ -12,7 +12,7 @@ from visup.agent import HealthStatus, Mind, ObjectBelief, Presence, Relation, Tr
 from visup.rules.geometry import RCC8
 from visup.rules.relations import Measured, RelationSettings, measured, scale
 from visup.rules.sentences import believed_name
-from visup.rules.tracks import tracks
+from visup.rules.tracks import at_border, tracks
 
 RELATION_NAMES = (
     "converging",
@@ -138,6 +138,14 @@ def moving(facts: Facts, a: int) -> Truth:
     return truth(speed > RelationSettings().still_speed * scale(facts.mind.frame_size))
 
 
+def whole(facts: Facts, a: int) -> Truth:
+    """Whether an object is clear of the image border."""
+    belief = facts.objects.get(a)
+    if belief is None:
+        return Truth.UNKNOWN
+    return truth(not at_border(belief.region, facts.mind.frame_size, 0))
+
+
 def first_contact(facts: Facts, a: int, b: int) -> Truth:
     """Whether b is what a would meet first."""
     if isnan(facts.time_to_contact(a, b)):
@@ -216,6 +224,7 @@ WORDS: MappingProxyType[str, Word] = MappingProxyType(
         "hidden": Word(_ONE, lambda f, a: presence(f, a, Presence.HIDDEN), "it is out of sight"),
         "lost": Word(_ONE, lost, "it is out of sight and nothing tells why"),
         "moving": Word(_ONE, moving, "it moves in the image"),
+        "whole": Word(_ONE, whole, "it is clear of the image border"),
         "first_contact": Word(_TWO, first_contact, "the second is what the first would meet first"),
         "stale": Word(("kind",), stale, "percepts of that kind could not be observed"),
         "healthy": Word(

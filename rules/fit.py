@@ -105,7 +105,7 @@ def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
     """
     good = np.isfinite(support) & free
     count = good.sum(axis=0)
-    usable = (count >= 4) & (count >= 0.6 * len(times))
+    usable = (count >= 4) & (count >= 0.5 * len(times))
     values = np.where(good, support, 0.0)
     n = np.maximum(count, 1)
     t = np.where(good, times[:, None, None], 0.0)

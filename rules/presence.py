@@ -220,6 +220,7 @@ class SeePresence:
 
     def _follow(self, work: _Work) -> None:
         seen = work.seen()
+        around = self._around(work)
         hosts = {t.merged_with for t in work.of.values()}
         for belief in seen:
             track = work.of.get(belief.id)
@@ -231,11 +232,16 @@ class SeePresence:
                 work.put(belief, merged_with=None, parted_at=work.now)
                 track = work.of[belief.id]
             crowded = belief.id in hosts or any(
-                self._near(belief.region, other.region) for other in seen if other.id != belief.id
+                self._near(belief.region, other.region) for other in around if other.id != belief.id
             )
             work.of[belief.id] = follow(
                 track, belief.region, work.now, crowded, self.settings.allowed_gap_s
             )
+
+    def _around(self, work: _Work) -> list[ObjectBelief]:
+        """Objects that are seen, or were a flicker ago: all that may hide a part of another."""
+        since = work.now - self.settings.allowed_gap_s
+        return [b for b in work.mind.objects.values() if b.last_seen >= since]
 
     def _near(self, a: Region, b: Region) -> bool:
         if box_gap(a.bbox, b.bbox) > self.settings.contact_px:

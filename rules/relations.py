@@ -45,6 +45,7 @@ class RelationSettings:
         rate_exit: Trend below which they end, image diagonals per second.
         sigmas: How many standard deviations of the slope a trend must exceed to enter.
         trend_minimum_s: Least duration of a trend before it is believed.
+        hold_s: How long the last gap stands for bodies that flicker out of sight.
         depth_rate: Relative depth change that counts, share of the depth per second.
         touch_enter: Outline gap at which bodies touch, image diagonals.
         touch_exit: Outline gap at which they no longer do.
@@ -64,6 +65,7 @@ class RelationSettings:
     rate_exit: float = 0.001
     sigmas: float = 3.0
     trend_minimum_s: float = 0.3
+    hold_s: float = 0.3
     depth_rate: float = 0.02
     touch_enter: float = 0.0035
     touch_exit: float = 0.006
@@ -167,7 +169,7 @@ class Relations:
         objects = mind.present()
         ids = tuple(b.id for b in objects)
         history = self._sample(kept.history, objects, mind, observation)
-        now = self._measure(history, objects, mind)
+        now = self._measure(history, objects, mind, kept.measured)
         rows = np.array([kept.measured.ids.index(i) if i in kept.measured.ids else -1 for i in ids])
         latches = {
             name: step(
@@ -219,7 +221,9 @@ class Relations:
             np.concatenate([history.depth, np.where(seen, depth, np.nan)[None]]),
         )
 
-    def _measure(self, h: History, objects: tuple[ObjectBelief, ...], mind: Mind) -> Measured:
+    def _measure(
+        self, h: History, objects: tuple[ObjectBelief, ...], mind: Mind, before: Measured
+    ) -> Measured:
         m = len(objects)
         slope, sigma = np.full((m, m), np.nan), np.full((m, m), np.nan)
         i, j = np.triu_indices(m, 1)
@@ -236,7 +240,7 @@ class Relations:
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
         return Measured(
             h.ids,
-            self._gaps(objects, h, mind),
+            self._gaps(objects, h, mind, before),
             slope,
             sigma,
             apart,
@@ -263,21 +267,30 @@ class Relations:
             velocity(times[cut:], support[cut:], free[cut:]),
         )
 
-    def _gaps(self, objects: tuple[ObjectBelief, ...], h: History, mind: Mind) -> Floats:
+    def _gaps(
+        self, objects: tuple[ObjectBelief, ...], h: History, mind: Mind, before: Measured
+    ) -> Floats:
         """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
-        near = 0.05 * scale(mind.frame_size)
         gaps = np.full((len(objects), len(objects)), np.nan)
         for i, a in enumerate(objects):
             for j in range(i + 1, len(objects)):
                 b = objects[j]
-                if a.last_seen != mind.time or b.last_seen != mind.time:
-                    continue
-                gap = outline_gap(a.region, b.region, near)
-                if gap is None:
-                    latest = h.separation[-1, i, j] if len(h.times) else np.nan
-                    gap = max(near, float(latest)) if np.isfinite(latest) else np.nan
-                gaps[i, j] = gaps[j, i] = gap
+                unseen = mind.time - min(a.last_seen, b.last_seen)
+                if unseen == 0.0:
+                    gaps[i, j] = gaps[j, i] = self._gap(a, b, h, (i, j), mind)
+                elif unseen <= self.settings.hold_s:
+                    gaps[i, j] = gaps[j, i] = before.pair("gap", a.id, b.id)
         return gaps
+
+    def _gap(
+        self, a: ObjectBelief, b: ObjectBelief, h: History, at: tuple[int, int], mind: Mind
+    ) -> float:
+        near = 0.05 * scale(mind.frame_size)
+        gap = outline_gap(a.region, b.region, near)
+        if gap is not None:
+            return gap
+        apart = float(h.separation[-1][at]) if len(h.times) else np.nan
+        return max(near, apart) if np.isfinite(apart) else np.nan
 
     def _wanted(
         self,
