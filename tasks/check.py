@@ -1,6 +1,7 @@
-"""What a tree must satisfy beyond its syntax: names, actors, courses that end, clauses that agree.
+"""What a tree must satisfy beyond its syntax: known names, the right actors, stages that are reached.
 
-Each check tells a fault where it stands and none that merely follows from another.
+Courses and their clauses are checked in `check_courses.py`. Each check tells a fault where it
+stands and none that merely follows from another.
 """
 
 from __future__ import annotations
@@ -11,34 +12,23 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cached_property
 
-from visup.tasks.actions import Meaning, contradict
+from visup.tasks.actions import Meaning
+from visup.tasks.check_courses import CourseCheck
+from visup.tasks.chunk import WORDS
 from visup.tasks.faults import Source, TaskFault, closest, did_you_mean
 from visup.tasks.language import Grammar
-from visup.tasks.mistakes import WORDS
 from visup.tasks.syntax import Parsed
 from visup.tasks.tree import (
-    SECONDS_PER_UNIT,
     Action,
     Actors,
     Course,
-    Deadline,
-    Duration,
-    Hold,
     Name,
     Reference,
-    Repeated,
     Span,
     Stage,
-    Timed,
-    Together,
     walk,
 )
 
-UNITS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "m": "min", "mins": "min",
-    "minute": "min", "minutes": "min", "hr": "h", "hrs": "h", "hour": "h", "hours": "h",
-    "msec": "ms", "msecs": "ms", "millisecond": "ms", "milliseconds": "ms",
-}  # fmt: skip
 ALIKE = 0.85  # two names that are so alike are taken to be meant as one
 
 
@@ -99,12 +89,8 @@ class _Check:
             yield from self.unreached()
             yield from self.slips()
             yield from self.idle_actors()
-        yield from self.endless()
-        yield from self.durations()
-        yield from self.clauses()
-        yield from self.together()
-        yield from self.invariants()
-        yield from self.repetitions()
+        whole = not (self.undefined or self.parsed.faults)
+        yield from CourseCheck(self.parsed.task, self.source, self.actions, whole).faults()
 
     def fault(
         self,
@@ -273,101 +259,6 @@ class _Check:
                 what = f"actor `{actor.name}` is declared but takes no part"
                 hint = did_you_mean(actor.name, named)
                 yield self.fault("E213", what, actor.span, "an action with this actor", hint)
-
-    def endless(self) -> Iterator[TaskFault]:
-        begins = self.grammar.begin_with_themselves()
-        for stage in begins:
-            what = f"stage `<{stage.name}>` begins with itself and so never begins"
-            hint = f"let something come first, such as `<try> | <try> <{stage.name}>`"
-            yield self.fault("E206", what, stage.span, "an action before it comes again", hint)
-        if begins or self.undefined or self.parsed.faults:
-            return
-        for stage in self.grammar.never_end():
-            what = f"stage `<{stage.name}>` can never end"
-            hint = f"offer a way out, such as `( ... <{stage.name}> )?` or `| ...`"
-            yield self.fault("E207", what, stage.span, "a course without the stage itself", hint)
-
-    def durations(self) -> Iterator[TaskFault]:
-        for _, course in self.courses:
-            if not isinstance(course, Timed):
-                continue
-            for duration in (c.duration for c in course.clauses):
-                yield from self.duration(duration)
-
-    def duration(self, duration: Duration) -> Iterator[TaskFault]:
-        if duration.unit not in SECONDS_PER_UNIT:
-            meant = UNITS.get(duration.unit.casefold())
-            hint = f"did you mean `{meant}`?" if meant else None
-            what = f"`{duration.unit}` is not a unit of time"
-            yield self.fault("E218", what, duration.span, "`ms`, `s`, `min` or `h`", hint)
-        elif duration.amount <= 0:
-            yield self.fault("E217", f"`{duration}` is no time at all", duration.span)
-
-    def clauses(self) -> Iterator[TaskFault]:
-        for _, course in self.courses:
-            if not isinstance(course, Timed):
-                continue
-            holds = [c for c in course.clauses if isinstance(c, Hold)]
-            deadlines = [c for c in course.clauses if isinstance(c, Deadline)]
-            for word, clauses in (("for", holds), ("within", deadlines)):
-                if len(clauses) > 1:
-                    span = clauses[1].span
-                    yield self.fault("E208", f"`{word}` is said twice", span, f"one `{word}`")
-            least = self.grammar.least_time(course)
-            for deadline in deadlines[:1]:
-                if float("inf") > least > deadline.duration.seconds > 0:
-                    what = f"what takes at least {least:g} s cannot be over {deadline}"
-                    yield self.fault("E208", what, deadline.span, "a longer `within`")
-            if holds and self.grammar.follows_on(course.item):
-                what = f"`{holds[0]}` stands behind things that follow one another"
-                hint = "put `for` behind the one that must hold"
-                expected = "one action, or several at the same time"
-                yield self.fault("E216", what, holds[0].span, expected, hint)
-
-    def together(self) -> Iterator[TaskFault]:
-        for _, course in self.courses:
-            if not isinstance(course, Together):
-                continue
-            parts = [self.grammar.sole_action(p) for p in course.parts]
-            for i, a in enumerate(parts):
-                for b in parts[i + 1 :]:
-                    if a and b and self.contradict(a, b):
-                        what = f"`{a}` and `{b}` can never hold at the same time"
-                        yield self.fault("E209", what, course.span, hint="in turn is `a b`")
-
-    def contradict(self, a: Action, b: Action) -> bool:
-        one, other = self.actions.get(a.name), self.actions.get(b.name)
-        if one is None or other is None:
-            return False
-        return {str(x) for x in a.actors} == {str(x) for x in b.actors} and contradict(one, other)
-
-    def invariants(self) -> Iterator[TaskFault]:
-        for invariant in self.parsed.task.invariants:
-            for stage, action in self.grammar.asked:
-                if invariant.during and invariant.during.stage != stage:
-                    continue
-                same = (action.name, {*action.actors}) == (
-                    invariant.action.name,
-                    {*invariant.action.actors},
-                )
-                breaks = same if invariant.when == "never" else False
-                breaks = breaks or (
-                    invariant.when == "always" and self.contradict(invariant.action, action)
-                )
-                if breaks:
-                    what = f"`{invariant}`, but stage `<{stage}>` asks for `{action}`"
-                    hint = "say for which stage it is meant with `during <stage>`"
-                    yield self.fault("E210", what, invariant.span, hint=hint)
-                    break
-
-    def repetitions(self) -> Iterator[TaskFault]:
-        for _, course in self.courses:
-            if not isinstance(course, Repeated) or course.mark == "?":
-                continue
-            if self.grammar.may_be_left_out(course.item):
-                what = f"`{course.mark}` repeats what may be left out, so it has no end"
-                hint = "leave the `?` or `*` inside away"
-                yield self.fault("E215", what, course.span, hint=hint)
 
 
 def _slip(name: str, other: str) -> bool:

@@ -10,8 +10,9 @@ from itertools import pairwise
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from visup.agent.errors import Place
+from visup.tasks.chunk import Chunk
 from visup.tasks.faults import Source, TaskFault, did_you_mean
-from visup.tasks.mistakes import Chunk, name_mistake
+from visup.tasks.mistakes import name_mistake
 from visup.tasks.read import read
 from visup.tasks.tree import Actor, Invariant, Stage, Task
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from visup.tasks.mistakes import WORDS
+from visup.tasks.chunk import WORDS
 from visup.tasks.tree import (
     Action,
     Actor,

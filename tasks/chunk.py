@@ -1,0 +1,45 @@
+"""A statement that does not parse, and a mistake recognised in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+NAME = r"[^\W\d]\w*"
+WORDS = ("actor", "is", "or", "never", "always", "during", "for", "within")
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A statement that does not parse, and where it begins in its file (counted from 1)."""
+
+    text: str
+    line: int
+    column: int
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Line and column in the file of an offset in the statement."""
+        row = self.text.count("\n", 0, offset)
+        start = self.text.rfind("\n", 0, offset) + 1
+        return self.line + row, offset - start + (self.column if row == 0 else 1)
+
+    @property
+    def end(self) -> tuple[int, int]:
+        """Line and column just behind its last character."""
+        return self.position(len(self.text))
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A recognised mistake: offsets in the statement, and what is said of it."""
+
+    code: str
+    start: int
+    length: int
+    what: str
+    expected: str | None = None
+    hint: str | None = None
+
+
+Recogniser = Callable[[str], Mistake | None]
+"""Looks at the text of a statement and finds its mistake, or None."""
