@@ -113,13 +113,17 @@ class Region:
             size: (width, height) of the image, pixels.
 
         Returns:
-            (height, width) bool.
+            (height, width) bool; what lies outside the image (an object is believed to have moved
+            there) is left out.
         """
         import numpy as np
 
         out = np.zeros((size[1], size[0]), dtype=bool)
         x, y, w, h = self.bbox
-        out[y : y + h, x : x + w] = self.mask
+        left, top = max(0, -x), max(0, -y)
+        inside = self.mask[top : max(top, size[1] - y), left : max(left, size[0] - x)]
+        rows, columns = inside.shape
+        out[y + top : y + top + rows, x + left : x + left + columns] = inside
         return out
 
 

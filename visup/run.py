@@ -210,6 +210,11 @@ class _Recorder:
             write_report(self._run_data(result), path)
         except ExtraMissingError as missing:
             return None, (str(missing),)
+        except OutputError:
+            raise
+        except Exception as fault:
+            # The run itself is recorded already; a report that cannot be made must not hide it.
+            return None, (f"the report was not made: {type(fault).__name__}: {fault}",)
         return path, ()
 
     def _run_data(self, result: RunResult) -> RunData:

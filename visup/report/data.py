@@ -238,7 +238,8 @@ class Collector:
         )
 
     def _looks(self, mind: Mind, frame: Frame) -> list[Look]:
-        seen = [b for b in mind.present() if b.presence is Presence.SEEN]
+        # A region that was not seen just now is where its object is believed to be: no picture of it.
+        seen = [b for b in mind.present() if b.last_seen == mind.time]
         largest = sorted(seen, key=lambda b: -b.region.area)[:MOST_LOOKS]
         looks = []
         for b in sorted(largest, key=lambda b: b.id):
