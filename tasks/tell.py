@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from visup.agent import (
     Concern,
@@ -14,6 +15,7 @@ from visup.agent import (
     TaskBelief,
     Verdict,
 )
+from visup.rules.sentences import describe
 from visup.tasks.sentences import stage_sentence, verdict_sentence
 from visup.tasks.verify import BAD
 
@@ -28,7 +30,17 @@ KINDS = {
 
 
 def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind) -> Iterator[Event]:
-    """Events of what changed between two beliefs about a task, stages first, in their order."""
+    """Events of what changed between two beliefs about a task.
+
+    Args:
+        before: The belief of the last step.
+        now: The belief of this step.
+        mind: The mind, for the time; it may still hold the old belief.
+
+    Yields:
+        Events of stages in the order of the task, then a change of the verdict.
+    """
+    mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
     was = {s.stage: s.status for s in before.stages}
     for stage in now.stages:
         for kind in _kinds(was.get(stage.stage, Status.PENDING), stage.status):
@@ -78,12 +90,19 @@ def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) 
         kind,
         mind.time,
         mind.frame_index,
-        stage_sentence(kind, stage.stage, belief.task, stage.evidence),
+        _sentence(kind, stage, belief, mind),
         _objects(belief),
         stage.confidence,
         Severity.WARNING if bad else Severity.INFO,
         {"task": belief.task, "stage": stage.stage, "status": str(stage.status)},
     )
+
+
+def _sentence(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
+    if kind != "stage_started" or not _objects(belief):
+        return stage_sentence(kind, stage.stage, belief.task, stage.evidence)
+    who = ", and ".join(describe(mind, i, n) for n, i in enumerate(_objects(belief)))
+    return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
 
 
 def _verdict_event(belief: TaskBelief, mind: Mind) -> Event:
