@@ -87,7 +87,8 @@ def compare(a: Shape, b: Shape) -> Likeness:
 def join(graphs: Match, of_outlines: float) -> Likeness:
     """The likeness that follows from both terms."""
     similarity = GRAPH_SHARE * graphs.similarity + (1 - GRAPH_SHARE) * of_outlines
-    return Likeness(min(1.0, similarity), graphs.similarity, of_outlines, graphs)
+    # Features are of single precision: further digits mean nothing, and equal shapes give exactly 1.
+    return Likeness(min(1.0, round(similarity, 5)), graphs.similarity, of_outlines, graphs)
 
 
 def outline_similarities(query: Shape, others: Sequence[Shape]) -> NDArray[np.float64]:

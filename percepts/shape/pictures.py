@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.database import ModelDatabase
-from visup.percepts.shape.shock_graph import ShockGraph
+from visup.percepts.shape.shock_graph import ShockGraph, shock_graph
 from visup.percepts.shape.shocks import Kind, label_branch
 from visup.percepts.shape.silhouette import Silhouette
 from visup.percepts.shape.skeleton import skeletonise
@@ -98,7 +98,7 @@ def _row(database: ModelDatabase, name: str) -> NDArray[np.uint8]:
 
 
 def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
-    """A silhouette as text: '.' inside, and each skeleton point's kind of shock by number.
+    """A silhouette as text: ':' inside, and each skeleton point's kind of shock by number.
 
     Args:
         silhouette: In normal form.
@@ -108,11 +108,26 @@ def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
         Lines without trailing blanks.
 
     Example:
-        A disc is one seed (4); an ellipse a seed with two protrusions (1); a strip is a bend (3).
+        A rectangle is a bend (3) with a protrusion (1) to each corner; two overlapping discs are two
+        seeds (4) with a neck (2) between them.
 
         >>> from visup.percepts.shape.silhouette import normalise
         >>> y, x = np.mgrid[-40:41, -60:61]
-        >>> print(ascii_shocks(normalise(np.hypot(x, 2 * y) < 55), 30))
+        >>> print(ascii_shocks(normalise((abs(x) < 50) & (abs(y) < 17)), 30))
+        ::::::::::::::::::::::::::::::
+        :::1::::::::::::::::::::::1:::
+        :::133333333333333333333331:::
+        ::::::::::::::::::::::::::1:::
+        ::::::::::::::::::::::::::::::
+        >>> print(ascii_shocks(normalise(np.hypot(abs(x) - 20, y) < 25), 30))
+            ::::::::      ::::::::
+          ::::::::::::::::::::::::::
+         ::::::::::::::::::::::::::::
+        ::::::::::::::::::::::::::::::
+        ::::::::41111112111114::::::::
+        ::::::::::::::::::::::::::::::
+         ::::::::::::::::::::::::::::
+           ::::::::::    ::::::::::
         <BLANKLINE>
     """
     contour = silhouette.contour
@@ -123,7 +138,7 @@ def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
     spots = np.stack([xs + 0.5, 2 * ys + 1.0], axis=-1).reshape(-1, 2) * cell + low
     outline = contour.astype(np.float32).reshape(-1, 1, 2)
     text = np.array(
-        ["." if cv2.pointPolygonTest(outline, p, False) > 0 else " " for p in spots.tolist()]
+        [":" if cv2.pointPolygonTest(outline, p, False) > 0 else " " for p in spots.tolist()]
     ).reshape(lines, columns)
     for point, kind in _labelled_points(silhouette):
         column = min(columns - 1, int((point[0] - low[0]) / cell))
@@ -132,14 +147,16 @@ def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
 
 
 def _labelled_points(silhouette: Silhouette) -> list[tuple[NDArray[np.float64], Kind]]:
-    """Skeleton points with their kinds; necks and seeds last, so that they are drawn on top."""
+    """Points along the skeleton with their kinds; necks and seeds last, so that they show on top."""
     skeleton = skeletonise(silhouette.contour)
-    if not skeleton.branches:
-        return [(skeleton.points[0], Kind.SEED)]
-    found = []
+    found: list[tuple[NDArray[np.float64], Kind]] = []
     for branch in skeleton.branches:
         points = skeleton.points[branch]
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         for shock in label_branch(skeleton.radii[branch], along):
-            found += [(p, shock.kind) for p in points[shock.start : shock.stop + 1]]
-    return sorted(found, key=lambda f: f[1] in (Kind.NECK, Kind.SEED))
+            at = np.linspace(along[shock.start], along[shock.stop], 200)
+            dense = np.stack([np.interp(at, along, points[:, k]) for k in (0, 1)], axis=1)
+            found += [(p, shock.kind) for p in dense]
+    graph = shock_graph(silhouette)
+    spots = [n for n in range(1, len(graph)) if graph.kinds[n] in (Kind.NECK, Kind.SEED)]
+    return found + [(graph.positions[n].astype(float), Kind(int(graph.kinds[n]))) for n in spots]

@@ -158,11 +158,11 @@ def _link(
         node = points[0]
         is_seed = parts[node].kind is Kind.SEED
         return [(node, r) if is_seed else (r, node) for r in runs]
-    if len(runs) < 2:
-        return []
     if all(parts[r].kind is Kind.PROTRUSION and parts[r].points[0] == point for r in runs):
         parts.append(_Part(Kind.SEED, np.array([point], dtype=np.intp)))
         return [(len(parts) - 1, r) for r in runs]
+    if len(runs) < 2:
+        return []
     thickness = [float(skeleton.radii[parts[r].points].mean()) for r in runs]
     parent = runs[int(np.argmax(thickness))]
     return [(parent, r) for r in runs if r != parent]

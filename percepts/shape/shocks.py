@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 TOLERANCE = 0.18
 """Share of the radius by which it must change to count as changing."""
 
+LEAST_SLOPE = 0.35
+"""Change of the radius per length that counts on a branch too short to change by much."""
+
 LEAST_BEND = 1.5
 """Length of a bend inside a longer branch, in radii, to be told apart from the rest."""
 
@@ -134,8 +137,8 @@ def _split_run(
     radii: NDArray[np.float64], along: NDArray[np.float64], a: int, b: int, tolerance: float
 ) -> list[Shock]:
     """A run on which the radius goes one way: one protrusion, one bend, or parts of both."""
-    greater = max(radii[a], radii[b])
-    if min(radii[a], radii[b]) >= greater * (1 - tolerance):
+    change, length = abs(radii[a] - radii[b]), along[b] - along[a]
+    if change <= tolerance * max(radii[a], radii[b]) and change <= LEAST_SLOPE * length:
         return [Shock(Kind.BEND, a, b)]
     c, d = _longest_level(radii, along, a, b, tolerance)
     if along[d] - along[c] < LEAST_BEND * radii[c : d + 1].mean():

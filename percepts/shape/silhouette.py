@@ -76,7 +76,7 @@ def normalise(
     if cropped is None:
         return None
     part, corner, shrink = cropped
-    solid = _solid_largest(part)
+    solid, inset = _solid_largest(part)
     area = float(np.count_nonzero(solid))
     if area < LEAST_AREA:
         return None
@@ -84,7 +84,8 @@ def normalise(
     outline = _longest_outline(field)
     if outline is None:
         return None
-    return _in_units(outline, zoom, pad, corner, shrink, area, cut)
+    unscaled = (outline + 0.5) / zoom - 0.5 - pad + np.asarray(inset)
+    return _in_units((unscaled + 0.5) / shrink - 0.5 + np.asarray(corner), area / shrink**2, cut)
 
 
 def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], float] | None:
@@ -105,15 +106,16 @@ def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], 
     return part, (x0, y0), shrink
 
 
-def _solid_largest(part: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The largest 8-connected part, holes filled."""
+def _solid_largest(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
+    """The largest 8-connected part, holes filled, and where its corner lies."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(part, connectivity=8)
     if count <= 1:
-        return np.zeros_like(part)
+        return np.zeros_like(part), (0, 0)
     best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    around = np.pad((labels != best).astype(np.uint8), 1, constant_values=1)
+    x, y, w, h = (int(n) for n in stats[best, :4])
+    around = np.pad((labels[y : y + h, x : x + w] != best).astype(np.uint8), 1, constant_values=1)
     _, outside = cv2.connectedComponents(around, connectivity=4)
-    return np.asarray(outside[1:-1, 1:-1] != outside[0, 0], dtype=np.uint8)
+    return np.asarray(outside[1:-1, 1:-1] != outside[0, 0], dtype=np.uint8), (x, y)
 
 
 def _smooth_field(
@@ -144,24 +146,13 @@ def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
     return np.asarray(longest[:-1, ::-1], dtype=np.float64) if len(longest) > 8 else None
 
 
-def _in_units(
-    outline: NDArray[np.float64],
-    zoom: float,
-    pad: int,
-    corner: tuple[int, int],
-    shrink: float,
-    area: float,
-    cut: bool,
-) -> Silhouette:
-    """The outline scaled to unit area around its centroid, and the way back to the image."""
+def _in_units(outline: NDArray[np.float64], area: float, cut: bool) -> Silhouette:
+    """An outline in pixels of the image, scaled to unit area around its centroid."""
     outer, centroid = polygon_moments(outline)
     if outer < 0:
         outline, outer = outline[::-1], -outer
-    unit = outer**0.5
-    contour = resample_closed((outline - centroid) / unit)
-    where = ((centroid + 0.5) / zoom - 0.5 - pad + 0.5) / shrink - 0.5 + np.asarray(corner)
-    real = area / shrink**2
-    return Silhouette(contour, (float(where[0]), float(where[1])), real**0.5, real, cut)
+    contour = resample_closed((outline - centroid) / outer**0.5)
+    return Silhouette(contour, (float(centroid[0]), float(centroid[1])), area**0.5, area, cut)
 
 
 def polygon_moments(polygon: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

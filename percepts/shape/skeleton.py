@@ -27,6 +27,10 @@ JOIN = 0.3
 """Two branching points nearer than this share of their radius are one."""
 
 
+LONGEST_EDGE = 0.05
+"""Distance of neighbouring points of a skeleton at most, units."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Skeleton:
     """A tree of points with radii.
@@ -100,7 +104,8 @@ def _voronoi_tree(
     if not keep.any():
         best = int(np.argmax(np.where(inside, radii, -1.0)))
         return centres[best][None], radii[best][None], np.empty((0, 2), dtype=np.intp)
-    return _largest_tree(centres, radii, np.stack([a[keep], b[keep]], axis=1))
+    edges, touched = _largest_tree(centres, np.stack([a[keep], b[keep]], axis=1), i[keep])
+    return _subdivide(centres, radii, edges, contour[touched])
 
 
 def _circumcircles(
@@ -148,17 +153,56 @@ def _residual(
 
 
 def _largest_tree(
-    points: NDArray[np.float64], radii: NDArray[np.float64], edges: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
-    """The largest connected part, its points renumbered from 0."""
+    points: NDArray[np.float64], edges: NDArray[np.intp], touched: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The edges of the largest connected part, with the outline point that each touches."""
     size = len(points)
     ones = np.ones(len(edges))
     _, part = connected_components(coo_matrix((ones, edges.T), shape=(size, size)), directed=False)
     lengths = np.hypot(*(points[edges[:, 0]] - points[edges[:, 1]]).T)
     biggest = np.argmax(np.bincount(part[edges[:, 0]], weights=lengths + 1e-9))
-    edges = edges[part[edges[:, 0]] == biggest]
-    used, renumbered = np.unique(edges, return_inverse=True)
-    return points[used], radii[used], renumbered.reshape(-1, 2).astype(np.intp)
+    kept = part[edges[:, 0]] == biggest
+    return edges[kept], touched[kept]
+
+
+def _subdivide(
+    points: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    edges: NDArray[np.intp],
+    touching: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+    """The tree with points along its long edges, renumbered from 0.
+
+    Between two dents of the outline an edge may be long, and the radius is least in its middle: a neck
+    would be missed if only its ends were looked at.
+    """
+    used, numbers = np.unique(edges, return_inverse=True)
+    edges = numbers.reshape(-1, 2).astype(np.intp)
+    points, radii = points[used], radii[used]
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    inner = np.ceil(np.hypot(*(b - a).T) / LONGEST_EDGE).astype(np.intp) - 1
+    inner = np.clip(inner, 0, 400)
+    owner = np.repeat(np.arange(len(edges)), inner)
+    first = np.cumsum(inner) - inner
+    step = (np.arange(len(owner)) - first[owner] + 1) / (inner[owner] + 1)
+    added = a[owner] + (b - a)[owner] * step[:, None]
+    reach = np.hypot(*(added - touching[owner]).T)
+    return (
+        np.vstack([points, added]),
+        np.concatenate([radii, reach]),
+        _chains(edges, inner, first + len(points)),
+    )
+
+
+def _chains(
+    edges: NDArray[np.intp], inner: NDArray[np.intp], first: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Edges replaced by chains over their inner points, numbered on from `first`."""
+    piece_of = np.repeat(np.arange(len(edges)), inner + 1)
+    piece = np.arange(len(piece_of)) - (np.cumsum(inner + 1) - inner - 1)[piece_of]
+    start = np.where(piece == 0, edges[piece_of, 0], first[piece_of] + piece - 1)
+    stop = np.where(piece == inner[piece_of], edges[piece_of, 1], first[piece_of] + piece)
+    return np.stack([start, stop], axis=1).astype(np.intp)
 
 
 def _trace(edges: NDArray[np.intp], size: int) -> list[list[int]]:

@@ -192,27 +192,25 @@ def open_checked(path: Path) -> sqlite3.Connection:
             expected="a file made by 'visup models build'",
             hint=_BUILD_HINT,
         )
-    uri = f"{path.resolve().as_uri()}?mode=ro&immutable=1"
+    _check_header(path)
     try:
-        file = sqlite3.connect(uri, uri=True)
+        return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
     except sqlite3.Error as e:
         raise _unreadable(path, e) from e
-    try:
-        _check_header(file, path)
-    except BaseException:
-        file.close()
-        raise
-    return file
 
 
-def _check_header(file: sqlite3.Connection, path: Path) -> None:
+def _check_header(path: Path) -> None:
+    """Look at the first 100 bytes, as SQLite's file format defines them, before SQLite does."""
     try:
-        (application,) = file.execute("PRAGMA application_id").fetchone()
-        (version,) = file.execute("PRAGMA user_version").fetchone()
-        (pages,) = file.execute("PRAGMA page_count").fetchone()
-        (page,) = file.execute("PRAGMA page_size").fetchone()
-    except sqlite3.Error as e:
+        with path.open("rb") as file:
+            header = file.read(100)
+    except OSError as e:
         raise _unreadable(path, e) from e
+    if len(header) < 100 or not header.startswith(b"SQLite format 3\0"):
+        raise _unreadable(path, "no SQLite header")
+    page, pages, version, application = (
+        int.from_bytes(header[a:b], "big") for a, b in ((16, 18), (28, 32), (60, 64), (68, 72))
+    )
     if application != APPLICATION_ID:
         raise DatabaseError(
             f"this is not a model database (application id {application:#x})",
@@ -221,23 +219,24 @@ def _check_header(file: sqlite3.Connection, path: Path) -> None:
             hint=_BUILD_HINT,
         )
     if version != VERSION:
-        newer = version > VERSION
         raise DatabaseError(
             f"this model database is of version {version}",
             where=str(path),
             expected=f"version {VERSION}",
-            hint="use a newer visup for it" if newer else _BUILD_HINT,
+            hint="use a newer visup for it" if version > VERSION else _BUILD_HINT,
         )
-    if path.stat().st_size < pages * page:
+    # A page size of 65536 does not fit its field and is written as 1.
+    expected, found = pages * (65536 if page == 1 else page), path.stat().st_size
+    if found < expected:
         raise DatabaseError(
-            f"this model database is truncated: {path.stat().st_size} bytes",
+            f"this model database is truncated: {found} bytes",
             where=str(path),
-            expected=f"{pages * page} bytes",
+            expected=f"{expected} bytes",
             hint=_BUILD_HINT,
         )
 
 
-def _unreadable(path: Path, error: Exception) -> DatabaseError:
+def _unreadable(path: Path, error: object) -> DatabaseError:
     return DatabaseError(
         f"this is not a model database that can be read ({error})",
         where=str(path),

@@ -1,0 +1,259 @@
+"""The model database: round trips, refusals, and what a query answers."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing, suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.shape.shapes import ZOO, flower, limbs, shape, small_database
+from visup.agent.errors import DatabaseError, SettingsError
+from visup.percepts.shape.build import (
+    build_database,
+    mesh_views,
+    read_silhouettes,
+    silhouette_views,
+)
+from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.storage import APPLICATION_ID, VERSION
+
+trimesh = pytest.importorskip("trimesh", reason="views of meshes need the extra 'render'")
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return small_database(tmp_path_factory.mktemp("db") / "zoo.db").path
+
+
+def box(path: Path, size: tuple[float, float, float] = (1.0, 2.0, 3.0)) -> Path:
+    trimesh.creation.box(extents=size).export(path)
+    return path
+
+
+def test_what_is_written_is_read_back(stored: Path) -> None:
+    database = ModelDatabase.open(stored)
+    assert database.names() == tuple(ZOO)
+    for view, loaded, mask in zip(database.views, database.shapes, ZOO.values(), strict=True):
+        fresh = shape(mask)
+        assert (view.number, view.direction, view.area, view.cut) == (
+            0,
+            (0.0, 0.0, 1.0),
+            1.0,
+            False,
+        )
+        assert loaded.graph.key == fresh.graph.key
+        np.testing.assert_array_equal(loaded.graph.below, fresh.graph.below)
+        np.testing.assert_allclose(loaded.contour, fresh.contour, atol=1e-6)
+
+
+def test_equal_content_gives_equal_bytes(stored: Path, tmp_path: Path) -> None:
+    assert small_database(tmp_path / "again.db").path.read_bytes() == stored.read_bytes()
+
+
+@pytest.mark.parametrize("name", sorted(ZOO))
+def test_a_turned_shape_is_recognised(stored: Path, name: str) -> None:
+    mask = np.rot90(ZOO[name])
+    best = ModelDatabase.open(stored).query(mask, top=2).matches
+    assert best[0].view.name == name
+    assert best[0].similarity > 0.9 > best[1].similarity
+
+
+def test_matches_are_ranked_bounded_and_above_the_threshold(stored: Path) -> None:
+    database = ModelDatabase.open(stored)
+    every = database.query(ZOO["star"], top=10).matches
+    assert [m.similarity for m in every] == sorted((m.similarity for m in every), reverse=True)
+    assert len(database.query(ZOO["star"], top=2).matches) == 2
+    some = database.query(ZOO["star"], threshold=0.9).matches
+    assert [m.view.name for m in some] == ["star"]
+
+
+def test_a_query_answers_the_same_as_trying_everything(stored: Path) -> None:
+    from visup.percepts.shape.compare import compare
+
+    database = ModelDatabase.open(stored)
+    query = shape(limbs((0.5, 2.5, 4.1)))
+    expected = sorted((compare(query, s).similarity for s in database.shapes), reverse=True)
+    found = [m.similarity for m in database.query(query, top=3).matches]
+    assert found == pytest.approx(expected[:3], abs=2e-5)
+
+
+def test_a_query_may_be_restricted_to_names(stored: Path) -> None:
+    found = ModelDatabase.open(stored).query(ZOO["star"], restrict={"pear", "stick"}).matches
+    assert {m.view.name for m in found} == {"pear", "stick"}
+
+
+def test_nothing_looks_like_an_empty_mask(stored: Path) -> None:
+    assert ModelDatabase.open(stored).query(np.zeros((20, 20), bool)).matches == ()
+
+
+def test_an_empty_database_answers_nothing(tmp_path: Path) -> None:
+    assert ModelDatabase.create(tmp_path / "empty.db").query(ZOO["star"]).matches == ()
+
+
+def test_a_cut_shape_is_found_among_cut_views(stored: Path, tmp_path: Path) -> None:
+    path = tmp_path / "cut.db"
+    shutil.copyfile(stored, path)
+    half = ZOO["walker"][: ZOO["walker"].shape[0] // 2]
+    database = ModelDatabase.open(path).add(silhouette_views("half walker", [half], 1))
+    assert database.views[-1].cut
+    best = database.query(half[:, 20:], cut=True).matches[0]
+    assert (best.view.name, best.similarity > 0.9) == ("half walker", True)
+
+
+def test_silhouettes_of_a_known_name_become_further_views(stored: Path, tmp_path: Path) -> None:
+    path = tmp_path / "more.db"
+    shutil.copyfile(stored, path)
+    masks = [flower(((4, d),)) for d in (0.1, 0.12, 0.3, 0.32)]
+    database = ModelDatabase.open(path).add(silhouette_views("star", masks, 2))
+    own = [v for v in database.views if v.name == "star"]
+    assert [v.number for v in own] == [0, 1, 2]
+    assert [v.area for v in own] == [1.0, None, None]
+
+
+def test_views_of_a_box_have_its_size(tmp_path: Path) -> None:
+    for view in mesh_views(box(tmp_path / "box.ply"), 12):
+        assert view.direction is not None
+        # The area of a box's parallel projection is the sum of its faces' projections.
+        expected = np.abs(view.direction) @ np.array([2 * 3, 1 * 3, 1 * 2])
+        assert view.area == pytest.approx(expected, rel=0.01)
+
+
+def test_a_database_is_built_alike_by_one_process_or_two(tmp_path: Path) -> None:
+    meshes = [box(tmp_path / "a.ply"), box(tmp_path / "b.ply", (1, 1, 4))]
+    told: list[tuple[int, int, str]] = []
+    one = build_database(tmp_path / "1.db", meshes, views=3, progress=lambda *t: told.append(t))
+    two = build_database(tmp_path / "2.db", meshes, views=3, jobs=2)
+    assert one.path.read_bytes() == two.path.read_bytes()
+    assert told == [(1, 2, "a"), (2, 2, "b")]
+    assert [(v.name, v.number) for v in two.views] == [(n, k) for n in "ab" for k in range(3)]
+
+
+def set_pragma(name: str, value: int) -> Callable[[Path], None]:
+    def damage(path: Path) -> None:
+        with closing(sqlite3.connect(path)) as file:
+            file.execute(f"PRAGMA {name} = {value}")
+            file.commit()
+
+    return damage
+
+
+def run_sql(sql: str) -> Callable[[Path], None]:
+    def damage(path: Path) -> None:
+        with closing(sqlite3.connect(path)) as file:
+            file.execute(sql)
+            file.commit()
+
+    return damage
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
+    "missing": (lambda p: p.unlink(), "no such model database"),
+    "a text": (lambda p: p.write_text("this is no database at all\n" * 100), "can be read"),
+    "empty": (lambda p: p.write_bytes(b""), "can be read"),
+    "foreign": (set_pragma("application_id", 7), "not a model database"),
+    "newer": (set_pragma("user_version", VERSION + 1), f"of version {VERSION + 1}"),
+    "older": (set_pragma("user_version", 0), "of version 0"),
+    "truncated": (truncate, "truncated"),
+    "no arrays": (run_sql("DELETE FROM arrays"), "without contour"),
+    "no table": (run_sql("DROP TABLE arrays"), "can be read"),
+    "huge": (run_sql("UPDATE arrays SET rows = 1000000000"), "with 1000000000"),
+    "negative": (run_sql("UPDATE arrays SET rows = -1"), "with -1"),
+    "other type": (run_sql("UPDATE arrays SET dtype = 'O'"), "of O"),
+    "other field": (run_sql("UPDATE OR REPLACE arrays SET field = 'x'"), "'x'"),
+    "short data": (run_sql("UPDATE arrays SET data = x'00'"), "another length"),
+    "text data": (run_sql("UPDATE arrays SET data = 'text'"), "another length"),
+    "cycle": (
+        run_sql("UPDATE arrays SET data = zeroblob(length(data)) WHERE field = 'edges'"),
+        "a graph that is none",
+    ),
+    "bad direction": (run_sql("UPDATE views SET dx = 9e9"), "damaged: view 1"),
+    "bad area": (run_sql("UPDATE views SET area = -1.0"), "damaged: view 1"),
+}
+
+
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_a_file_that_is_not_as_it_should_be_is_refused(
+    stored: Path, tmp_path: Path, case: str
+) -> None:
+    damage, message = REFUSED[case]
+    path = tmp_path / "bad.db"
+    shutil.copyfile(stored, path)
+    damage(path)
+    with pytest.raises(DatabaseError) as refused:
+        _ = ModelDatabase.open(path).shapes
+    assert message in refused.value.what
+    assert str(path) in str(refused.value)
+    assert refused.value.hint
+
+
+def test_random_damage_is_refused_or_harmless(stored: Path, tmp_path: Path) -> None:
+    sound = stored.read_bytes()
+    rng = np.random.default_rng(5)
+    path = tmp_path / "damaged.db"
+    for _ in range(60):
+        content = bytearray(sound)
+        for at in rng.integers(0, len(content), 20):
+            content[at] = rng.integers(0, 256)
+        path.write_bytes(content)
+        with suppress(DatabaseError):
+            ModelDatabase.open(path).query(ZOO["star"])
+
+
+def test_a_failed_write_leaves_the_old_file(stored: Path, tmp_path: Path) -> None:
+    path = tmp_path / "kept.db"
+    shutil.copyfile(stored, path)
+
+    def breaks() -> object:
+        raise DatabaseError("no more views")
+        yield
+
+    with pytest.raises(DatabaseError, match="no more views"):
+        ModelDatabase.create(path, breaks())  # type: ignore[arg-type]
+    assert path.read_bytes() == stored.read_bytes()
+    assert [p.name for p in tmp_path.iterdir()] == ["kept.db"]
+
+
+def test_a_database_cannot_be_written_where_no_folder_is(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="cannot be written"):
+        ModelDatabase.create(tmp_path / "nowhere" / "a.db")
+
+
+def test_two_meshes_of_one_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="named 'a'"):
+        build_database(tmp_path / "x.db", [tmp_path / "a.ply", tmp_path / "b" / "a.ply"])
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a mesh"], ids=["missing", "empty", "text"])
+def test_a_bad_mesh_is_refused(tmp_path: Path, content: bytes | None) -> None:
+    mesh = tmp_path / "bad.ply"
+    if content is not None:
+        mesh.write_bytes(content)
+    with pytest.raises(DatabaseError):
+        build_database(tmp_path / "x.db", [mesh])
+    assert not (tmp_path / "x.db").exists()
+
+
+def test_folders_without_pictures_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="no silhouette pictures"):
+        read_silhouettes(tmp_path)
+    (tmp_path / "a.png").write_text("no picture")
+    with pytest.raises(DatabaseError, match="not a picture"):
+        read_silhouettes(tmp_path)
+    with pytest.raises(DatabaseError, match="shows anything"):
+        silhouette_views("x", [np.zeros((9, 9), bool)])
+
+
+def test_the_file_says_what_it_is(stored: Path) -> None:
+    header = stored.read_bytes()[:100]
+    assert header.startswith(b"SQLite format 3")
+    assert int.from_bytes(header[68:72], "big") == APPLICATION_ID
+    assert int.from_bytes(header[60:64], "big") == VERSION

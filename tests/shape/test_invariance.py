@@ -1,0 +1,123 @@
+"""What must not matter does not: where, how large, and how turned a silhouette is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape
+from visup.percepts.shape.compare import compare
+from visup.percepts.shape.match import match
+from visup.percepts.shape.silhouette import normalise
+
+FEW = settings(max_examples=12, deadline=None)
+Lobes = tuple[tuple[int, float], ...]
+
+
+@FEW
+@given(FLOWERS, st.integers(0, 80), st.integers(0, 80))
+def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
+    mask = flower(lobes, size=40)
+    moved = np.pad(mask, ((dy, 3), (dx, 5)))
+    here, there = normalise(mask), normalise(moved)
+    assert here is not None
+    assert there is not None
+    np.testing.assert_allclose(here.contour, there.contour, atol=1e-9)
+    assert there.origin == pytest.approx((here.origin[0] + dx, here.origin[1] + dy), abs=1e-6)
+
+
+@FEW
+@given(LIMBS, st.floats(0, 2 * np.pi))
+def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float) -> None:
+    likeness = compare(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
+    assert likeness.similarity > 0.85
+
+
+@FEW
+@given(FLOWERS, st.floats(30, 200))
+def test_scale_hardly_changes_a_shape(lobes: Lobes, size: float) -> None:
+    likeness = compare(shape(flower(lobes, size=60)), shape(flower(lobes, size=size)))
+    assert likeness.similarity > 0.8
+
+
+@FEW
+@given(FLOWERS)
+def test_a_shape_looks_like_its_mirror_image(lobes: Lobes) -> None:
+    mask = flower(lobes)
+    assert compare(shape(mask), shape(mask[:, ::-1])).similarity > 0.85
+
+
+@FEW
+@given(FLOWERS, LIMBS)
+def test_similarity_is_symmetric_and_a_share(lobes: Lobes, angles: tuple[float, ...]) -> None:
+    a, b = shape(flower(lobes)), shape(limbs(angles))
+    assert compare(a, b).similarity == compare(b, a).similarity
+    assert 0.0 <= compare(a, b).similarity <= 1.0
+    assert match(a.graph, b.graph).similarity == match(b.graph, a.graph).similarity
+
+
+@pytest.mark.parametrize("name", sorted(ZOO))
+def test_a_shape_is_like_itself_fully_and_like_others_less(name: str) -> None:
+    own = shape(ZOO[name])
+    assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
+    for other in sorted(set(ZOO) - {name}):
+        assert compare(own, shape(ZOO[other])).similarity < 0.75
+
+
+def test_growing_damage_lowers_the_similarity() -> None:
+    whole = limbs((0.3, 1.2, 2.0, 4.0))
+    own = shape(whole)
+    similarities = []
+    for share in (0.0, 0.15, 0.3, 0.45):
+        damaged = whole.copy()
+        rows = np.flatnonzero(whole.any(axis=1))
+        damaged[rows[0] : rows[0] + int(share * len(rows))] = False
+        similarities.append(compare(own, shape(damaged)).similarity)
+    assert similarities == sorted(similarities, reverse=True)
+    assert similarities[-1] < similarities[0] - 0.1
+
+
+def test_holes_and_islands_do_not_matter() -> None:
+    mask = ZOO["clover"].copy()
+    clean = shape(mask)
+    mask[130:136, 130:136] = False
+    mask[2:6, 2:6] = True
+    assert compare(clean, shape(mask)).similarity == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [
+        np.zeros((40, 40), bool),
+        np.zeros((0, 0), bool),
+        np.eye(3, dtype=bool),
+        np.pad(np.ones((1, 1), bool), 20),
+    ],
+    ids=["empty", "no pixels", "three pixels", "one pixel"],
+)
+def test_a_mask_that_shows_nothing_has_no_shape(mask: np.ndarray) -> None:
+    assert normalise(mask) is None
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [
+        np.ones((50, 50), bool),
+        np.ones((1, 400), bool),
+        np.ones((400, 2), bool),
+        np.indices((64, 64)).sum(axis=0) % 2 == 0,
+        np.random.default_rng(0).random((80, 80)) < 0.5,
+        np.random.default_rng(1).random((80, 80)) < 0.7,
+        np.eye(200, dtype=bool),
+    ],
+    ids=["full", "row", "column", "checkerboard", "noise", "dense noise", "diagonal"],
+)
+def test_odd_masks_have_a_shape_or_none_and_never_fail(mask: np.ndarray) -> None:
+    silhouette = normalise(mask)
+    if silhouette is not None:
+        own = shape(mask)
+        assert np.isfinite(own.contour).all()
+        assert own.graph.weights.sum() == pytest.approx(1.0, abs=1e-4)
+        assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
