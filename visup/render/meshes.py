@@ -74,11 +74,11 @@ def payload_bay() -> Solid:
 
 
 def sill() -> Solid:
-    """One sill of the payload bay: a long tube along x with latches; metres, origin at its near end."""
+    """A length of one sill of the payload bay: a tube along x with latches; origin at its near end."""
     return join(
-        cone((0, 0, 0), (12, 0, 0), 0.10, None, WHITE),
-        box((12, 0.06, 0.7), (6, 0, -0.4), FOIL),
-        *(box((0.2, 0.22, 0.2), (x, 0, 0.1), STEEL) for x in (2.0, 5.0, 8.0, 11.0)),
+        cone((0, 0, 0), (6.5, 0, 0), 0.10, None, WHITE),
+        box((6.5, 0.06, 0.6), (3.25, 0, -0.35), FOIL),
+        *(box((0.2, 0.22, 0.2), (x, 0, 0.1), STEEL) for x in (0.6, 2.6, 4.6, 6.3)),
     )
 
 
