@@ -8,6 +8,7 @@ pitch, wrist pitch, wrist yaw, wrist roll. Pitch lifts for positive angles.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from math import acos, atan2, cos, pi, sin
 
 import numpy as np
@@ -143,6 +144,7 @@ def _wrap(angle: float) -> float:
     return (angle + pi) % (2 * pi) - pi
 
 
+@cache
 def _links() -> tuple[Solid, ...]:
     """The six links, each with its joint at the origin and x along it."""
     r = THICKNESS / 2

@@ -38,6 +38,6 @@ def find_scenario(word: str) -> Scenario:
         ManyErrors: The file has several faults.
     """
     path = Path(word)
-    if path.exists() or path.suffix == ".toml":
+    if path.is_file() or path.suffix == ".toml":
         return load_scenario(path)
     return shipped_scenario(word)
