@@ -122,6 +122,10 @@ class ModelDatabase:
         return read_shapes(self.path, self.views)
 
     @cached_property
+    def _places(self) -> dict[int, int]:
+        return {view.id: k for k, view in enumerate(self.views)}
+
+    @cached_property
     def _index(self) -> ViewIndex:
         return ViewIndex([s.graph for s in self.shapes])
 
@@ -249,7 +253,7 @@ class ModelDatabase:
         return Ranking(tuple(wanted.best(found)), len(compared))
 
     def _with_rotation(self, query: Shape, found: ViewMatch) -> ViewMatch:
-        own = self.shapes[self.views.index(found.view)].graph
+        own = self.shapes[self._places[found.view.id]].graph
         return replace(found, rotation=in_plane_rotation(own, query.graph, found.likeness.match))
 
 
