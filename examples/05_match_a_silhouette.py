@@ -15,5 +15,5 @@ if __name__ == "__main__":
     path = demo_settings().models
     if path is None:
         raise SystemExit("the demo has no model database")
-    for match in ModelDatabase.open(path).query(silhouette > 0)[:5]:
-        print(f"{match.similarity:.3f}  {match.name}, view {match.view}")
+    for match in ModelDatabase.open(path).query(silhouette > 0, top=5).matches:
+        print(f"{match.similarity:.3f}  {match.view.name}, view {match.view.number}")
