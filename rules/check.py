@@ -66,13 +66,19 @@ class _Checker:
             yield self.fault(rule.span, what, "distinct names", None)
         yield from self.sentence(rule)
         used: set[str] = set()
+        found = [
+            fault
+            for formula in (rule.when, rule.unless)
+            for atom in atoms(formula)
+            for fault in self.atom(atom, rule, used)
+        ]
+        yield from found
         for formula in (rule.when, rule.unless):
-            for atom in atoms(formula):
-                yield from self.atom(atom, rule, used)
             yield from self.durations(formula)
         if rule.hold is not None:
             yield from self.time(rule.hold, "hold")
-        for name in sorted(set(rule.variables) - used):
+        # A variable that is missing from a faulty call is no second fault.
+        for name in sorted(set(rule.variables) - used) if not found else ():
             what = f"the variable '{name}' of '{rule.name}' is not used"
             hint = "leave it out, or the rule is true for every object"
             yield self.fault(rule.span, what, None, hint)

@@ -87,7 +87,9 @@ def nanmedian(values: Floats) -> Floats:
     return np.where(count > 0, 0.5 * (low + high), np.nan)
 
 
-def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
+def velocity(
+    times: Floats, support: Floats, free: NDArray[np.bool_], misfit: float = np.inf
+) -> Floats:
     """Velocity of bodies from how their outlines' reach changes.
 
     A body that moves by v changes its reach in direction n by v . n; a line is fitted over time in
@@ -99,9 +101,12 @@ def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
         times: (T,) seconds.
         support: (T, M, 16) pixels, NaN where a body is not seen.
         free: (T, M, 16) bool, clear of the border.
+        misfit: Mean deviation of the directions from a common motion, pixels per second, up to
+            which the outline is believed to move as one; a third of the speed is allowed anyway.
 
     Returns:
-        (M, 2) pixels per second; NaN where fewer than four samples or three directions serve.
+        (M, 2) pixels per second; NaN where fewer than four samples or three directions serve, or
+        where the outline does not move as one, as when one body passes before another.
     """
     good = np.isfinite(support) & free
     count = good.sum(axis=0)
@@ -120,4 +125,7 @@ def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
         found = np.linalg.solve(a, b[..., None])[..., 0]
         off = np.abs(slopes - found @ DIRECTIONS.T)
         weight = usable / np.maximum(off, 0.3)
-    return np.where(enough[:, None], found, np.nan)
+    off = (np.abs(slopes - found @ DIRECTIONS.T) * usable).sum(axis=1)
+    off /= np.maximum(usable.sum(axis=1), 1)
+    as_one = off <= np.maximum(misfit, np.linalg.norm(found, axis=1) / 3.0)
+    return np.where((enough & as_one)[:, None], found, np.nan)

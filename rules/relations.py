@@ -40,6 +40,9 @@ class RelationSettings:
         window_s: Length of the window over which lines are fitted.
         samples: Most samples kept in the window.
         bins: Most means of neighbouring samples to which lines are fitted.
+        quick_window_s: Length of a shorter window in which a trend must be strong to count; by it
+            a turn is seen sooner.
+        quick_sigmas: How many standard deviations of its slope that is, and twice `rate_enter`.
         motion_window_s: Length of the window over which velocities are fitted.
         rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
         rate_exit: Trend below which they end, image diagonals per second.
@@ -53,6 +56,7 @@ class RelationSettings:
         still_speed: Relative speed over the window below which two bodies are at rest to each
             other, image diagonals per second.
         still_half: The same in each half of the window, where the noise is greater.
+        misfit: How unevenly an outline may move and still have a velocity, image diagonals/s.
         apart_depth: Share of depth by which touching outlines belong to bodies apart in depth.
         image_only_confidence: Most that a relation judged without depth is believed.
     """
@@ -60,6 +64,8 @@ class RelationSettings:
     window_s: float = 1.5
     samples: int = 64
     bins: int = 16
+    quick_window_s: float = 0.7
+    quick_sigmas: float = 4.0
     motion_window_s: float = 1.25
     rate_enter: float = 0.002
     rate_exit: float = 0.001
@@ -72,6 +78,7 @@ class RelationSettings:
     touch_minimum_s: float = 0.2
     still_speed: float = 0.0025
     still_half: float = 0.0045
+    misfit: float = 0.0075
     apart_depth: float = 0.25
     image_only_confidence: float = 0.8
 
@@ -227,15 +234,13 @@ class Relations:
         m = len(objects)
         slope, sigma = np.full((m, m), np.nan), np.full((m, m), np.nan)
         i, j = np.triu_indices(m, 1)
-        if self._covered(h, mind.time) and len(i):
-            slope[i, j], sigma[i, j] = theil_sen(
-                *binned(h.times, h.separation[:, i, j], self.settings.bins)
-            )
+        if self._covered(h) and len(i):
+            slope[i, j], sigma[i, j] = self._trend(h.times, h.separation[:, i, j], mind)
             slope[j, i], sigma[j, i] = slope[i, j], sigma[i, j]
         stale = np.array([mind.time - b.last_seen > 0.5 * self.settings.window_s for b in objects])
         if m:
             slope[stale, :] = slope[:, stale] = np.nan
-        whole, early, late = self._velocities(h, mind.time)
+        whole, early, late = self._velocities(h, mind)
         apart = np.linalg.norm(whole[:, None] - whole[None], axis=2)
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
         return Measured(
@@ -250,21 +255,34 @@ class Relations:
             depth,
         )
 
-    def _covered(self, h: History, now: float) -> bool:
+    def _trend(self, times: Floats, distance: Floats, mind: Mind) -> tuple[Floats, Floats]:
+        """Slope over the window, or over its last part where that is strong and of another sign."""
+        s = self.settings
+        slope, sigma = theil_sen(*binned(times, distance, s.bins))
+        recent = times > times[-1] - s.quick_window_s
+        quick, spread = theil_sen(*binned(times[recent], distance[recent], s.bins))
+        least = 2.0 * s.rate_enter * scale(mind.frame_size)
+        with np.errstate(invalid="ignore"):
+            turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
+            turned &= np.sign(quick) != np.sign(slope)
+        return np.where(turned, quick, slope), np.where(turned, spread, sigma)
+
+    def _covered(self, h: History) -> bool:
         return len(h.times) >= 6 and h.times[-1] - h.times[0] >= 0.6 * self.settings.window_s
 
-    def _velocities(self, h: History, now: float) -> tuple[Floats, Floats, Floats]:
-        m = len(h.ids)
+    def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
+        """Over the window of motion, and over its two halves."""
+        m, misfit = len(h.ids), self.settings.misfit * scale(mind.frame_size)
         unknown = np.full((m, 2), np.nan)
-        if m == 0 or not self._covered(h, now):
+        if m == 0 or not self._covered(h):
             return unknown, unknown, unknown
-        recent = h.times > now - self.settings.motion_window_s
+        recent = h.times > mind.time - self.settings.motion_window_s
         times, support, free = h.times[recent], h.support[recent], h.free[recent]
-        cut = len(times) // 2
+        half = len(times) // 2
         return (
-            velocity(times, support, free),
-            velocity(times[:cut], support[:cut], free[:cut]),
-            velocity(times[cut:], support[cut:], free[cut:]),
+            velocity(times, support, free, misfit),
+            velocity(times[:half], support[:half], free[:half], misfit),
+            velocity(times[half:], support[half:], free[half:], misfit),
         )
 
     def _gaps(
@@ -313,7 +331,7 @@ class Relations:
             s.sigmas,
         )
         boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
-        trends = with_depth(image, self._depth_trend(h, mind.time))
+        trends = with_depth(image, self._depth_trend(h))
         touch = self._wanted_touch(now, touching, diagonal)
         for i, j in index_pairs(h.ids, (c.objects for c in mind.couplings)):
             # One body that turns changes its outline; it comes apart when its parts no longer touch.
@@ -329,7 +347,7 @@ class Relations:
             ("rcc8", rcc8(boxes, 0.002 * diagonal), s.touch_minimum_s),
         )
 
-    def _depth_trend(self, h: History, now: float) -> Codes:
+    def _depth_trend(self, h: History) -> Codes:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
         m = len(h.ids)
         codes = np.full((m, m), UNKNOWN, dtype=np.int8)
@@ -337,7 +355,7 @@ class Relations:
         known = np.isfinite(h.depth).mean(axis=0) >= 0.6 if len(h.times) else np.zeros(m, bool)
         both = known[i] & known[j]
         i, j = i[both], j[both]
-        if len(i) == 0 or not self._covered(h, now):
+        if len(i) == 0 or not self._covered(h):
             return codes
         apart = np.abs(h.depth[:, i] - h.depth[:, j])
         slope, sigma = theil_sen(*binned(h.times, apart, self.settings.bins))

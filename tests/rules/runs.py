@@ -6,7 +6,18 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from visup.agent import Concern, Event, Mind, Observation, Thinker
+from visup.agent import (
+    Binding,
+    Concern,
+    Event,
+    Expectation,
+    Mind,
+    Observation,
+    Outcome,
+    TaskBelief,
+    Thinker,
+    Verdict,
+)
 
 
 @dataclass(frozen=True)
@@ -35,3 +46,26 @@ def think(
             mind, events = outcome.mind, events + outcome.events
             concerns += outcome.concerns
         yield Thought(mind, events, concerns)
+
+
+def dock(mind: Mind, observation: Observation) -> Outcome:
+    """A stand-in for task supervision: the arm shall come to the satellite, nobody else may."""
+    playing = {
+        actor: next((b for b in mind.present() if b.name in models), None)
+        for actor, models in mind.actors.items()
+    }
+    bindings = tuple(
+        Binding(actor, mind.actors[actor], b.id if b else None, b.strength if b else 0.0)
+        for actor, b in playing.items()
+    )
+    explained = {b.object_id for b in bindings}
+    known = all(b.object_id is not None for b in bindings)
+    pair = tuple(b.object_id for b in bindings if b.object_id is not None)
+    task = TaskBelief(
+        "dock",
+        Verdict.IN_PROGRESS,
+        bindings=bindings,
+        expected=(Expectation("coupled", pair),) if known else (),
+        unexplained=tuple(b.id for b in mind.present() if b.id not in explained) if known else (),
+    )
+    return Outcome(replace(mind, tasks=(task,)))
