@@ -36,8 +36,11 @@ CONTRARY, IDLE, UNOBSERVED, WAITING = 1.0, 0.2, 0.05, 0.02  # cost per second of
 STAYED = 0.5  # cost of staying, once, when what comes next was seen to begin
 GUESSED = 0.4  # cost of going on when what comes next is seen to come nearer, not yet to begin
 SKIPPED = 1.5  # cost of leaving a step that was not seen through
+MISSED = 3.0  # cost of leaving a step that was seen not to happen
 SHARPNESS = 5.0  # how fast a reading loses credit with its cost
 WORST = 6.0  # a reading that costs so much more than the best is given up
+
+WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
 
 See = Callable[[Step], Sighting]
 
@@ -161,10 +164,12 @@ class Follower:
         """What a move costs, or None when nothing speaks for it."""
         if all(self._over(x) for x in way.left):
             return 0.0
-        skipped = SKIPPED * sum(not x.watch.fulfilled for x in way.left)
+        if all(self._goes_on(x.step, way.left) for x in way.entered):
+            return None
+        skipped = sum(self._skipped(x) for x in way.left)
         if self._seen(reading, way, see, now):
             return skipped
-        nearer = all(self._enters(x.step, way.left, see(x.step).helps, now) for x in way.entered)
+        nearer = all(self._enters(see(x.step).helps, now) for x in way.entered)
         return skipped + GUESSED if nearer else None
 
     def _seen(self, reading: Reading, way: Move[Watch], see: See, now: float) -> bool:
@@ -179,18 +184,26 @@ class Follower:
         """When the entry to each move was last seen, with what is seen now."""
         met = dict(reading.met)
         for way in ways:
-            signs = ((x.step, see(x.step).entry) for x in way.entered)
-            if way.entered and all(self._enters(s, way.left, sign, now) for s, sign in signs):
+            signs = (see(x.step).entry for x in way.entered)
+            if way.entered and all(self._enters(sign, now) for sign in signs):
                 met[_steps(way)] = now
         return tuple(met.items())
 
-    def _enters(
-        self, step: Step, left: tuple[Leaf[Watch], ...], sign: Relation | None, now: float
-    ) -> bool:
-        """Whether a sign of a step lasts; one like that before it begins only when that ceased."""
-        if any(step.same_as(x.step) and not x.watch.ceased for x in left):
-            return False
+    def _enters(self, sign: Relation | None, now: float) -> bool:
+        """Whether a sign of a step has lasted long enough."""
         return sign is not None and now - sign.since >= self.settings.enter_s - 1e-9
+
+    def _goes_on(self, step: Step, left: tuple[Leaf[Watch], ...]) -> bool:
+        """Whether a step asks for what is going on already: it can only begin once that ceased."""
+        return any(step.same_as(x.step) and not x.watch.ceased for x in left)
+
+    def _skipped(self, leaf: Leaf[Watch]) -> float:
+        """What leaving a step costs."""
+        if leaf.watch.fulfilled:
+            return 0.0
+        lasts = self.actions[leaf.step.action].lasts
+        missed = not lasts and not leaf.watch.held and leaf.watch.broken_since is not None
+        return MISSED if missed else SKIPPED
 
     def _moved(
         self,
@@ -205,14 +218,23 @@ class Follower:
             self._look(x, see(x.step), now, 0.0, False) if x in way.entered else x
             for x in leaves(state)
         ]
-        past = reading.past
         under_way = {x.step.stage for x in fresh}
-        for leaf in way.left:
-            status, why = outcome(leaf.step, self.actions[leaf.step.action], leaf.watch, now)
-            if leaf.step.stage not in under_way or status is Status.FAILED:
-                belief = StageBelief(leaf.step.stage, status, now, leaf.watch.confidence, why)
-                past = (*(p for p in past if p.stage != belief.stage), belief)
-        return Reading(with_leaves(state, iter(fresh)), reading.cost + price, past)
+        told = {p.stage: p for p in reading.past}
+        endings = sorted((self._ending(x, now) for x in way.left), key=lambda e: WORSE[e.status])
+        for ending in endings:
+            failed = ending.status is Status.FAILED
+            before = told.get(ending.stage)
+            if before is not None and before.status is Status.FAILED:
+                continue  # there is no way back from that
+            if ending.stage not in under_way or failed:
+                told[ending.stage] = ending
+        cost = reading.cost + price
+        return Reading(with_leaves(state, iter(fresh)), cost, tuple(told.values()))
+
+    def _ending(self, leaf: Leaf[Watch], now: float) -> StageBelief:
+        """How the stage of a step ends when it ends with this step."""
+        status, why = outcome(leaf.step, self.actions[leaf.step.action], leaf.watch, now)
+        return StageBelief(leaf.step.stage, status, now, leaf.watch.confidence, why)
 
     def _best(self, readings: Iterator[Reading]) -> tuple[Reading, ...]:
         """The cheapest reading of each form, cheapest first, the best at cost 0."""

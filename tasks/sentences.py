@@ -57,8 +57,8 @@ def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Sta
     """How a step that has been left ended, and why.
 
     Returns:
-        DONE, FAILED when it was left before its `for` was kept or after its time was over, or
-        UNKNOWN when it was never seen.
+        DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
+        it was seen not to hold; UNKNOWN when it could not be seen, or may have been before.
     """
     who, was = names(step.actors), "was" if len(step.actors) == 1 else "were"
     if watch.late:
@@ -66,9 +66,13 @@ def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Sta
         return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
     if step.hold_s is not None and not watch.fulfilled:
         return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
-    if watch.begun is None:
+    if meaning.lasts and watch.begun is None:
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
-    return Status.DONE, f"{who} {was} {meaning.text} until {now:.1f} s"
+    if meaning.lasts or watch.held:
+        return Status.DONE, f"{who} {was} {meaning.text} until {now:.1f} s"
+    if watch.broken_since is not None:
+        return Status.FAILED, f"{who} should be {meaning.text}, and {was} not"
+    return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"
 
 
 def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:

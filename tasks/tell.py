@@ -41,10 +41,14 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind) -> Iterator[Ev
         Events of stages in the order of the task, then a change of the verdict.
     """
     mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
+    first = all(s.status is Status.PENDING for s in before.stages)
     was = {s.stage: s.status for s in before.stages}
     for stage in now.stages:
         for kind in _kinds(was.get(stage.stage, Status.PENDING), stage.status):
-            yield _stage_event(kind, stage, now, mind)
+            event = _stage_event(kind, stage, now, mind)
+            if first and kind == "stage_started" and event.objects:
+                event = replace(event, text=_introduction(stage, now, mind))
+            yield event
     if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
         yield _verdict_event(now, mind)
 
@@ -90,7 +94,7 @@ def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) 
         kind,
         mind.time,
         mind.frame_index,
-        _sentence(kind, stage, belief, mind),
+        stage_sentence(kind, stage.stage, belief.task, stage.evidence),
         _objects(belief),
         stage.confidence,
         Severity.WARNING if bad else Severity.INFO,
@@ -98,9 +102,8 @@ def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) 
     )
 
 
-def _sentence(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
-    if kind != "stage_started" or not _objects(belief):
-        return stage_sentence(kind, stage.stage, belief.task, stage.evidence)
+def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
+    """The sentence with which a task begins: it says who is believed to take part."""
     who = ", and ".join(describe(mind, i, n) for n, i in enumerate(_objects(belief)))
     return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
 

@@ -22,6 +22,7 @@ class Watch:
         status: How it stands.
         since: Since when it stands so.
         begun: When it was first seen to hold or to come nearer, or None.
+        held: Whether it ever held.
         held_s: How long it has held without a break.
         broken_since: Since when it has not held, or None.
         fulfilled: Whether it has held for as long as it must.
@@ -43,6 +44,7 @@ class Watch:
     status: Status = Status.ACTIVE
     since: float = 0.0
     begun: float | None = None
+    held: bool = False
     held_s: float = 0.0
     broken_since: float | None = None
     fulfilled: bool = False
@@ -143,6 +145,7 @@ def _note_progress(
     return replace(
         watch,
         begun=_first(watch.begun, now) if helping else watch.begun,
+        held=watch.held or seen.holds is Truth.TRUE,
         held_s=held,
         broken_since=broken,
         fulfilled=watch.fulfilled or held >= must - 1e-9,

@@ -43,7 +43,7 @@ def run(name: str) -> Run:
     beliefs: list[tuple[float, TaskBelief]] = []
     events: list[Event] = []
     alerts: list[Concern] = []
-    for seen, _ in observations(name, Noise(every=2)):
+    for seen, _ in observations(name, Noise(every=3)):
         mind = replace(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )

@@ -373,7 +373,7 @@ def test_several_tasks_are_supervised_side_by_side() -> None:
 
 @pytest.mark.parametrize("share", [0.05, 0.1])
 def test_now_and_then_wrong_relations_do_not_change_the_verdict(share: float) -> None:
-    for seed in range(8):
+    for seed in range(4):
         for name, (spells, until) in SCENES.items():
             noisy = _with_noise(spells, until, share, seed)
             verdict = finish(task_of(watch(Script(noisy), until)))
