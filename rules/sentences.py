@@ -108,7 +108,7 @@ def mentions(template: str) -> tuple[str, ...]:
 
 def tidy(text: str) -> str:
     """Close the commas round 'believed to be', and begin with a capital."""
-    text = text.replace(",,", ",").replace(",.", ".").replace(", .", ".")
+    text = re.sub(r",(?=\s*[,.;:!?])", "", text)
     return text[:1].upper() + text[1:]
 
 
