@@ -199,7 +199,7 @@ def _hypothesis(region: Region, match: ViewMatch) -> Hypothesis:
         view=view.number,
         similarity=match.similarity,
         rotation=match.rotation,
-        direction=view.direction,
+        direction=match.direction,
     )
 
 

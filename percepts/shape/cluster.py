@@ -20,7 +20,7 @@ def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
     out = np.eye(len(shapes))
     for i, shape in enumerate(shapes):
         others = shapes[:i]
-        outlines = outline_similarities(shape, others)
+        outlines, _ = outline_similarities(shape, others)
         graphs = np.array([match(shape.graph, o.graph).similarity for o in others])
         out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + (1 - GRAPH_SHARE) * outlines
     return out

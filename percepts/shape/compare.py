@@ -56,12 +56,14 @@ class Likeness:
         of_graphs: Similarity of the shock graphs alone.
         of_outlines: Similarity of the outlines alone.
         match: Corresponding nodes.
+        mirrored: Whether it is the mirror image of the one that looks like the other.
     """
 
     similarity: float
     of_graphs: float
     of_outlines: float
     match: Match
+    mirrored: bool = False
 
 
 def shape_of(silhouette: Silhouette) -> Shape:
@@ -81,29 +83,35 @@ def compare(a: Shape, b: Shape) -> Likeness:
         (1.0, True)
     """
     graphs = match(a.graph, b.graph)
-    return join(graphs, float(outline_similarities(a, [b])[0]))
+    similar, mirrored = outline_similarities(a, [b])
+    return join(graphs, float(similar[0]), bool(mirrored[0]))
 
 
-def join(graphs: Match, of_outlines: float) -> Likeness:
+def join(graphs: Match, of_outlines: float, mirrored: bool) -> Likeness:
     """The likeness that follows from both terms."""
     similarity = GRAPH_SHARE * graphs.similarity + (1 - GRAPH_SHARE) * of_outlines
     # Features are of single precision: further digits mean nothing, and equal shapes give exactly 1.
-    return Likeness(min(1.0, round(similarity, 5)), graphs.similarity, of_outlines, graphs)
+    return Likeness(
+        min(1.0, round(similarity, 5)), graphs.similarity, of_outlines, graphs, mirrored
+    )
 
 
-def outline_similarities(query: Shape, others: Sequence[Shape]) -> NDArray[np.float64]:
-    """Similarity of one outline with many, (B,) in [0, 1].
+def outline_similarities(
+    query: Shape, others: Sequence[Shape]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Similarity of one outline with many, (B,) in [0, 1], and which are alike mirrored, (B,) bool.
 
     Alignment is not quite the same in both directions; the shapes' own order decides on one.
     """
     if not others:
-        return np.empty(0)
+        return np.empty(0), np.empty(0, dtype=bool)
     heights = np.stack([o.heights for o in others])
-    distance = np.empty(len(others))
+    distance, mirrored = np.empty(len(others)), np.zeros(len(others), dtype=bool)
     query_first = np.array([query.graph.key <= o.graph.key for o in others])
     own = query.heights[None]
     if query_first.any():
-        distance[query_first] = outline_distances(own, heights[query_first])
+        distance[query_first], mirrored[query_first] = outline_distances(own, heights[query_first])
     if not query_first.all():
-        distance[~query_first] = outline_distances(heights[~query_first], own)
-    return np.asarray(np.exp(-((distance / OUTLINE_SCALE) ** 2)))
+        turned = outline_distances(heights[~query_first], own)
+        distance[~query_first], mirrored[~query_first] = turned
+    return np.exp(-((distance / OUTLINE_SCALE) ** 2)), mirrored

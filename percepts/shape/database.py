@@ -55,7 +55,8 @@ class ViewMatch:
         view: The view.
         likeness: How alike the two are, and why; pairs of nodes are (query, view, similarity).
         rotation: In-plane rotation from view to query, radians (positive from x towards y, y down), or
-            None when the two have too little in common to tell.
+            None when the two have too little in common to tell. Of a mirrored match, the rotation from
+            the view's left-right mirror image, which is what is seen from the opposite direction.
     """
 
     view: View
@@ -66,6 +67,18 @@ class ViewMatch:
     def similarity(self) -> float:
         """0 to 1."""
         return self.likeness.similarity
+
+    @property
+    def direction(self) -> tuple[float, float, float] | None:
+        """Unit vector from the object to the viewer, model frame; None when it is not known.
+
+        In parallel projection the silhouette from behind is the mirror image of the one from before,
+        so that a mirrored match tells of the opposite direction.
+        """
+        if self.view.direction is None or not self.likeness.mirrored:
+            return self.view.direction
+        x, y, z = self.view.direction
+        return (-x, -y, -z)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,14 +226,15 @@ class ModelDatabase:
         """Candidates by index, their outlines at once, then graphs until no other can do better."""
         favoured = np.intersect1d(self._named(first), among) if first else None
         likely = self._index.candidates(query.graph, among, most, favoured)
-        outlines = outline_similarities(query, [self.shapes[k] for k in likely.numbers])
+        outlines, mirrored = outline_similarities(query, [self.shapes[k] for k in likely.numbers])
         ceilings = GRAPH_SHARE * likely.bounds + (1 - GRAPH_SHARE) * outlines
         found: list[ViewMatch] = []
         for n in np.argsort(-ceilings, kind="stable"):
             if ceilings[n] < wanted.least(found):
                 break
             number = int(likely.numbers[n])
-            likeness = join(self._match(query, number, likely.similar[n]), float(outlines[n]))
+            graphs = self._match(query, number, likely.similar[n])
+            likeness = join(graphs, float(outlines[n]), bool(mirrored[n]))
             found = wanted.best([*found, ViewMatch(self.views[number], likeness)])
         return Ranking(tuple(found), len(likely.numbers))
 
@@ -254,7 +268,9 @@ class ModelDatabase:
 
     def _with_rotation(self, query: Shape, found: ViewMatch) -> ViewMatch:
         own = self.shapes[self._places[found.view.id]].graph
-        return replace(found, rotation=in_plane_rotation(own, query.graph, found.likeness.match))
+        likeness = found.likeness
+        turn = in_plane_rotation(own, query.graph, likeness.match, mirrored=likeness.mirrored)
+        return replace(found, rotation=turn)
 
 
 @dataclass(frozen=True, slots=True)

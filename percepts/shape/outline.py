@@ -59,7 +59,7 @@ def complexity(heights: NDArray[np.float32]) -> float:
 
 def outline_distances(
     first: NDArray[np.float32], second: NDArray[np.float32]
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Distances of pairs of outlines, each at its best rotation, mirrored or not.
 
     Args:
@@ -67,16 +67,17 @@ def outline_distances(
         second: The same, of the other outlines.
 
     Returns:
-        (B,) float64, 0 for equal outlines; about 0.2 within a class and 0.45 between.
+        (B,) float64, 0 for equal outlines; about 0.2 within a class and 0.45 between. And (B,) bool,
+        whether the mirror image fits better.
     """
     count = max(len(first), len(second))
     both = np.stack([second, second[:, ::-1, ::-1]], axis=1)
     costs = _point_costs(first[:, None], both)
     costs = np.broadcast_to(costs, (count, 2, POINTS, POINTS)).reshape(count * 2, -1)
     shifted = costs[:, _shifts()].reshape(count, 2 * POINTS, POINTS)
-    distance = _align(shifted)
+    distance, mirrored = _align(shifted)
     varied = _complexities(first) + _complexities(second)
-    return np.asarray(distance / (_BETA + varied), dtype=np.float64)
+    return np.asarray(distance / (_BETA + varied), dtype=np.float64), mirrored
 
 
 def _complexities(heights: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -98,16 +99,21 @@ def _shifts() -> NDArray[np.intp]:
     return np.asarray(i[None] * POINTS + (i[None] + d[:, None]) % POINTS, dtype=np.intp).ravel()
 
 
-def _align(shifted: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Least mean cost of an alignment, (B,), from (B, 2 * POINTS, POINTS) costs by diagonal."""
+def _align(shifted: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Least mean cost of an alignment and whether it is mirrored, both (B,).
+
+    Costs come by diagonal, (B, 2 * POINTS, POINTS): the upper half of the diagonals is mirrored.
+    """
     count = len(shifted)
     starts = _best_diagonals(shifted.sum(axis=-1).reshape(count, 2, POINTS))
     side, diagonal = starts // POINTS, starts % POINTS
     band = (diagonal[..., None] + np.arange(-_BAND, _BAND + 1)) % POINTS + side[..., None] * POINTS
     rows = np.arange(count)[:, None, None]
     lanes = np.ascontiguousarray(np.moveaxis(shifted[rows, band], -1, 0))
-    least = _descend(lanes).min(axis=(1, 2))
-    return np.asarray(least, dtype=np.float64) / POINTS
+    least = _descend(lanes).min(axis=2)
+    best = least.argmin(axis=1)
+    each = np.arange(count)
+    return least[each, best].astype(np.float64) / POINTS, side[each, best] > 0
 
 
 def _best_diagonals(sums: NDArray[np.float32]) -> NDArray[np.intp]:

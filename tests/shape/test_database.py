@@ -21,6 +21,7 @@ from visup.percepts.shape.build import (
 )
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.shape.storage import APPLICATION_ID, VERSION
+from visup.percepts.shape.views import load_mesh, render_views
 
 trimesh = pytest.importorskip("trimesh", reason="views of meshes need the extra 'render'")
 
@@ -257,3 +258,25 @@ def test_the_file_says_what_it_is(stored: Path) -> None:
     assert header.startswith(b"SQLite format 3")
     assert int.from_bytes(header[68:72], "big") == APPLICATION_ID
     assert int.from_bytes(header[60:64], "big") == VERSION
+
+
+def test_a_mirrored_match_tells_of_the_opposite_direction(stored: Path) -> None:
+    database = ModelDatabase.open(stored)
+    same = database.query(ZOO["walker"], top=1).matches[0]
+    mirrored = database.query(ZOO["walker"][:, ::-1], top=1).matches[0]
+    assert (same.view.name, same.likeness.mirrored) == ("walker", False)
+    assert (mirrored.view.name, mirrored.likeness.mirrored) == ("walker", True)
+    assert same.direction == (0.0, 0.0, 1.0)
+    assert mirrored.direction == (-0.0, -0.0, -1.0)
+    assert mirrored.rotation == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_opposite_view_is_the_mirror_image(tmp_path: Path) -> None:
+    """The convention on roll that mirrored matches rely on."""
+    mesh = load_mesh(box(tmp_path / "box.ply"))
+    mesh.vertices[0] += (0.7, 0.4, 0.2)
+    toward = np.array([0.48, 0.6, 0.64])
+    front, back = render_views(mesh, np.stack([toward, -toward]))
+    assert back.area == pytest.approx(front.area, rel=0.01)
+    assert back.mask.shape == front.mask.shape
+    assert (front.mask[:, ::-1] != back.mask).mean() < 0.01

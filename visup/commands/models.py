@@ -153,7 +153,7 @@ def _print_json(ranking: Ranking) -> None:
             "view": m.view.number,
             "similarity": round(m.similarity, 6),
             "rotation_rad": m.rotation,
-            "direction": m.view.direction,
+            "direction": m.direction,
         }
         for m in ranking.matches
     ]

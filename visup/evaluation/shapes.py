@@ -149,7 +149,7 @@ def _compare_rows(begin: int) -> _Rows:
     start = time.perf_counter()
     rows = list(range(begin, min(begin + _ROWS, len(_Shared.shapes))))
     graphs = [_graph_row(i) for i in rows]
-    outlines = [outline_similarities(_Shared.shapes[i], _Shared.shapes[:i]) for i in rows]
+    outlines = [outline_similarities(_Shared.shapes[i], _Shared.shapes[:i])[0] for i in rows]
     return _Rows(rows, graphs, outlines, time.perf_counter() - start)
 
 
