@@ -92,13 +92,15 @@ def _sample(mind: Mind) -> StageSample:
     """The reported stage and its outcome so far.
 
     A stage that is done while no other has begun counts as progressing: its outcome so far is good,
-    and the mission is still within it.
+    and in the truth a mission stays within its last stage until it ends.
     """
     task = mind.tasks[0] if mind.tasks else None
-    if task is None or task.current is None:
+    done = [s.stage for s in task.stages if s.status is Status.DONE] if task else []
+    stage = (task.current or (done[-1] if done else None)) if task else None
+    if task is None or stage is None:
         return StageSample(mind.time, None, None)
-    status = next(s.status for s in task.stages if s.stage == task.current)
-    return StageSample(mind.time, task.current, _outcome(task, status))
+    status = next(s.status for s in task.stages if s.stage == stage)
+    return StageSample(mind.time, stage, _outcome(task, status))
 
 
 def _outcome(task: TaskBelief, status: Status) -> str | None:
