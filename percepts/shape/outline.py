@@ -74,7 +74,7 @@ def outline_distances(
     both = np.stack([second, second[:, ::-1, ::-1]], axis=1)
     costs = _point_costs(first[:, None], both)
     costs = np.broadcast_to(costs, (count, 2, POINTS, POINTS)).reshape(count * 2, -1)
-    shifted = costs[:, _shifts()].reshape(count, 2 * POINTS, POINTS)
+    shifted = costs.take(_shifts(), axis=1).reshape(count, 2 * POINTS, POINTS)
     distance, mirrored = _align(shifted)
     varied = _complexities(first) + _complexities(second)
     return np.asarray(distance / (_BETA + varied), dtype=np.float64), mirrored
@@ -86,10 +86,15 @@ def _complexities(heights: NDArray[np.float32]) -> NDArray[np.float64]:
 
 def _point_costs(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
     """Root mean squared difference of heights between all points of both."""
-    squares = (a**2).sum(axis=-1)[..., :, None] + (b**2).sum(axis=-1)[..., None, :]
-    squares = (squares - 2 * np.matmul(a, b.swapaxes(-1, -2))) / HEIGHTS
+    costs: NDArray[np.float32] = np.matmul(a, b.swapaxes(-1, -2))
+    costs *= -2.0
+    costs += (a**2).sum(axis=-1)[..., :, None]
+    costs += (b**2).sum(axis=-1)[..., None, :]
+    costs *= 1 / HEIGHTS
     # Below this, single precision cannot tell a difference from none.
-    return np.asarray(np.sqrt(np.where(squares > 1e-6, squares, 0.0)), dtype=np.float32)
+    costs -= 1e-6
+    np.maximum(costs, 0.0, out=costs)
+    return np.sqrt(costs, out=costs)
 
 
 @lru_cache(maxsize=1)
