@@ -3,5 +3,6 @@
 Read in this order: `thinkers.py` (everything, in the order in which it runs), `objects.py` and
 `presence.py` (who is there), `votes.py` (who is who), `relations.py` and `coupling.py` (what holds
 between them), `safety.rules` and `rules.lark` (what to watch for, and the language that says so),
-`sentences.py` (how it is told). `geometry.py`, `fit.py` and `latch.py` are the mathematics below.
+`sentences.py` (how it is told). Below them lie `history.py` and `measure.py` (samples and quantities)
+and `geometry.py`, `fit.py`, `latch.py` (the mathematics).
 """

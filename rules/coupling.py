@@ -30,7 +30,8 @@ from visup.agent import (
     Relation,
     Truth,
 )
-from visup.rules.relations import Measured, RelationSettings, at_rest, measured, scale
+from visup.rules.measure import Measured, RelationSettings, at_rest, scale
+from visup.rules.relations import measured
 from visup.rules.rigid import shape_change
 from visup.rules.sentences import sentence
 from visup.rules.tracks import merged_pairs

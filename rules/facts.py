@@ -10,7 +10,8 @@ from types import MappingProxyType
 
 from visup.agent import HealthStatus, Mind, ObjectBelief, Presence, Relation, Truth
 from visup.rules.geometry import RCC8
-from visup.rules.relations import Measured, RelationSettings, measured, scale
+from visup.rules.measure import Measured, RelationSettings, scale
+from visup.rules.relations import measured
 from visup.rules.sentences import believed_name
 from visup.rules.tracks import at_border, tracks
 

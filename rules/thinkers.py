@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from visup.agent import Thinker
 from visup.rules.coupling import Couple, CouplingSettings
 from visup.rules.depth import BelieveDepth, DepthSettings
 from visup.rules.formula import Rule
 from visup.rules.language import shipped_rules
+from visup.rules.measure import RelationSettings
 from visup.rules.narrative import NarrativeSettings, TellRelations
 from visup.rules.objects import ObjectSettings, UpdateObjects
 from visup.rules.presence import PresenceSettings, SeePresence
-from visup.rules.relations import Relations, RelationSettings
+from visup.rules.relations import Relations
 from visup.rules.safety import RuleThinker
 from visup.rules.votes import Votes, VoteSettings
 
@@ -64,7 +65,7 @@ def default_thinkers(
             Votes(s.votes),
             BelieveDepth(s.depth),
             Relations(s.relations),
-            Couple(s.coupling),
+            Couple(replace(s.coupling, relations=s.relations)),
             TellRelations(s.narrative),
             RuleThinker(shipped_rules() if rules is None else rules),
         ),

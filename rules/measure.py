@@ -1,0 +1,228 @@
+"""Quantities of all objects and pairs: gaps, trends, velocities, measured in one vectorised pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Mind, ObjectBelief
+from visup.rules.fit import binned, theil_sen, velocity
+from visup.rules.geometry import Floats, outline_gap
+from visup.rules.history import History, covered
+
+
+@dataclass(frozen=True, slots=True)
+class RelationSettings:
+    """Thresholds of the relations.
+
+    Attributes:
+        window_s: Length of the window over which lines are fitted.
+        samples: Most samples kept in the window.
+        bins: Most means of neighbouring samples to which lines are fitted.
+        quick_window_s: Length of a shorter window in which a trend must be strong to count; by it
+            a turn is seen sooner.
+        quick_sigmas: How many standard deviations of its slope that is, and twice `rate_enter`.
+        motion_window_s: Length of the window over which velocities are fitted.
+        rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
+        rate_exit: Trend below which they end, image diagonals per second.
+        sigmas: How many standard deviations of the slope a trend must exceed to enter.
+        trend_minimum_s: Least duration of a trend before it is believed.
+        hold_s: How long the last gap stands for bodies that flicker out of sight.
+        depth_rate: Relative depth change that counts, share of the depth per second.
+        touch_enter: Outline gap at which bodies touch, image diagonals.
+        touch_exit: Outline gap at which they no longer do.
+        touch_minimum_s: Least duration of a touch.
+        still_speed: Relative speed over the window below which two bodies are at rest to each
+            other, image diagonals per second.
+        still_half: The same in each half of the window, where the noise is greater.
+        misfit: How unevenly an outline may move and still have a velocity, image diagonals/s.
+        apart_depth: Share of depth by which touching outlines belong to bodies apart in depth.
+        image_only_confidence: Most that a relation judged without depth is believed.
+    """
+
+    window_s: float = 1.5
+    samples: int = 64
+    bins: int = 16
+    quick_window_s: float = 0.7
+    quick_sigmas: float = 4.0
+    motion_window_s: float = 1.25
+    rate_enter: float = 0.002
+    rate_exit: float = 0.001
+    sigmas: float = 3.0
+    trend_minimum_s: float = 0.3
+    hold_s: float = 0.3
+    depth_rate: float = 0.02
+    touch_enter: float = 0.0035
+    touch_exit: float = 0.006
+    touch_minimum_s: float = 0.2
+    still_speed: float = 0.0025
+    still_half: float = 0.0045
+    misfit: float = 0.0075
+    apart_depth: float = 0.25
+    image_only_confidence: float = 0.8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """Quantities of the last step; what rules compare. NaN is unknown.
+
+    Attributes:
+        ids: (M,) object ids, increasing.
+        gap: (M, M) distance of the outlines, pixels.
+        rate: (M, M) trend of the distance, pixels per second, negative when closing.
+        rate_sigma: (M, M) its standard deviation.
+        relative_speed: (M, M) pixels per second.
+        speed: (M,) pixels per second in the image.
+        early: (M, 2) velocity in the first half of the window, pixels per second.
+        late: (M, 2) velocity in the second half.
+        depth: (M,) in the objects' units.
+    """
+
+    ids: tuple[int, ...] = ()
+    gap: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    rate: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    rate_sigma: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    relative_speed: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    speed: Floats = field(default_factory=lambda: np.zeros(0))
+    early: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    late: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    depth: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def pair(self, quantity: str, a: int, b: int) -> float:
+        """One quantity of one pair, NaN when unknown."""
+        if a not in self.ids or b not in self.ids:
+            return float("nan")
+        table: Floats = getattr(self, quantity)
+        return float(table[self.ids.index(a), self.ids.index(b)])
+
+    def one(self, quantity: str, a: int) -> float:
+        """One quantity of one object, NaN when unknown."""
+        if a not in self.ids:
+            return float("nan")
+        return float(getattr(self, quantity)[self.ids.index(a)])
+
+
+def scale(frame_size: tuple[int, int]) -> float:
+    """Image diagonal, pixels; what thresholds are relative to."""
+    return float(np.hypot(*frame_size))
+
+
+@dataclass(frozen=True, slots=True)
+class Measuring:
+    """Turns samples into quantities."""
+
+    settings: RelationSettings
+
+    def __call__(
+        self, h: History, objects: tuple[ObjectBelief, ...], mind: Mind, before: Measured
+    ) -> Measured:
+        """Measure one step.
+
+        Args:
+            h: Samples up to now.
+            objects: The objects of the samples.
+            mind: The mind.
+            before: What was measured in the step before.
+
+        Returns:
+            All quantities; NaN where unknown.
+        """
+        m = len(objects)
+        slope, sigma = np.full((m, m), np.nan), np.full((m, m), np.nan)
+        i, j = np.triu_indices(m, 1)
+        if covered(h, self.settings.window_s) and len(i):
+            slope[i, j], sigma[i, j] = self._trend(h.times, h.separation[:, i, j], mind)
+            slope[j, i], sigma[j, i] = slope[i, j], sigma[i, j]
+        stale = np.array([mind.time - b.last_seen > 0.5 * self.settings.window_s for b in objects])
+        if m:
+            slope[stale, :] = slope[:, stale] = np.nan
+        whole, early, late = self._velocities(h, mind)
+        apart = np.linalg.norm(whole[:, None] - whole[None], axis=2)
+        depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
+        return Measured(
+            h.ids,
+            self._gaps(objects, h, mind, before),
+            slope,
+            sigma,
+            apart,
+            np.linalg.norm(whole, axis=1),
+            early,
+            late,
+            depth,
+        )
+
+    def _trend(self, times: Floats, distance: Floats, mind: Mind) -> tuple[Floats, Floats]:
+        """Slope over the window, or over its last part where that is strong and of another sign."""
+        s = self.settings
+        slope, sigma = theil_sen(*binned(times, distance, s.bins))
+        recent = times > times[-1] - s.quick_window_s
+        quick, spread = theil_sen(*binned(times[recent], distance[recent], s.bins))
+        least = 2.0 * s.rate_enter * scale(mind.frame_size)
+        with np.errstate(invalid="ignore"):
+            turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
+            turned &= np.sign(quick) != np.sign(slope)
+        return np.where(turned, quick, slope), np.where(turned, spread, sigma)
+
+    def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
+        """Over the window of motion, and over its two halves."""
+        m, misfit = len(h.ids), self.settings.misfit * scale(mind.frame_size)
+        unknown = np.full((m, 2), np.nan)
+        if m == 0 or not covered(h, self.settings.window_s):
+            return unknown, unknown, unknown
+        recent = h.times > mind.time - self.settings.motion_window_s
+        times, support, free = h.times[recent], h.support[recent], h.free[recent]
+        half = len(times) // 2
+        return (
+            velocity(times, support, free, misfit),
+            velocity(times[:half], support[:half], free[:half], misfit),
+            velocity(times[half:], support[half:], free[half:], misfit),
+        )
+
+    def _gaps(
+        self, objects: tuple[ObjectBelief, ...], h: History, mind: Mind, before: Measured
+    ) -> Floats:
+        """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
+        gaps = np.full((len(objects), len(objects)), np.nan)
+        for i, a in enumerate(objects):
+            for j in range(i + 1, len(objects)):
+                b = objects[j]
+                unseen = mind.time - min(a.last_seen, b.last_seen)
+                if unseen == 0.0:
+                    gaps[i, j] = gaps[j, i] = self._gap(a, b, h, (i, j), mind)
+                elif unseen <= self.settings.hold_s:
+                    gaps[i, j] = gaps[j, i] = before.pair("gap", a.id, b.id)
+        return gaps
+
+    def _gap(
+        self, a: ObjectBelief, b: ObjectBelief, h: History, at: tuple[int, int], mind: Mind
+    ) -> float:
+        near = 0.05 * scale(mind.frame_size)
+        gap = outline_gap(a.region, b.region, near)
+        if gap is not None:
+            return gap
+        apart = float(h.separation[-1][at]) if len(h.times) else np.nan
+        return max(near, apart) if np.isfinite(apart) else np.nan
+
+
+def at_rest(now: Measured, settings: RelationSettings, diagonal: float) -> NDArray[np.bool_]:
+    """Whether bodies are at rest to each other: over the window, and in both of its halves.
+
+    The halves are looked at so that a body that bounces off, whose mean relative velocity is zero
+    for a moment, is not taken for one that rests.
+
+    Args:
+        now: Velocities.
+        settings: Thresholds.
+        diagonal: Image diagonal, pixels.
+
+    Returns:
+        (M, M) bool; false where a velocity is unknown.
+    """
+    early = np.linalg.norm(now.early[:, None] - now.early[None], axis=2)
+    late = np.linalg.norm(now.late[:, None] - now.late[None], axis=2)
+    with np.errstate(invalid="ignore"):
+        halves = np.maximum(early, late) < settings.still_half * diagonal
+        rest: NDArray[np.bool_] = halves & (now.relative_speed < settings.still_speed * diagonal)
+    return rest
