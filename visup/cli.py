@@ -20,6 +20,10 @@ from visup.commands.watch import demo, watch
 
 BAD_INPUT = 2
 
+# Small matrices are many here: threads of the linear algebra library cost more than they bring.
+# Set before NumPy is imported; whoever set it otherwise is obeyed.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 app = typer.Typer(
     name="visup",
     help="The visual supervisor: it watches machines work and says in plain words whether it goes well.",

@@ -50,17 +50,18 @@ CREATE TABLE arrays (
 """
 
 _N = MOST_NODES + 1
+# Half precision where it is far finer than a silhouette is known: an outline of unit area to 0.0005.
 _FIELDS: dict[str, tuple[str, int, int]] = {
-    # field: (dtype, most rows, columns; 0 columns for a vector)
-    "contour": ("<f4", MOST_POINTS, 2),
+    # field: (dtype on disk, most rows, columns; 0 columns for a vector)
+    "contour": ("<f2", MOST_POINTS, 2),
     "kinds": ("|i1", _N, 0),
     "edges": ("<i2", 2 * _N, 2),
     "weights": ("<f4", _N, 0),
     "lengths": ("<f4", _N, 0),
-    "profiles": ("<f4", _N, PROFILE),
-    "contexts": ("<f4", _N, CONTEXT),
+    "profiles": ("<f2", _N, PROFILE),
+    "contexts": ("<f2", _N, CONTEXT),
     "positions": ("<f4", _N, 2),
-    "directions": ("<f4", _N, 2),
+    "directions": ("<f2", _N, 2),
     "signatures": ("<f4", _N, LENGTH),
 }
 _GRAPH_FIELDS = tuple(f for f in _FIELDS if f != "contour")
@@ -255,7 +256,7 @@ def read_views(path: Path) -> tuple[View, ...]:
     with closing(open_checked(path)) as file:
         try:
             return tuple(_view(row, path) for row in file.execute(query))
-        except sqlite3.Error as e:
+        except (sqlite3.Error, UnicodeDecodeError) as e:
             raise _unreadable(path, e) from e
 
 
@@ -284,7 +285,7 @@ def read_shapes(path: Path, views: Sequence[View]) -> tuple[Shape, ...]:
             for view, *rest in file.execute(query):
                 field, array = _checked_array(path, view, rest)
                 found.setdefault(view, {})[field] = array
-        except sqlite3.Error as e:
+        except (sqlite3.Error, UnicodeDecodeError) as e:
             raise _unreadable(path, e) from e
     return tuple(_checked_shape(path, v, found.get(v.id, {})) for v in views)
 
@@ -306,6 +307,8 @@ def _checked_array(path: Path, view: int, row: Iterable[Any]) -> tuple[str, NDAr
         raise _damaged(
             path, f"view {view}: {field} with unlikely numbers", "magnitudes below 10000"
         )
+    if array.dtype.kind == "f":
+        array = array.astype(np.float32)
     return field, array.reshape(rows, width) if width else array
 
 
