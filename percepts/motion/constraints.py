@@ -194,6 +194,10 @@ def track(
         old.grey, new.grey, there, start.copy(), flags=initial, **options
     )
     ok = (found.ravel() > 0) & (back.ravel() > 0)
+    # What is said of points that were lost is not even finite.
+    ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
+    misfit = np.where(ok[:, None], misfit, 255.0)
+    home, there = np.where(ok[:, None, None], home, 0), np.where(ok[:, None, None], there, 0)
     energy = (points.tensor[:, 0] + points.tensor[:, 2]) / WINDOW**2
     wrong = np.asarray(misfit, dtype=np.float32).ravel()
     ok &= wrong < 3 * noise + 0.7 * np.sqrt(energy)

@@ -177,7 +177,26 @@ def warped(
             box = _box_of(mine[cells.labels])
             fit = compare(scene.image, old, t.predicted(c.lag, c.span_s), box, noise)
             out[mine, k] = _cell_mean(cells, fit, box)[mine]
+            hid = mine & _was_hidden(scene, t.predicted(c.lag, c.span_s)[0], k)
+            out[hid, 0] = np.maximum(out[hid, 0], out[hid, k])
     out[any_near, -1] = out[any_near, :-1].max(axis=1)
+    return out
+
+
+def _was_hidden(scene: Scene, model: Affine, k: int) -> NDArray[np.bool_]:
+    """Cells that, were they background, the track would have hidden in the older image.
+
+    There the background need not look as it does now, so a poor comparison says nothing against it.
+    """
+    cells, background = scene.cells, scene.measured[-1].background.models
+    height, width = cells.labels.shape
+    out = np.zeros(cells.count, dtype=bool)
+    for ground in background:
+        away = model.at(cells.centre) - ground.at(cells.centre)
+        away += 2.0 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-3)
+        at = np.rint(cells.centre + 1.2 * away).astype(np.int64)
+        x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
+        out |= scene.owner[cells.labels[y, x]] == k
     return out
 
 
@@ -223,6 +242,7 @@ def label(
     trust = np.full(cells.count, settings.persistence, dtype=np.float32)
     bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
     bias[_border(cells.labels)] *= 10
+    bias *= np.where(prior[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
     return spread(cells, share, settings.evidence * weight, look, trust, bias)
 
 

@@ -23,6 +23,7 @@ NEAR_STEPS = 4
 APART_S = 1.5
 VOTES = 3.0
 MOST_PARTS = 3
+CONTACT = 5.0  # affinity of two cells that are flat and of one tone
 
 
 def least_area(scene: Scene, settings: MotionSettings) -> float:
@@ -65,7 +66,7 @@ def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> T
                 motions=(motion,),
                 centre=(float(middle[0]), float(middle[1])),
             )
-            host = _territory(out, share > 0)
+            host = _territory(out, share > 0, scene)
             if host is None:
                 out.append(t)
             else:
@@ -74,10 +75,20 @@ def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> T
     return tuple(out)
 
 
-def _territory(tracks: Sequence[Track], where: NDArray[np.bool_]) -> int | None:
-    """The track that was of late in most of these cells."""
+def _territory(tracks: Sequence[Track], where: NDArray[np.bool_], scene: Scene) -> int | None:
+    """The track that is hidden in most of these cells, or else was of late in most of them."""
     for i, t in enumerate(tracks):
-        if t.id and t.recent is not None and np.mean(t.recent[where] > 0.3) > 0.5:
+        if t.id and t.hidden is not None and scene.cells.mean(t.hidden)[where].mean() > 0.5:
+            return i
+    for i, t in enumerate(tracks):
+        if not t.id or t.recent is None:
+            continue
+        # What comes out from behind an object is not a part of it.
+        others = [
+            o.own > 0.3 for o in tracks if o is not t and o.hidden is not None and o.own is not None
+        ]
+        free = where & ~np.any(others, axis=0) if others else where
+        if free.any() and np.mean(t.recent[free] > 0.3) > 0.5:
             return i
     return None
 
@@ -160,7 +171,11 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
                 continue
             if apart > APART_S:
                 continue
-            votes = a.alike.get(b.key, 0.0) + _vote(scene, a, members[:, i], members[:, j])
+            votes = a.alike.get(b.key, 0.0)
+            if _grown_together(scene, members[:, i], members[:, j]):
+                votes += 1.0
+            else:
+                votes += _vote(scene, a, members[:, i], members[:, j])
             votes = max(votes, -VOTES)
             out[i] = replace(a, alike=_with(a.alike, b.key, votes))
             if votes >= VOTES:
@@ -190,6 +205,12 @@ def _vote(scene: Scene, a: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool
         same = same_motion(c, mine, other, start, slack_of(start, a.centre))
         votes += 0.0 if same is None else (1.0 if same else -1.0)
     return votes
+
+
+def _grown_together(scene: Scene, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_]) -> bool:
+    """Whether no image edge parts two tracks where they touch, as in the links of an arm."""
+    contact = scene.cells.link[in_a][:, in_b]
+    return contact.nnz > 0 and float(contact.max()) > CONTACT
 
 
 def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:

@@ -14,9 +14,11 @@ from visup.percepts.motion.image import Floats, WorkImage
 from visup.percepts.motion.layers import Affine, distances, fit_affine, log_likelihood
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels
-from visup.percepts.motion.tracking import Indices, Track
+from visup.percepts.motion.tracking import Indices, Motion, Track
 
 REACH_STEPS = 2
+ALIKE_PX_S = 12.0  # pixels per second within which a part moves like what is hidden
+PART_COST = 4.0  # squared distance that a further part of a track must save
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +92,24 @@ def fit_tracks(tracks: tuple[Track, ...], scene: Scene) -> tuple[Track, ...]:
         c = m.constraints
         at = scene.owner[scene.cell_of(c.xy)]
         tracks = tuple(_fit(t, m, at == k, scene.time) for k, t in enumerate(tracks, 1))
-    return tracks
+    hidden = [t for t in tracks if t.mostly_hidden]
+    return tuple(_disown(t, [h for h in hidden if h is not t]) for t in tracks)
+
+
+def _disown(t: Track, hidden: list[Track]) -> Track:
+    """Drop parts that move as something hidden does: it is coming out from behind this track."""
+    if len(t.motions) < 2 or not hidden:
+        return t
+    kept = [m for m in t.motions if not any(_moves_like(m, h) for h in hidden)]
+    return replace(t, motions=tuple(kept) or t.motions[:1])
+
+
+def _moves_like(motion: Motion, other: Track) -> bool:
+    rate = motion.best_rate(other.centre)
+    if rate is None:
+        return False
+    gap = rate.velocity(other.centre) - np.asarray(other.pace)
+    return bool(np.hypot(*gap) < ALIKE_PX_S + 0.2 * np.hypot(*other.pace))
 
 
 def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
@@ -104,18 +123,42 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
     if not mine.any():
         return t
     off = np.stack([distances(m, c, slack_of(m, t.centre)) for m in models])
+    # The first part comes first: an edge along the motion fits any part, and must not feed them.
+    off[1:] += PART_COST
     nearest = off.argmin(axis=0)
+    clear = 0.6 if t.mostly_hidden else 0.0
     motions = []
     for i, (motion, start) in enumerate(zip(t.motions, models, strict=True)):
         weight = (mine & (nearest == i)).astype(np.float32)
         fit = fit_affine(c, weight, start, slack=slack_of(start, t.centre))
-        if fit.support >= 5:
-            motion = motion.with_rate(c.lag, rate_of(fit, c, now), fit.support)
-            if len(t.motions) > 1 and c.span_s > 0.3 and m.background.moves_as(fit, t.centre):
+        # A part that is nearly hidden tells little of its motion: what was known is kept.
+        if fit.support >= max(5.0, clear * motion.support):
+            support = max(fit.support, 0.99 * motion.support)
+            motion = motion.with_rate(c.lag, rate_of(fit, c, now), support)
+            if i > 0 and c.span_s > 0.3 and m.background.moves_as(fit, t.centre):
+                continue
+        elif i > 0 and c.lag > 1:
+            motion = replace(motion, support=0.8 * motion.support)
+            if motion.support < 4:
                 continue
         motions.append(motion)
     motions = motions or [t.motions[0]]
-    return replace(t, motions=tuple(motions))
+    whole = t.whole
+    if len(motions) > 1:
+        # One shift for all parts together: what the edges of one leave open, those of others close.
+        fit = fit_affine(c, mine.astype(np.float32), models[0], rigidity=1e4, slack=0.5)
+        if fit.support >= 5:
+            whole = rate_of(fit, c, now)
+    return replace(t, motions=tuple(motions), whole=whole)
+
+
+def reach_of(scene: Scene, tracks: tuple[Track, ...], prior: Floats) -> NDArray[np.bool_]:
+    """Which cells each track may claim, (count, K) bool: its own, their neighbours, its hidden."""
+    members = prior[:, 1:-1] > 0.3
+    for k, t in enumerate(tracks):
+        if t.hidden is not None:
+            members[:, k] |= scene.cells.mean(t.hidden) > 0.3
+    return scene.cells.reach(members, REACH_STEPS)
 
 
 def explain(
@@ -137,7 +180,7 @@ def explain(
     out = np.zeros((n, len(tracks) + 2), dtype=np.float32)
     has = np.zeros(n, dtype=bool)
     at = scene.cell_of(scene.points.xy)
-    near = scene.cells.reach(prior[:, 1:-1] > 0.3, REACH_STEPS)[at]
+    near = reach_of(scene, tracks, prior)[at]
     least = -0.5 * settings.outlier**2
     for m in scene.measured:
         c = m.constraints
@@ -145,7 +188,8 @@ def explain(
         zero = m.background.log_likelihood(c)
         for k, t in enumerate(tracks, 1):
             parts = t.predicted(c.lag, c.span_s)
-            fit = np.max([log_likelihood(p, c, slack_of(p, t.centre)) for p in parts], axis=0)
+            each = np.stack([log_likelihood(p, c, slack_of(p, t.centre)) for p in parts])
+            fit = each.max(axis=0)
             fit = np.where(near[c.index, k - 1], fit, 3 * least)
             out[c.index, k] += np.maximum(fit, 3 * least)
         out[c.index, 0] += np.maximum(zero, 3 * least)

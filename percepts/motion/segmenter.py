@@ -20,7 +20,15 @@ from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, update
 from visup.percepts.motion.report import obey, report
-from visup.percepts.motion.scene import Measured, Scene, expected, explain, fit_tracks, outside
+from visup.percepts.motion.scene import (
+    Measured,
+    Scene,
+    expected,
+    explain,
+    fit_tracks,
+    outside,
+    reach_of,
+)
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels, superpixels
 from visup.percepts.motion.tracking import Track, carry, priors, transition
@@ -77,7 +85,7 @@ class MotionSegmenter:
         likelihood, has = explain(scene, tracks, priors(tracks, cells), self.settings)
         likelihood = obey(directives, scene, likelihood)
         prior = priors(tracks, cells)
-        near = cells.reach(prior[:, 1:-1] > 0.3, 2)
+        near = reach_of(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
         posterior = label(cells, scene.points, likelihood, has, prior, more, self.settings)
@@ -100,7 +108,7 @@ class MotionSegmenter:
         points = find_points(image, self.settings.cell, self.settings.noise)
         flow = flow_back(image.grey, old.grey, self._engine)
         step = transition(before, cells, flow, self._grid)
-        tracks = tuple(carry(t, step, seconds) for t in self._tracks)
+        tracks = tuple(carry(t, step, before, cells, seconds) for t in self._tracks)
         owner = priors(tracks, cells).argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         measured = [self._measure(scene, tracks, 1, flow)]

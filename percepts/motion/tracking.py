@@ -20,6 +20,7 @@ from visup.percepts.motion.layers import Affine, Doubles
 from visup.percepts.motion.superpixels import Superpixels
 
 Indices = NDArray[np.int64]
+PACE_S = 1.0  # time over which the pace of a track follows its measured velocity, seconds
 FADE = 0.4  # share of the memory of where a track was that is left after a second
 
 
@@ -105,12 +106,16 @@ class Track:
         share: (count,) float32, probability that each superpixel shows it.
         hidden: (h, w) float32, where others hide it; None when they do not.
         motions: Of its rigid parts; an arm has several.
+        whole: The one motion that suits all parts best.
         recent: (count,) float32, where it was of late: parts that turn up there are its own.
         evidence: How much better its own motion explains it than the background's did (log
             likelihood, running sum).
         frames: In how many frames it was visible.
         centre: (x, y) centroid when last visible, working pixels.
+        mostly_hidden: Whether others hide a third of it or more.
+        pace: (vx, vy) when it was last in full view, pixels per second.
         drift: (x, y) of motion not yet applied to `hidden`, pixels.
+        own: (count,) float32, where it would be by its own motion alone.
         apart: Seconds for which it was seen apart from other tracks, by key.
         alike: Votes that it is one with another track, by key.
     """
@@ -122,11 +127,15 @@ class Track:
     share: Floats
     hidden: Floats | None = None
     motions: tuple[Motion, ...] = ()
+    whole: Rate | None = None
     recent: Floats | None = None
     evidence: float = 0.0
     frames: int = 0
     centre: tuple[float, float] = (0.0, 0.0)
+    mostly_hidden: bool = False
+    pace: tuple[float, float] = (0.0, 0.0)
     drift: tuple[float, float] = (0.0, 0.0)
+    own: Floats | None = None
     apart: Mapping[int, float] = field(default_factory=_nothing)
     alike: Mapping[int, float] = field(default_factory=_nothing)
 
@@ -135,9 +144,11 @@ class Track:
         return tuple(m.predicted(lag, span_s, self.centre) for m in self.motions)
 
     def best_rate(self) -> Rate | None:
-        """The rate of the part with most support."""
+        """The rate of the whole, or of the only part."""
         if not self.motions:
             return None
+        if len(self.motions) > 1 and self.whole is not None:
+            return self.whole
         main = max(self.motions, key=lambda m: m.support)
         return main.best_rate(self.centre)
 
@@ -169,34 +180,42 @@ def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -
     return sparse.diags(1.0 / new.area).astype(np.float32) @ joint
 
 
-def carry(track: Track, step: sparse.csr_matrix, seconds: float) -> Track:
-    """Bring a track to the next frame: the visible goes with the flow, the hidden with its motion.
+def carry(
+    track: Track, step: sparse.csr_matrix, old: Superpixels, new: Superpixels, seconds: float
+) -> Track:
+    """Bring a track to the next frame.
 
-    Hidden parts are moved by whole pixels, so that they are not blurred by many small moves.
+    What is visible goes with the flow. Where it would be by its own motion is kept as well: if
+    another object turns up there, the track is hidden behind it. That map is moved by whole pixels,
+    so that it is not blurred by many small moves.
 
     Args:
         track: The track as of the frame before.
         step: The transition between superpixels.
+        old: Superpixels of the frame before.
+        new: Superpixels of the newest frame.
         seconds: Between the two frames.
 
     Returns:
         The track as predicted for the newest image.
     """
     share = np.asarray(step @ track.share, dtype=np.float32)
+    recent = share
     if track.recent is not None:
         recent = FADE**seconds * np.asarray(step @ track.recent, dtype=np.float32)
-        track = replace(track, recent=np.maximum(recent, share))
-    if track.hidden is None:
-        return replace(track, share=share)
-    rate = track.best_rate()
-    moved = rate.velocity(track.centre) * seconds if rate is not None else np.zeros(2)
-    drift = np.asarray(track.drift) + moved
+    drift = np.asarray(track.drift) + np.asarray(track.pace) * seconds
     whole = np.round(drift)
     rest = drift - whole
+    own = (track.share > 0.5).astype(np.float32)[old.labels]
+    if track.hidden is not None:
+        own = np.maximum(own, track.hidden)
+    own = shift(own, int(whole[0]), int(whole[1]))
     return replace(
         track,
         share=share,
-        hidden=shift(track.hidden, int(whole[0]), int(whole[1])),
+        recent=np.maximum(recent, share),
+        hidden=None if track.hidden is None else shift(track.hidden, int(whole[0]), int(whole[1])),
+        own=new.mean(own),
         drift=(float(rest[0]), float(rest[1])),
     )
 
@@ -223,6 +242,13 @@ def priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
     out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
     for k, track in enumerate(tracks, 1):
         out[:, k] = track.share
+    for track in tracks:
+        if track.hidden is not None:
+            # An occluder is expected no further than its own motion takes it.
+            there = cells.mean(track.hidden) > 0.3
+            for k, other in enumerate(tracks, 1):
+                if other is not track and other.own is not None:
+                    out[there, k] = np.minimum(out[there, k], other.own[there])
     free = np.clip(1 - out.sum(axis=1), 0, 1)
     for k, track in enumerate(tracks, 1):
         if track.hidden is not None:
@@ -269,11 +295,17 @@ def remember(
     if seen:
         where = (cells.centre[mine] * cells.area[mine, None]).sum(axis=0) / area
         centre = (float(where[0]), float(where[1]))
-    covered = track.share > 0.5
-    if track.hidden is not None:
-        covered |= cells.mean(track.hidden) > 0.5
-    covered &= (winner > 0) & ~mine
-    hidden = covered.astype(np.float32)[cells.labels] if covered.any() else None
+    pace = track.pace
+    rate = track.best_rate()
+    if seen and not track.mostly_hidden and rate is not None:
+        # Slowly, lest the first signs of an occluder be taken for the object's own motion.
+        follow = 1.0 if track.frames < 15 else min(1.0, (now - track.seen) / PACE_S)
+        velocity = np.asarray(pace) * (1 - follow) + rate.velocity(centre) * follow
+        pace = (float(velocity[0]), float(velocity[1]))
+    covered = (winner > 0) & ~mine & (track.own > 0.5 if track.own is not None else False)
+    # A cell or two beside another object is no occlusion.
+    much = cells.area[covered].sum() > max(0.05 * area, 0.3 * least)
+    hidden = covered.astype(np.float32)[cells.labels] if much else None
     return replace(
         track,
         share=share,
@@ -281,6 +313,7 @@ def remember(
         hidden=hidden,
         seen=now if seen else track.seen,
         frames=track.frames + int(seen),
-        centre=centre,
-        drift=track.drift if hidden is not None else (0.0, 0.0),
+        centre=track.centre if track.mostly_hidden else centre,
+        mostly_hidden=bool(cells.area[covered].sum() > 0.5 * area),
+        pace=pace,
     )
