@@ -22,7 +22,7 @@ def moving_disc(count: int = 40, size: tuple[int, int] = (96, 72)) -> list[NDArr
         grey = ground.copy()
         x, y = 8 + i, height // 2 - 15
         grey[y : y + 31, x : x + 31][inside] = disc[inside]
-        images.append(np.repeat(grey[:, :, None], 3, axis=2))
+        images.append(np.asarray(np.repeat(grey[:, :, None], 3, axis=2), np.uint8))
     return images
 
 
