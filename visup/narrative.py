@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.console import Console
@@ -45,7 +46,7 @@ class Narrator:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Print the events of one step."""
-        for event in step.events:
+        for event in step.events if self.as_json else worded_once(step.events):
             self.tell(event)
 
     def tell(self, event: Event) -> None:
@@ -54,6 +55,16 @@ class Narrator:
             print(json.dumps(event_line(event), ensure_ascii=False, sort_keys=True), flush=True)
         else:
             self.console.print(line(event))
+
+
+def worded_once(events: Sequence[Event]) -> list[Event]:
+    """Events for people: of several with the same words (a stage fails, an alert opens) the gravest."""
+    gravest: dict[str, Event] = {}
+    for event in events:
+        held = gravest.get(event.text)
+        if held is None or event.severity > held.severity:
+            gravest[event.text] = event
+    return list(gravest.values())
 
 
 def line(event: Event) -> Table:

@@ -13,7 +13,7 @@ from rich.tree import Tree
 
 from visup.agent import Frame, Mind, ObjectBelief
 from visup.agent.agent import Agent, Step
-from visup.narrative import line
+from visup.narrative import line, worded_once
 
 Predicate = Callable[[Step], bool]
 HELP = """\
@@ -105,7 +105,7 @@ class Session:
         for frame in islice(self._frames, count):
             self._last = self.agent.step(frame)
             taken += 1
-            told = [line(e) for e in self._last.events]
+            told = [line(e) for e in worded_once(self._last.events)]
             self._events = [*self._events, *told][-1000:]
             for text in told:
                 self.console.print(text)
