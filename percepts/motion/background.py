@@ -15,6 +15,7 @@ from visup.percepts.motion.layers import (
     STILL,
     Affine,
     distances,
+    fit_bent,
     fit_dominant,
     log_likelihood,
     spread_weights,
@@ -85,12 +86,14 @@ class Background:
         fixed: Whether something is seen to be fixed to the camera while the rest moves; None when
             the baseline is too short to tell.
         ground: Which motion prevails where.
+        sure: Whether the camera's motion was seen across the view, or only predicted.
     """
 
     models: tuple[Affine, ...]
     scale: float
     fixed: bool | None
     ground: Ground
+    sure: bool
 
     def distances(self, c: Constraints) -> Floats:
         """Squared distance of each constraint to the likeliest background motion, (N,) float32."""
@@ -142,9 +145,11 @@ def find_background(
     if still_too:
         # What is fixed comes first, or a bending fit would swallow it with what drifts.
         moving = _wide(c, outside * (to_still > 9), shape, seed)
-        models = [still, moving or fit_dominant(c, weight, (still, guess), seed)]
+        camera = moving or _camera(c, outside, weight, (still, guess), shape, seed)
+        models = [still, camera or guess]
     else:
-        models = [fit_dominant(c, weight, (still, guess), seed)]
+        camera = _camera(c, outside, weight, (still, guess), shape, seed)
+        models = [camera or guess]
         away = distances(models[0], c, 0.15) > 16
         second = _wide(c, outside * away, shape, seed)
         models = models if second is None else [second, models[0]]
@@ -153,7 +158,8 @@ def find_background(
         models.insert(0, still)
     rest = np.min([distances(m, c, 0.15) for m in models], axis=0)
     ground = ground.seen(c, outside, tuple(models))
-    return Background(tuple(models), _scale(rest, weight, cell), fixed, ground)
+    scale = _scale(rest, weight, cell)
+    return Background(tuple(models), scale, fixed, ground, camera is not None)
 
 
 def _is_fixed(c: Constraints, outside: Floats, to_dominant: Floats) -> bool | None:
@@ -163,22 +169,47 @@ def _is_fixed(c: Constraints, outside: Floats, to_dominant: Floats) -> bool | No
     return bool(np.count_nonzero(tight) >= 8)
 
 
+def _camera(
+    c: Constraints,
+    outside: Floats,
+    weight: Floats,
+    guesses: tuple[Affine, ...],
+    shape: tuple[int, int],
+    seed: int,
+) -> Affine | None:
+    """The camera's motion; a motion that fills no more than a part of the view is not that."""
+    model = fit_dominant(c, weight, guesses, seed)
+    if not _spans(c, model, outside, shape, 0.15):
+        return None
+    moved = float(np.median(np.hypot(*model.at(c.xy).T)))
+    return fit_bent(c, weight * 20, model) if moved > 0.5 else model
+
+
 def _wide(c: Constraints, weight: Floats, shape: tuple[int, int], seed: int) -> Affine | None:
     """A motion that spans the image, such as a planet behind; objects are narrower than that."""
     if np.count_nonzero(weight) < 30:
         return None
-    balanced, cell = spread_weights(c.xy, shape, weight)
+    balanced, _ = spread_weights(c.xy, shape, weight)
     model = fit_dominant(c, balanced, (Affine(STILL),), seed + 1)
+    return model if _spans(c, model, weight, shape, 0.28) else None
+
+
+def _spans(
+    c: Constraints, model: Affine, weight: Floats, shape: tuple[int, int], share: float
+) -> bool:
+    """Whether the constraints that fit a motion reach across the image and fill a share of it."""
     fits = (distances(model, c, 0.15) < 9) & (weight > 0)
+    _, cell = spread_weights(c.xy, shape, weight)
     rows, cols = GRID
-    points_in = np.bincount(cell[fits], minlength=rows * cols).reshape(rows, cols) >= 2
-    wide = points_in.any(0).sum() >= 0.7 * cols or points_in.any(1).sum() >= 0.8 * rows
-    return model if wide and points_in.sum() >= 0.28 * rows * cols else None
+    filled = np.bincount(cell[fits], minlength=rows * cols).reshape(rows, cols) >= 2
+    across = filled.any(0).sum() >= 0.7 * cols or filled.any(1).sum() >= 0.8 * rows
+    return bool(across and filled.sum() >= share * rows * cols)
 
 
-def _scale(m2: Floats, weight: Floats, cell: Floats) -> float:
+def _scale(m2: Floats, weight: Floats, cell: NDArray[np.int64]) -> float:
     """Robust width of the errors of the background, from their weighted 40 % quantile."""
-    if weight.sum() <= 0:
+    # From a small part of the view nothing can be said of the whole.
+    if len(np.unique(cell[weight > 0])) < 0.25 * GRID[0] * GRID[1]:
         return 1.0
     order = np.argsort(m2, kind="stable")
     cumulated = np.cumsum(weight[order])

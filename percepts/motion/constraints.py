@@ -132,39 +132,10 @@ def mahalanobis(error: Floats, information: Floats) -> Floats:
     return np.asarray(a * dx * dx + 2 * b * dx * dy + c * dy * dy, dtype=np.float32)
 
 
-def from_flow(
-    points: Points, flow: Floats, old: WorkImage, new: WorkImage, noise: float
-) -> Constraints:
-    """Constraints over one frame, read from a dense flow field where there is structure.
-
-    Args:
-        points: Points of the newest image.
-        flow: (h, w, 2) float32, from the newest image back to the old one.
-        old: The image before.
-        new: The newest image.
-        noise: Standard deviation of grey values.
-
-    Returns:
-        Constraints; points that left the image or whose grey value did not fit are left out.
-    """
-    x, y = points.xy.astype(np.int64).T
-    back = flow[y, x]
-    target = points.xy + back
-    height, width = new.shape
-    inside = (target >= 0).all(1) & (target[:, 0] < width - 1) & (target[:, 1] < height - 1)
-    there = cv2.remap(old.grey, target[:, None].astype(np.float32), None, cv2.INTER_LINEAR)
-    misfit = np.abs(there.ravel().astype(np.float32) - new.grey[y, x].astype(np.float32))
-    keep = np.flatnonzero(inside & (misfit < 6 * noise + 20))
-    sigma = np.maximum(3 * noise, misfit[keep]).astype(np.float32)
-    information = information_of(points.tensor[keep], sigma, 2 * FLOOR)
-    span = new.time - old.time
-    return Constraints(1, span, keep, points.xy[keep], -back[keep], information)
-
-
 def track(
     points: Points, guess: Floats, old: WorkImage, new: WorkImage, lag: int, noise: float
 ) -> Constraints:
-    """Constraints over a longer baseline, each point checked forward and backward.
+    """Constraints over one baseline, each point checked forward and backward.
 
     Args:
         points: Points of the newest image.
@@ -207,6 +178,48 @@ def track(
     keep = np.flatnonzero(ok)
     moved = points.xy[keep] - there[keep, 0]
     return Constraints(lag, new.time - old.time, keep, points.xy[keep], moved, information[keep])
+
+
+def with_flow(
+    c: Constraints, points: Points, flow: Floats, old: WorkImage, new: WorkImage, noise: float
+) -> Constraints:
+    """Fill in, from a dense flow field, points that could not be followed one by one.
+
+    Blurred and bending things are lost by tracking points, and are just what moves. The flow is
+    trusted less, and only where grey values fit.
+
+    Args:
+        c: Constraints over one frame.
+        points: N points of the newest image.
+        flow: (h, w, 2) float32, from the newest image back to the old one.
+        old: The image before.
+        new: The newest image.
+        noise: Standard deviation of grey values.
+
+    Returns:
+        The constraints with those of the flow behind them.
+    """
+    lost = np.setdiff1d(np.arange(len(points)), c.index)
+    if not len(lost):
+        return c
+    x, y = points.xy[lost].astype(np.int64).T
+    back = flow[y, x]
+    at = np.rint(points.xy[lost] + back).astype(np.int64)
+    height, width = new.shape
+    inside = (at >= 0).all(axis=1) & (at[:, 0] < width) & (at[:, 1] < height)
+    at = np.clip(at, 0, [width - 1, height - 1])
+    misfit = np.abs(old.grey[at[:, 1], at[:, 0]].astype(np.float32) - new.grey[y, x])
+    keep = inside & (misfit < 6 * noise + 15)
+    sigma = np.maximum(3 * noise, misfit[keep]).astype(np.float32)
+    information = information_of(points.tensor[lost[keep]], sigma, 5 * FLOOR)
+    return Constraints(
+        c.lag,
+        c.span_s,
+        np.concatenate([c.index, lost[keep]]),
+        np.concatenate([c.xy, points.xy[lost[keep]]]),
+        np.concatenate([c.moved, -back[keep]]),
+        np.concatenate([c.information, information]),
+    )
 
 
 def _nothing() -> tuple[Floats, Floats, Floats]:

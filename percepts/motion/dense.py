@@ -9,6 +9,7 @@ evidence stays between the labels.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -136,13 +137,26 @@ def compare(
     sigma2 = (1.5 * noise) ** 2 + (0.35 * slope) ** 2
     best = np.full((h, w), np.inf, dtype=np.float32)
     for model in models:
-        back = np.eye(2, 3) - model.matrix
-        back[:, 2] += back[:, :2] @ np.array([x, y]) - np.array([0, 0])
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        there = cv2.warpAffine(old.grey, back, (w, h), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        there = _warp(old.grey, model, box)
         off = cv2.blur(np.abs(here - there.astype(np.float32)), (3, 3))
         best = np.minimum(best, off * off)
     return np.asarray(-0.5 * np.minimum(best / sigma2, 9.0), dtype=np.float32)
+
+
+def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]) -> NDArray[Any]:
+    """An old image as a layer's motion brings it to a part of the newest one."""
+    x, y, w, h = box
+    if model.bend is not None:
+        ys, xs = np.mgrid[y : y + h, x : x + w]
+        at = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
+        source = (at - model.at(at)).reshape(h, w, 2)
+        return cv2.remap(
+            grey, source, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+    back = np.eye(2, 3) - model.matrix
+    back[:, 2] += back[:, :2] @ np.array([x, y])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return cv2.warpAffine(grey, back, (w, h), flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
 
 def warped(

@@ -53,7 +53,7 @@ def discover(
                 break
             weight = np.zeros(len(c), dtype=np.float32)
             weight[left] = 1
-            start = _middle(c, left)
+            start = middle(c, left)
             slack = slack_of(start)
             model = fit_affine(c, weight, start, rigidity=10.0, rounds=6, slack=slack)
             fits = distances(model, c, slack)[left] < 9
@@ -78,7 +78,7 @@ def slack_of(model: Affine, where: tuple[float, float] = (0.0, 0.0)) -> float:
     return 0.15 + 0.05 * float(np.hypot(*moved))
 
 
-def _middle(c: Constraints, index: NDArray[np.int64]) -> Affine:
+def middle(c: Constraints, index: NDArray[np.int64]) -> Affine:
     """Constant motion to start from: the median over the constraints."""
     matrix = np.zeros((2, 3))
     matrix[:, 2] = np.median(c.moved[index], axis=0)
@@ -87,7 +87,9 @@ def _middle(c: Constraints, index: NDArray[np.int64]) -> Affine:
 
 def rate_of(model: Affine, c: Constraints, now: float) -> Rate:
     """A displacement over a baseline as a motion per second."""
-    return Rate(model.matrix / c.span_s, max(model.sigma, 0.02) / c.span_s, now, c.span_s)
+    bend = None if model.bend is None else model.bend / c.span_s
+    sigma = max(model.sigma, 0.02) / c.span_s
+    return Rate(model.matrix / c.span_s, sigma, now, c.span_s, bend)
 
 
 def same_motion(

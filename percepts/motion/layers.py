@@ -28,19 +28,70 @@ class Affine:
         matrix: (2, 3) float64, pixels of displacement.
         sigma: Standard deviation of its displacements where it was fitted, pixels.
         support: How many constraints it rests on (sum of weights).
+        bend: (2, 3) float64 coefficients of (x^2, xy, y^2) / 1000, for a camera that turns or a
+            scene that is tilted; None for a plain affine motion.
     """
 
     matrix: Doubles
     sigma: float = 0.0
     support: float = 0.0
+    bend: Doubles | None = None
 
     def at(self, xy: Floats) -> Floats:
         """Displacements of (N, 2) positions, (N, 2) float32."""
-        return np.asarray(xy @ self.matrix[:, :2].T + self.matrix[:, 2], dtype=np.float32)
+        out = xy @ self.matrix[:, :2].T + self.matrix[:, 2]
+        if self.bend is not None:
+            out = out + _squares(xy) @ self.bend.T
+        return np.asarray(out, dtype=np.float32)
 
     def scaled(self, factor: float) -> Affine:
         """The same motion over a baseline that is `factor` times as long."""
-        return Affine(self.matrix * factor, self.sigma * factor, self.support)
+        bend = None if self.bend is None else self.bend * factor
+        return Affine(self.matrix * factor, self.sigma * factor, self.support, bend)
+
+
+def _squares(xy: Floats) -> Doubles:
+    x, y = xy.T.astype(np.float64)
+    return np.stack([x * x, x * y, y * y], axis=1) / 1000.0
+
+
+def fit_bent(c: Constraints, weight: Floats, start: Affine, slack: float = 0.15) -> Affine:
+    """A robust quadratic fit, for the background of a camera that moves.
+
+    Args:
+        c: N constraints.
+        weight: (N,) float32, how far each belongs to the layer.
+        start: An affine fit.
+        slack: Error of the model itself, pixels.
+
+    Returns:
+        The bent motion.
+    """
+    info = widened(c.information, slack)
+    centre, spread = c.xy.mean(axis=0), float(c.xy.std()) + 1.0
+    x, y = ((c.xy - centre) / spread).T.astype(np.float64)
+    phi = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
+    moved = c.moved.astype(np.float64)
+    fitted = start.at(c.xy)
+    hold = np.diag([1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-3] * 2) / slack**2
+    for _ in range(5):
+        m2 = mahalanobis((moved - fitted).astype(np.float32), info)
+        w = weight / (1 + m2 / 3.0**2) ** 2
+        model = _solve(phi, info.astype(np.float64), moved, w.astype(np.float64), hold)
+        fitted = np.asarray(phi @ model.T, dtype=np.float32)
+    return _unscaled(model, centre, spread, float(w.sum()))
+
+
+def _unscaled(model: Doubles, centre: Doubles, spread: float, support: float) -> Affine:
+    """A quadratic in centred and scaled coordinates as one in pixels."""
+    a, b, c = (model[:, i] / spread**2 for i in range(3))
+    d, e = model[:, 3] / spread, model[:, 4] / spread
+    x, y = float(centre[0]), float(centre[1])
+    linear_x = d - 2 * a * x - b * y
+    linear_y = e - 2 * c * y - b * x
+    constant = model[:, 5] - d * x - e * y + a * x * x + b * x * y + c * y * y
+    matrix = np.stack([linear_x, linear_y, constant], axis=1)
+    return Affine(matrix, 0.0, support, np.stack([a, b, c], axis=1) * 1000.0)
 
 
 def distances(model: Affine, c: Constraints, slack: float = 0.0) -> Floats:
@@ -141,13 +192,13 @@ def fit_affine(
 
 
 def _solve(phi: Doubles, info: Doubles, residual: Doubles, w: Doubles, hold: Doubles) -> Doubles:
-    """Weighted normal equations of the affine model; (2, 3)."""
+    """Weighted normal equations of a model linear in `phi` (N, K); (2, K)."""
     a, b, c = (info * w[:, None]).T
     dx, dy = residual.T
     blocks = [(phi * k[:, None]).T @ phi for k in (a, b, c)]
     normal = np.block([[blocks[0], blocks[1]], [blocks[1], blocks[2]]]) + hold
     right = np.concatenate([phi.T @ (a * dx + b * dy), phi.T @ (b * dx + c * dy)])
-    return np.asarray(np.linalg.solve(normal, right).reshape(2, 3))
+    return np.asarray(np.linalg.solve(normal, right).reshape(2, -1))
 
 
 def spread_weights(

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from visup.percepts.motion.dense import CLIP
-from visup.percepts.motion.discovery import discover, rate_of, same_motion, slack_of
+from visup.percepts.motion.discovery import discover, middle, rate_of, same_motion, slack_of
 from visup.percepts.motion.image import Floats
-from visup.percepts.motion.layers import distances
-from visup.percepts.motion.scene import Measured, Scene
+from visup.percepts.motion.layers import distances, fit_affine
+from visup.percepts.motion.scene import Measured, Scene, moves_like
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Indices, Motion, Track, remember
 
@@ -23,6 +23,8 @@ NEAR_STEPS = 4
 APART_S = 1.5
 VOTES = 3.0
 MOST_PARTS = 3
+LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
+SURE = 500.0  # the same for one that has only just appeared
 CONTACT = 5.0  # affinity of two cells that are flat and of one tone
 
 
@@ -66,7 +68,7 @@ def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> T
                 motions=(motion,),
                 centre=(float(middle[0]), float(middle[1])),
             )
-            host = _territory(out, share > 0, scene)
+            host = _territory(out, share > 0, motion, scene)
             if host is None:
                 out.append(t)
             else:
@@ -75,10 +77,17 @@ def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> T
     return tuple(out)
 
 
-def _territory(tracks: Sequence[Track], where: NDArray[np.bool_], scene: Scene) -> int | None:
+def _territory(
+    tracks: Sequence[Track], where: NDArray[np.bool_], motion: Motion, scene: Scene
+) -> int | None:
     """The track that is hidden in most of these cells, or else was of late in most of them."""
     for i, t in enumerate(tracks):
-        if t.id and t.hidden is not None and scene.cells.mean(t.hidden)[where].mean() > 0.5:
+        if (
+            t.id
+            and t.hidden is not None
+            and scene.cells.mean(t.hidden)[where].mean() > 0.5
+            and moves_like(motion, t)
+        ):
             return i
     for i, t in enumerate(tracks):
         if not t.id or t.recent is None:
@@ -128,8 +137,13 @@ def update(
     return tuple(out)
 
 
-def absorb(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:
-    """Parts that move as no layer does and touch a track join it: limbs, wheels, shadows."""
+def absorb(
+    tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings, born: int
+) -> Tracks:
+    """Give parts that move as no layer does to the track that they touch, or make them tracks.
+
+    Limbs, wheels and shadows join their object; what stands alone is something new.
+    """
     unknown = np.flatnonzero(winner == len(tracks) + 1)
     if not len(unknown):
         return tracks
@@ -139,13 +153,51 @@ def absorb(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettin
         part = np.zeros(scene.cells.count, dtype=bool)
         part[unknown[number == i]] = True
         ring = scene.cells.reach(part[:, None], 1)[:, 0] & ~part
-        beside = winner[ring]
-        for k, t in enumerate(out, 1):
-            if np.mean(beside == k) > 0.3:
-                share = np.where(part, 1, t.share).astype(np.float32)
-                out[k - 1] = replace(t, share=share)
-                break
+        # Whose place it was counts first, then whom it touches.
+        k = _most(scene.owner[part], len(tracks), 0.3)
+        k = _most(winner[ring], len(tracks), 0.25) if k is None else k
+        if k is not None:
+            share = np.where(part, 1, out[k].share).astype(np.float32)
+            out[k] = replace(out[k], share=share)
+        elif scene.cells.area[part].sum() > least_area(scene, settings):
+            t = _alone(part, scene, born + 1)
+            if t is not None and len(out) < settings.max_regions:
+                born += 1
+                out.append(t)
     return tuple(out)
+
+
+def _most(labels: Indices, count: int, share: float) -> int | None:
+    """The track, from 0, that has more than a share of some labels and more than any other."""
+    if not count or not len(labels):
+        return None
+    numbers = np.bincount(labels, minlength=count + 2)[1 : count + 1]
+    k = int(numbers.argmax())
+    return k if numbers[k] > share * len(labels) else None
+
+
+def _alone(part: NDArray[np.bool_], scene: Scene, key: int) -> Track | None:
+    """A new track for cells that move as no layer does; None when there is too little to go by."""
+    c = scene.measured[0].constraints
+    inside = np.flatnonzero(part[scene.cell_of(c.xy)])
+    if len(inside) < 6:
+        return None
+    weight = np.zeros(len(c), dtype=np.float32)
+    weight[inside] = 1
+    start = middle(c, inside)
+    fit = fit_affine(c, weight, start, slack=slack_of(start))
+    motion = Motion().with_rate(c.lag, rate_of(fit, c, scene.time), float(len(inside)))
+    centre = scene.cells.centre[part].mean(axis=0)
+    return Track(
+        key,
+        0,
+        scene.time,
+        scene.time,
+        part.astype(np.float32),
+        motions=(motion,),
+        centre=(float(centre[0]), float(centre[1])),
+        evidence=10.0,
+    )
 
 
 def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:
@@ -269,8 +321,8 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
     """
     out = []
     for t in tracks:
-        lasted = scene.time - t.born >= settings.confirm_s and t.frames >= 3
-        if not t.id and lasted and t.evidence > 60 and t.seen == scene.time:
+        enough = SURE if scene.time - t.born < settings.confirm_s else LIKELY
+        if not t.id and t.frames >= 3 and t.evidence > enough and t.seen == scene.time:
             ids += 1
             t = replace(t, id=ids)
         out.append(t)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.background import Background
 from visup.percepts.motion.constraints import Constraints, Points
-from visup.percepts.motion.discovery import rate_of, slack_of
+from visup.percepts.motion.discovery import middle, rate_of, slack_of
 from visup.percepts.motion.image import Floats, WorkImage
 from visup.percepts.motion.layers import Affine, distances, fit_affine, log_likelihood
 from visup.percepts.motion.settings import MotionSettings
@@ -92,19 +92,11 @@ def fit_tracks(tracks: tuple[Track, ...], scene: Scene) -> tuple[Track, ...]:
         c = m.constraints
         at = scene.owner[scene.cell_of(c.xy)]
         tracks = tuple(_fit(t, m, at == k, scene.time) for k, t in enumerate(tracks, 1))
-    hidden = [t for t in tracks if t.mostly_hidden]
-    return tuple(_disown(t, [h for h in hidden if h is not t]) for t in tracks)
+    return tracks
 
 
-def _disown(t: Track, hidden: list[Track]) -> Track:
-    """Drop parts that move as something hidden does: it is coming out from behind this track."""
-    if len(t.motions) < 2 or not hidden:
-        return t
-    kept = [m for m in t.motions if not any(_moves_like(m, h) for h in hidden)]
-    return replace(t, motions=tuple(kept) or t.motions[:1])
-
-
-def _moves_like(motion: Motion, other: Track) -> bool:
+def moves_like(motion: Motion, other: Track) -> bool:
+    """Whether a part moves as a track did when it was last in full view."""
     rate = motion.best_rate(other.centre)
     if rate is None:
         return False
@@ -131,6 +123,10 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
     for i, (motion, start) in enumerate(zip(t.motions, models, strict=True)):
         weight = (mine & (nearest == i)).astype(np.float32)
         fit = fit_affine(c, weight, start, slack=slack_of(start, t.centre))
+        if i == 0 and fit.support < 0.5 * weight.sum():
+            # It may have stopped or turned: what most of its points do is tried as well.
+            other = fit_affine(c, weight, middle(c, np.flatnonzero(weight)), slack=0.3)
+            fit = other if other.support > fit.support else fit
         # A part that is nearly hidden tells little of its motion: what was known is kept.
         if fit.support >= max(5.0, clear * motion.support):
             support = max(fit.support, 0.99 * motion.support)

@@ -14,8 +14,9 @@ import numpy as np
 
 from visup.agent import Directive, Frame, Region
 from visup.percepts.motion.background import bare_ground, find_background
-from visup.percepts.motion.constraints import find_points, from_flow, track
+from visup.percepts.motion.constraints import find_points, track, with_flow
 from visup.percepts.motion.dense import flow_back, label, warped
+from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, update
@@ -31,7 +32,7 @@ from visup.percepts.motion.scene import (
 )
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels, superpixels
-from visup.percepts.motion.tracking import Track, carry, priors, transition
+from visup.percepts.motion.tracking import Rate, Track, carry, priors, transition
 
 
 class MotionSegmenter:
@@ -53,7 +54,7 @@ class MotionSegmenter:
         self._cells: Superpixels | None = None
         self._grid: Floats = np.zeros((0, 0, 2), np.float32)
         self._ground = bare_ground((1, 1))
-        self._camera: dict[int, Affine] = {}
+        self._camera: dict[int, Rate] = {}
         self._fixed_until: float | None = None
         self._count = self._born = self._ids = 0
 
@@ -91,7 +92,8 @@ class MotionSegmenter:
         posterior = label(cells, scene.points, likelihood, has, prior, more, self.settings)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
-        tracks = absorb(tracks, scene, winner, self.settings)
+        tracks = absorb(tracks, scene, winner, self.settings, self._born)
+        self._born = max([self._born, *(t.key for t in tracks)])
         tracks = merge(tracks, scene, winner, self.settings)
         tracks, self._ids = confirm(
             bury(tracks, scene, self.settings), scene, self._ids, self.settings
@@ -124,12 +126,15 @@ class MotionSegmenter:
         """Constraints over one baseline, and the background that they show."""
         image, points = scene.image, scene.points
         old = self._history.back(lag)
-        camera = self._camera.get(lag, Affine(np.zeros((2, 3))))
+        camera = self._predicted(image.time, image.time - old.time)
         if lag == 1:
-            c = from_flow(points, flow, old, image, self.settings.noise)
+            x, y = points.xy.astype(np.int64).T
+            guess = points.xy + flow[y, x]
         else:
             guess = expected(scene, tracks, camera, lag, image.time - old.time)
-            c = track(points, guess, old, image, lag, self.settings.noise)
+        c = track(points, guess, old, image, lag, self.settings.noise)
+        if lag == 1:
+            c = with_flow(c, points, flow, old, image, self.settings.noise)
         # Until a baseline is long enough to tell, what is still in the image may be background.
         still_too = self._fixed_until is None or image.time < self._fixed_until
         clear = outside(scene)[c.index]
@@ -139,8 +144,18 @@ class MotionSegmenter:
             until = self._fixed_until or 0.0
             hold = image.time + 2 * max(self.settings.lags_s)
             self._fixed_until = max(until, hold) if bg.fixed else until
-        self._camera[lag] = bg.models[-1]
+        if bg.sure:
+            self._camera[lag] = rate_of(bg.models[-1], c, image.time)
         return Measured(c, bg)
+
+    def _predicted(self, now: float, span: float) -> Affine:
+        """The camera's motion over a baseline, from the nearest baseline that showed it of late."""
+        fresh = [r for r in self._camera.values() if now - r.time < 1.0]
+        if not fresh:
+            return Affine(np.zeros((2, 3)))
+        nearest = min(fresh, key=lambda r: abs(np.log(r.span_s / span)))
+        bend = None if nearest.bend is None else nearest.bend * span
+        return Affine(nearest.matrix * span, bend=bend)
 
 
 def _grid(shape: tuple[int, int]) -> Floats:

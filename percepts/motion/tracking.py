@@ -20,6 +20,7 @@ from visup.percepts.motion.layers import Affine, Doubles
 from visup.percepts.motion.superpixels import Superpixels
 
 Indices = NDArray[np.int64]
+PATH_S = 2.8  # how long the way of a track is remembered, seconds
 PACE_S = 1.0  # time over which the pace of a track follows its measured velocity, seconds
 FADE = 0.4  # share of the memory of where a track was that is left after a second
 
@@ -33,12 +34,14 @@ class Rate:
         sigma: Standard deviation, pixels per second.
         time: When it was measured, seconds.
         span_s: Baseline, seconds.
+        bend: Quadratic part, as in `Affine`, per second, or None.
     """
 
     matrix: Doubles
     sigma: float
     time: float
     span_s: float
+    bend: Doubles | None = None
 
     def velocity(self, where: tuple[float, float]) -> Doubles:
         """(vx, vy) at a position, pixels per second."""
@@ -116,6 +119,7 @@ class Track:
         pace: (vx, vy) when it was last in full view, pixels per second.
         drift: (x, y) of motion not yet applied to `hidden`, pixels.
         own: (count,) float32, where it would be by its own motion alone.
+        path: (time, x, y) of its displacement since birth, over the longest baseline.
         apart: Seconds for which it was seen apart from other tracks, by key.
         alike: Votes that it is one with another track, by key.
     """
@@ -136,12 +140,42 @@ class Track:
     pace: tuple[float, float] = (0.0, 0.0)
     drift: tuple[float, float] = (0.0, 0.0)
     own: Floats | None = None
+    path: tuple[tuple[float, float, float], ...] = ()
     apart: Mapping[int, float] = field(default_factory=_nothing)
     alike: Mapping[int, float] = field(default_factory=_nothing)
 
     def predicted(self, lag: int, span_s: float) -> tuple[Affine, ...]:
-        """The displacement of each part over a baseline."""
-        return tuple(m.predicted(lag, span_s, self.centre) for m in self.motions)
+        """The displacement of each part over a baseline.
+
+        An object that stopped or turned within the baseline has not moved by its rate times the
+        time: then the way that it was seen to go is taken.
+        """
+        parts = [m.predicted(lag, span_s, self.centre) for m in self.motions]
+        if len(self.path) > 1:
+            went = self._went(span_s)
+            first = parts[0].at(np.asarray([self.centre], dtype=np.float32))[0]
+            if np.hypot(*(first - went)) > 2 + 0.25 * np.hypot(*went):
+                matrix = np.zeros((2, 3))
+                matrix[:, 2] = went
+                parts[0] = Affine(matrix)
+        return tuple(parts)
+
+    def _went(self, span_s: float) -> Doubles:
+        """Displacement over the last so many seconds, (x, y) pixels; at its rate before birth."""
+        now = self.path[-1]
+        then = min(self.path, key=lambda p: abs(now[0] - span_s - p[0]))
+        seconds = max(now[0] - then[0], 1e-6)
+        return np.array([now[1] - then[1], now[2] - then[2]]) * (span_s / seconds)
+
+    def brisk(self) -> Doubles:
+        """Velocity over the shortest baselines, (vx, vy) pixels per second."""
+        if not self.motions or not self.motions[0].rates:
+            return np.zeros(2)
+        rates = list(self.motions[0].rates.values())
+        newest = max(r.time for r in rates)
+        short = min(r.span_s for r in rates)
+        near = [r for r in rates if newest - r.time < 0.3 and r.span_s < short + 0.2] or rates
+        return min(near, key=lambda r: r.sigma).velocity(self.centre)
 
     def best_rate(self) -> Rate | None:
         """The rate of the whole, or of the only part."""
@@ -206,6 +240,10 @@ def carry(
     drift = np.asarray(track.drift) + np.asarray(track.pace) * seconds
     whole = np.round(drift)
     rest = drift - whole
+    step_xy = track.brisk() * seconds
+    last = track.path[-1] if track.path else (track.born, 0.0, 0.0)
+    here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
+    path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
     own = (track.share > 0.5).astype(np.float32)[old.labels]
     if track.hidden is not None:
         own = np.maximum(own, track.hidden)
@@ -216,6 +254,7 @@ def carry(
         recent=np.maximum(recent, share),
         hidden=None if track.hidden is None else shift(track.hidden, int(whole[0]), int(whole[1])),
         own=new.mean(own),
+        path=(*(path or (last,)), here),
         drift=(float(rest[0]), float(rest[1])),
     )
 
