@@ -1,8 +1,9 @@
 """Interpreting: from what was seen to what is going on (paper, section 5 and part of 7.4).
 
 Read in this order: `thinkers.py` (everything, in the order in which it runs), `objects.py` and
-`presence.py` (who is there), `votes.py` (who is who), `relations.py` and `coupling.py` (what holds
-between them), `safety.rules` and `rules.lark` (what to watch for, and the language that says so),
-`sentences.py` (how it is told). Below them lie `history.py` and `measure.py` (samples and quantities)
-and `geometry.py`, `fit.py`, `latch.py` (the mathematics).
+`presence.py` (who is there; one idea each in `adoption.py`, `merging.py`, `fragments.py`,
+`entering.py` and `vanishing.py`), `votes.py` (who is who), `relations.py` and `coupling.py` (what
+holds between them), `safety.rules` and `rules.lark` (what to watch for, and the language that says
+so), `sentences.py` (how it is told). Below them lie `history.py` and `measure.py` (samples and
+quantities) and `geometry.py`, `fit.py`, `latch.py` (the mathematics).
 """

@@ -121,7 +121,8 @@ def outline_gap(a: Region, b: Region, near: float) -> float | None:
     inside_a = _within(outline(a), b.bbox, near)
     inside_b = _within(outline(b), a.bbox, near)
     if len(inside_a) == 0 or len(inside_b) == 0:
-        return None
+        # One may still lie deep within the other.
+        return 0.0 if masks_overlap(a, b) else None
     distance = float(cKDTree(inside_b).query(inside_a)[0].min())
     if distance > 1.5 and masks_overlap(a, b):
         return 0.0

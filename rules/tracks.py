@@ -143,7 +143,8 @@ def follow(track: Track, region: Region, now: float, crowded: bool, allowed_gap_
         fixes=fixes,
         whole=region.bbox if clear else track.whole,
         whole_at=now if clear else track.whole_at,
-        drift=_drift(fixes) if clear else track.drift,
+        # Too few places in the clear tell nothing of how it moves: what is known stays.
+        drift=_drift(fixes) if clear and len(fixes) >= 3 else track.drift,
         reference=reference,
         visible=visible,
     )
@@ -177,15 +178,21 @@ def heading_out(track: Track, frame_size: tuple[int, int], margin: int = 3) -> b
     )
 
 
+def border_sides(region: Region, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
+    """Sides of the image that a region reaches: 'left', 'top', 'right', 'bottom'."""
+    x, y, w, h = region.bbox
+    reached = {
+        "left": x <= margin,
+        "top": y <= margin,
+        "right": x + w >= frame_size[0] - margin,
+        "bottom": y + h >= frame_size[1] - margin,
+    }
+    return frozenset(side for side, at in reached.items() if at)
+
+
 def at_border(region: Region, frame_size: tuple[int, int], margin: int = 3) -> bool:
     """Whether a region is cut by the image border or as good as."""
-    x, y, w, h = region.bbox
-    return (
-        region.cut
-        or min(x, y) <= margin
-        or x + w >= frame_size[0] - margin
-        or y + h >= frame_size[1] - margin
-    )
+    return region.cut or bool(border_sides(region, frame_size, margin))
 
 
 def _coherent(before: Region, after: Region) -> bool:
@@ -209,8 +216,6 @@ def _fixes(fixes: tuple[Fix, ...], fix: Fix) -> tuple[Fix, ...]:
 
 
 def _drift(fixes: tuple[Fix, ...]) -> tuple[float, float]:
-    if len(fixes) < 3:
-        return 0.0, 0.0
     t, x, y = np.array(fixes).T
     t = t - t.mean()
     lever = float((t**2).sum())

@@ -1,0 +1,54 @@
+"""A new region where a missing object should be is that object, which keeps its id."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from visup.agent import ObjectBelief, Presence
+from visup.rules.geometry import box_iou, box_overlap, grow
+from visup.rules.objects import drop_objects, give_region
+from visup.rules.tracks import expected_box
+from visup.rules.work import Work
+
+
+def adopt(work: Work) -> None:
+    """Give new regions to the missing objects that they show."""
+    for new in work.seen():
+        if new.confirmed:
+            continue
+        scored = [(_likeness(work, new, b), b) for b in work.missing() if b.id in work.of]
+        score, old = max(scored, key=lambda s: (s[0], -s[1].id), default=(0.0, new))
+        if score <= 0.0:
+            continue
+        work.mind = drop_objects(work.mind, frozenset({new.id}))
+        work.mind = give_region(work.mind, new.region.id, old.id)
+        taken = replace(old, region=new.region, last_seen=work.now)
+        work.put(taken, merged_with=None, changed_at=work.now)
+
+
+def _likeness(work: Work, new: ObjectBelief, old: ObjectBelief) -> float:
+    """How well a new region suits a missing object; 0 when it does not."""
+    track = work.of[old.id]
+    if track.merged_with is not None:
+        iou = box_iou(new.region.bbox, old.region.bbox)
+        return iou if iou > 0.3 else 0.0
+    ratio = new.region.area / max(track.reference, 1.0)
+    if old.presence is Presence.HIDDEN and work.now - new.first_seen < work.settings.adopt_s:
+        return 0.0
+    if ratio > 1.8 or (track.told == "seen" and ratio < 0.3):
+        return 0.0
+    # The longer it was out of sight, the less is known of where it is.
+    away = min(work.now - track.whole_at, 3.0)
+    place = grow(expected_box(track, work.now), round(4 + 8 * away))
+    within = box_overlap(new.region.bbox, place) / max(1, new.region.bbox[2] * new.region.bbox[3])
+    if within < 0.5 or not _same_name(new, old):
+        return 0.0
+    return within
+
+
+def _same_name(new: ObjectBelief, old: ObjectBelief) -> bool:
+    """Whether two beliefs may be of one thing: not when both have a clear and different name."""
+    if not new.candidates or not old.candidates:
+        return True
+    sure = new.strength > 0.6 and old.strength > 0.6
+    return not sure or new.name == old.name

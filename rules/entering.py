@@ -1,0 +1,38 @@
+"""Who comes: a region that has been seen steadily, and is no part of another object, enters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from visup.agent import ObjectBelief
+from visup.rules.fragments import in_place_of_hidden
+from visup.rules.tracks import at_border
+from visup.rules.work import Work
+
+
+def enter(work: Work, start: float) -> None:
+    """Confirm new objects; `start` is the time of the first observation, seconds."""
+    s = work.settings
+    for belief in work.seen():
+        track = work.of[belief.id]
+        if belief.confirmed or track.sightings < s.least_sightings:
+            continue
+        if work.doubted(belief) or in_place_of_hidden(belief, work.mind, work.of):
+            continue
+        if _negligible(work, belief):
+            continue
+        early = track.coherent_since - start <= s.start_s
+        at_edge = at_border(track.region, work.mind.frame_size)
+        needed = s.entry_s if early or at_edge else s.entry_inside_s
+        if work.now - track.coherent_since < needed - 1e-6:
+            continue
+        work.put(replace(belief, confirmed=True), told="seen")
+        template = "{0} is in view." if early else "{0} enters the field of view."
+        work.tell("entry", template, belief.id, confidence=belief.region.confidence)
+
+
+def _negligible(work: Work, belief: ObjectBelief) -> bool:
+    """Whether a region is a speck, of which nobody says what it is."""
+    width, height = work.mind.frame_size
+    least = work.settings.least_share * width * height
+    return not belief.candidates and belief.region.area < least

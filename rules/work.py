@@ -1,0 +1,105 @@
+"""One step of presence reasoning in the making, and its settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Region
+from visup.rules.fragments import Doubt
+from visup.rules.geometry import box_gap, outline_gap
+from visup.rules.sentences import sentence
+from visup.rules.tracks import Track
+
+
+@dataclass(frozen=True, slots=True)
+class PresenceSettings:
+    """How long things must last before they are told, and how much must show.
+
+    Attributes:
+        entry_s: A region that came over the border, or was there at the start, enters after this.
+        entry_inside_s: The same for one that appears in the middle of the image.
+        start_s: Length of the start, in which every region may be new.
+        least_sightings: Sightings that an entry needs.
+        allowed_gap_s: Longest flicker within a steady sighting.
+        settle_s: How long an object must be missing before exit or occlusion is told.
+        lost_s: The same when nothing explains it.
+        partial_s: How long little must show before exit or occlusion is told.
+        hidden_share: Below this share in sight, beside another region, an object is occluded.
+        leaving_share: Below this share, going over the border, it has left.
+        shown_share: Above this share a hidden object has reappeared.
+        shown_s: How long it must show, or stay in the clear, before that is told.
+        whole_share: An object of which less shows was being hidden, and went up in no other.
+        contact_px: Regions closer than this may hide parts of each other.
+        adopt_s: A new region must be seen this long before it can be a hidden object.
+        least_share: Share of the image below which nobody enters who has not been recognised.
+    """
+
+    entry_s: float = 0.36
+    entry_inside_s: float = 1.0
+    start_s: float = 2.0
+    least_sightings: int = 3
+    allowed_gap_s: float = 0.25
+    settle_s: float = 0.3
+    lost_s: float = 2.0
+    partial_s: float = 0.16
+    hidden_share: float = 0.2
+    leaving_share: float = 0.12
+    shown_share: float = 0.5
+    shown_s: float = 0.12
+    whole_share: float = 0.6
+    contact_px: float = 4.0
+    adopt_s: float = 0.12
+    least_share: float = 0.0005
+
+
+@dataclass(slots=True)
+class Work:
+    """One step in the making; lives only while the thinker runs."""
+
+    mind: Mind
+    observation: Observation
+    of: dict[int, Track]
+    doubts: Mapping[int, Doubt]
+    settings: PresenceSettings
+    events: list[Event] = field(default_factory=list)
+
+    @property
+    def now(self) -> float:
+        """Seconds."""
+        return self.observation.time
+
+    def seen(self) -> list[ObjectBelief]:
+        """Objects with a region now, confirmed or not, by id."""
+        return [b for _, b in sorted(self.mind.objects.items()) if b.last_seen == self.now]
+
+    def missing(self) -> list[ObjectBelief]:
+        """Confirmed objects without a region of their own now, unless they left."""
+        return [
+            b
+            for _, b in sorted(self.mind.objects.items())
+            if b.confirmed and b.last_seen < self.now and b.presence is not Presence.LEFT
+        ]
+
+    def doubted(self, new: ObjectBelief, body: ObjectBelief | None = None) -> bool:
+        """Whether a region may be only a part: of one body, or of any."""
+        doubt = self.doubts.get(new.id)
+        return doubt is not None and doubt.holds and (body is None or doubt.body == body.id)
+
+    def put(self, belief: ObjectBelief, **track: object) -> None:
+        """Believe it, and change what its track says."""
+        self.mind = self.mind.with_objects(belief)
+        self.of[belief.id] = replace(self.of[belief.id], **track)  # type: ignore[arg-type]
+
+    def tell(self, kind: str, template: str, *ids: int, confidence: float = 0.9) -> None:
+        """Add an event; its template speaks of the objects as {0}, {1}."""
+        text = sentence(self.mind, template, *ids, confidence=confidence)
+        self.events.append(
+            Event(kind, self.now, self.observation.frame_index, text, ids[:1], confidence)
+        )
+
+    def near(self, a: Region, b: Region) -> bool:
+        """Whether two regions are so close that one may hide a part of the other."""
+        if box_gap(a.bbox, b.bbox) > self.settings.contact_px:
+            return False
+        return outline_gap(a, b, self.settings.contact_px) is not None
