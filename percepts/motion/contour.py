@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.image import Floats
 
+HOLE = 0.08  # share of a region's area up to which a hole in it is filled
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
@@ -80,7 +82,16 @@ def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
         return None
     keep = np.zeros(count, dtype=bool)
     keep[1:] = areas >= max(0.1 * largest, 0.25 * least)
-    return np.asarray(keep[labels])
+    return _filled(np.asarray(keep[labels]), HOLE * largest)
+
+
+def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
+    """Fill holes of up to `most` pixels: what is quite enclosed and small is seldom background."""
+    padded = np.pad(~mask, 1, constant_values=True).astype(np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] <= most
+    small[[0, labels[0, 0]]] = False
+    return np.asarray(mask | small[labels][1:-1, 1:-1])
 
 
 def describe(mask: NDArray[np.bool_], origin: tuple[int, int], size: tuple[int, int]) -> Outline:

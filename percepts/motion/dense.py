@@ -150,9 +150,8 @@ def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]
         ys, xs = np.mgrid[y : y + h, x : x + w]
         at = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
         source = (at - model.at(at)).reshape(h, w, 2)
-        return cv2.remap(
-            grey, source, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
+        from_x, from_y = (np.ascontiguousarray(source[..., i]) for i in (0, 1))
+        return cv2.remap(grey, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     back = np.eye(2, 3) - model.matrix
     back[:, 2] += back[:, :2] @ np.array([x, y])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP

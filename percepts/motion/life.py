@@ -307,6 +307,12 @@ def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
     return tuple(out)
 
 
+def _is_thin(t: Track, scene: Scene) -> bool:
+    """Whether no cell of a track lies inside it: a sliver beside an edge is seldom an object."""
+    rest = t.share <= 0.5
+    return bool(scene.cells.reach(rest[:, None], 1)[:, 0].all())
+
+
 def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) -> tuple[Tracks, int]:
     """Give public ids to tracks that have lasted and surely move.
 
@@ -322,6 +328,8 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
     out = []
     for t in tracks:
         enough = SURE if scene.time - t.born < settings.confirm_s else LIKELY
+        if not t.id and _is_thin(t, scene):
+            enough = 2 * SURE
         if not t.id and t.frames >= 3 and t.evidence > enough and t.seen == scene.time:
             ids += 1
             t = replace(t, id=ids)

@@ -201,8 +201,8 @@ def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -
     """
     from_where = cv2.remap(
         old.labels.astype(np.float32),
-        grid + flow,
-        None,
+        np.ascontiguousarray(grid[..., 0] + flow[..., 0]),
+        np.ascontiguousarray(grid[..., 1] + flow[..., 1]),
         cv2.INTER_NEAREST,
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=-1,
