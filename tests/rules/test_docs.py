@@ -1,0 +1,82 @@
+"""The page about rules says what the code does."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from visup.rules.facts import IMPLIED, QUANTITIES, WORDS
+from visup.rules.formula import DIMENSION
+from visup.rules.fragments import FragmentSettings
+from visup.rules.language import parse_rules, shipped_rules
+from visup.rules.measure import RelationSettings
+from visup.rules.thinkers import RuleSettings
+from visup.rules.work import PresenceSettings
+
+PAGE = (Path(__file__).parents[2] / "docs/rules.md").read_text("utf-8")
+BLOCKS = re.findall(r"```\n(.*?)```", PAGE, re.S)
+ROWS = [
+    [cell.strip() for cell in line.strip("|").split("|")]
+    for line in re.findall(r"^\|.*\|$", PAGE, re.M)
+]
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_every_example_of_the_page_is_in_the_language(block: str) -> None:
+    assert len(parse_rules(block)) >= 2
+
+
+def test_the_page_explains_every_word_and_quantity_with_its_arguments() -> None:
+    told = {m[1]: len(m[2].split(", ")) if m[2] else 0 for r in ROWS if (m := _call(r[0]))}
+    known = {n: len(w.takes) for n, w in {**WORDS, **QUANTITIES}.items()}
+    assert told == known
+
+
+def _call(cell: str) -> re.Match[str] | None:
+    return re.fullmatch(r"`(\w+)\(([^)]*)\)`", cell)
+
+
+def test_units_of_quantities_are_those_of_their_dimension() -> None:
+    units = {str(unit): dimension for unit, (dimension, _) in DIMENSION.items()}
+    rows = {m[1]: r[1].strip("`") for r in ROWS if len(r) == 3 and (m := _call(r[0]))}
+    assert {name: units[unit] for name, unit in rows.items()} == {
+        name: q.dimension for name, q in QUANTITIES.items()
+    }
+
+
+def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None:
+    assert {r.name for r in shipped_rules()} == {r.name for r in parse_rules(BLOCKS[0])}
+    told = {
+        r[0].strip("`"): set(re.findall(r"\w+", r[1])) | {r[0].strip("`")}
+        for r in ROWS
+        if r[0].strip("`") in IMPLIED and len(r) == 2
+    }
+    assert told == {name: set(covers) for name, covers in IMPLIED.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("trend above {} D/s", RelationSettings().rate_enter),
+        ("below {} D/s, or turned", RelationSettings().rate_exit),
+        ("gap at most {} D", RelationSettings().touch_enter),
+        ("gap above {} D", RelationSettings().touch_exit),
+        ("relative speed below {} D/s", RelationSettings().still_speed),
+        ("below {} D/s in each half", RelationSettings().still_half),
+        ("fitted to the last\n  {} s", RelationSettings().window_s),
+        ("also seen in the last {} s", RelationSettings().quick_window_s),
+        ("for {} s\n(by", FragmentSettings().apart_s),
+        ("(by {} D", FragmentSettings().apart),
+        ("seen steadily: {} s", PresenceSettings().entry_s),
+        ("out of sight for {:g} s and nothing", PresenceSettings().lost_s),
+        ("shape for {} s", RuleSettings().coupling.merged_s),
+        ("apart for {} s.", RuleSettings().coupling.part_s),
+        ("tau is {:g} s", RuleSettings().votes.tau_s),
+        ("and {:g} s for an object that is hidden", RuleSettings().votes.tau_hidden_s),
+        ("fewer than {} votes", RuleSettings().votes.known_votes),
+    ],
+)  # fmt: skip
+def test_thresholds_on_the_page_are_the_defaults(text: str, value: float) -> None:
+    assert " ".join(text.format(value).split()) in " ".join(PAGE.split())
