@@ -11,6 +11,7 @@ from visup.agent import Mind, ObjectBelief
 from visup.rules.fit import binned, theil_sen, velocity
 from visup.rules.geometry import Floats, outline_gap
 from visup.rules.history import History, covered
+from visup.rules.parting import parting_speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class RelationSettings:
         quick_window_s: Length of a shorter window in which a trend must be strong to count; by it
             a turn is seen sooner.
         quick_sigmas: How many standard deviations of its slope that is, and twice `rate_enter`.
+        parting_gap: Gap up to which the motion of two bodies tells that they part, image diagonals.
         motion_window_s: Length of the window over which velocities are fitted.
         rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
         rate_exit: Trend below which they end, image diagonals per second.
@@ -47,6 +49,7 @@ class RelationSettings:
     bins: int = 16
     quick_window_s: float = 0.7
     quick_sigmas: float = 4.0
+    parting_gap: float = 0.02
     motion_window_s: float = 1.25
     rate_enter: float = 0.002
     rate_exit: float = 0.001
@@ -135,6 +138,9 @@ class Measuring:
         if covered(h, self.settings.window_s) and len(i):
             slope[i, j], sigma[i, j] = self._trend(h.times, h.separation[:, i, j], mind)
             slope[j, i], sigma[j, i] = slope[i, j], sigma[i, j]
+        gaps = self._gaps(objects, h, mind, before)
+        if len(i):
+            slope, sigma = self._parting(slope, sigma, gaps, objects, h, mind)
         stale = np.array([mind.time - b.last_seen > 0.5 * self.settings.window_s for b in objects])
         if m:
             slope[stale, :] = slope[:, stale] = np.nan
@@ -143,7 +149,7 @@ class Measuring:
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
         return Measured(
             h.ids,
-            self._gaps(objects, h, mind, before),
+            gaps,
             slope,
             sigma,
             apart,
@@ -164,6 +170,23 @@ class Measuring:
             turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
             turned &= np.sign(quick) != np.sign(slope)
         return np.where(turned, quick, slope), np.where(turned, spread, sigma)
+
+    def _parting(
+        self,
+        slope: Floats,
+        sigma: Floats,
+        gaps: Floats,
+        objects: tuple[ObjectBelief, ...],
+        h: History,
+        mind: Mind,
+    ) -> tuple[Floats, Floats]:
+        """The trend, or the speed at which bodies in contact surely part."""
+        s, diagonal = self.settings, scale(mind.frame_size)
+        speed, spread = parting_speed(objects, h.support[-1], mind.time)
+        with np.errstate(invalid="ignore"):
+            sure = speed > np.maximum(2.0 * s.rate_enter * diagonal, s.quick_sigmas * spread)
+            sure &= (gaps <= s.parting_gap * diagonal) & (slope < speed)
+        return np.where(sure, speed, slope), np.where(sure, spread, sigma)
 
     def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
         """Over the window of motion, and over its two halves."""

@@ -30,7 +30,8 @@ def test_every_example_of_the_page_is_in_the_language(block: str) -> None:
 
 def test_the_page_explains_every_word_and_quantity_with_its_arguments() -> None:
     told = {m[1]: len(m[2].split(", ")) if m[2] else 0 for r in ROWS if (m := _call(r[0]))}
-    known = {n: len(w.takes) for n, w in {**WORDS, **QUANTITIES}.items()}
+    known = {n: len(w.takes) for n, w in WORDS.items()}
+    known |= {n: len(q.takes) for n, q in QUANTITIES.items()}
     assert told == known
 
 
@@ -67,6 +68,8 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
         ("below {} D/s in each half", RelationSettings().still_half),
         ("fitted to the last\n  {} s", RelationSettings().window_s),
         ("also seen in the last {} s", RelationSettings().quick_window_s),
+        ("less than {} D apart", RelationSettings().parting_gap),
+        ("by more than {} D/s and 4", 2 * RelationSettings().rate_enter),
         ("for {} s\n(by", FragmentSettings().apart_s),
         ("(by {} D", FragmentSettings().apart),
         ("seen steadily: {} s", PresenceSettings().entry_s),
