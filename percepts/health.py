@@ -46,7 +46,7 @@ class HealthSettings:
     bright: float = 245.0
     noisy: float = 22.0
     blocked: float = 0.4
-    scrambled: float = 6.0
+    scrambled: float = 3.0
     lasting_s: float = 0.3
     frozen_s: float = 0.8
 

@@ -150,20 +150,10 @@ def track(
     """
     if not len(points):
         return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_nothing())
-    options = {"winSize": (WINDOW, WINDOW), "maxLevel": 2, "minEigThreshold": 1e-5}
-    initial = cv2.OPTFLOW_USE_INITIAL_FLOW
     start = points.xy.reshape(-1, 1, 2).copy()
-    there, found, misfit = cv2.calcOpticalFlowPyrLK(
-        new.grey,
-        old.grey,
-        start,
-        guess.astype(np.float32).reshape(-1, 1, 2).copy(),
-        flags=initial,
-        **options,
-    )
-    home, back, _ = cv2.calcOpticalFlowPyrLK(
-        old.grey, new.grey, there, start.copy(), flags=initial, **options
-    )
+    begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
+    there, found, misfit = _follow(new.grey, old.grey, start, begin)
+    home, back, _ = _follow(old.grey, new.grey, there, start.copy())
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # What is said of points that were lost is not even finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
@@ -178,6 +168,27 @@ def track(
     keep = np.flatnonzero(ok)
     moved = points.xy[keep] - there[keep, 0]
     return Constraints(lag, new.time - old.time, keep, points.xy[keep], moved, information[keep])
+
+
+def _follow(
+    source: NDArray[np.uint8], target: NDArray[np.uint8], start: Floats, begin: Floats
+) -> tuple[Floats, NDArray[np.uint8], Floats]:
+    """Pyramidal Lucas-Kanade from given starting values: (N, 1, 2), (N, 1), (N, 1)."""
+    end, found, misfit = cv2.calcOpticalFlowPyrLK(
+        source,
+        target,
+        start,
+        begin,
+        winSize=(WINDOW, WINDOW),
+        maxLevel=2,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        minEigThreshold=1e-5,
+    )
+    return (
+        np.asarray(end, dtype=np.float32),
+        np.asarray(found, dtype=np.uint8),
+        np.asarray(misfit, dtype=np.float32),
+    )
 
 
 def with_flow(

@@ -33,7 +33,7 @@ LEAST = 0.03  # no label is ever quite impossible before there is evidence
 
 def flow_back(new: NDArray[np.uint8], old: NDArray[np.uint8], engine: cv2.DISOpticalFlow) -> Floats:
     """Dense flow from the newest image back to the old one, (h, w, 2) float32 pixels."""
-    return np.asarray(engine.calc(new, old, None), dtype=np.float32)
+    return np.asarray(engine.calc(new, old, np.zeros((*new.shape, 2), np.float32)))
 
 
 def gather(
@@ -176,10 +176,9 @@ def warped(
     cells, m = scene.cells, scene.measured[-1]
     c = m.constraints
     out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
-    any_near = near.any(axis=1)
+    any_near = np.asarray(near.any(axis=1))
     if not any_near.any():
         return out
-    height, width = cells.labels.shape
     box = _box_of(any_near[cells.labels])
     zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, noise), box)
     out[any_near, 0] = zero[any_near]

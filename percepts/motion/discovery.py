@@ -75,7 +75,7 @@ def slack_of(model: Affine, where: tuple[float, float] = (0.0, 0.0)) -> float:
         Standard deviation, pixels.
     """
     moved = model.at(np.asarray([where], dtype=np.float32))[0]
-    return 0.15 + 0.05 * float(np.hypot(*moved))
+    return 0.1 + 0.05 * float(np.hypot(*moved))
 
 
 def middle(c: Constraints, index: NDArray[np.int64]) -> Affine:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -237,10 +237,8 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
     return tuple(t for t in out if t.id >= 0)
 
 
-def _with(
-    values: "MappingProxyType[int, float] | object", key: int, value: float
-) -> "MappingProxyType[int, float]":
-    return MappingProxyType({**values, key: value})  # type: ignore[dict-item]
+def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, float]:
+    return MappingProxyType({**values, key: value})
 
 
 def _vote(scene: Scene, a: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_]) -> float:

@@ -20,6 +20,7 @@ from visup.percepts.motion.layers import Affine, Doubles
 from visup.percepts.motion.superpixels import Superpixels
 
 Indices = NDArray[np.int64]
+BRISK_S = 0.25  # baselines up to which a velocity is that of the moment, seconds
 PATH_S = 2.8  # how long the way of a track is remembered, seconds
 PACE_S = 1.0  # time over which the pace of a track follows its measured velocity, seconds
 FADE = 0.4  # share of the memory of where a track was that is left after a second
@@ -151,10 +152,12 @@ class Track:
         time: then the way that it was seen to go is taken.
         """
         parts = [m.predicted(lag, span_s, self.centre) for m in self.motions]
-        if len(self.path) > 1:
+        own = self.motions[0].rates.get(lag)
+        measured_now = bool(self.path) and own is not None and own.time > self.path[-1][0] - 1e-6
+        if len(self.path) > 1 and not measured_now:
             went = self._went(span_s)
             first = parts[0].at(np.asarray([self.centre], dtype=np.float32))[0]
-            if np.hypot(*(first - went)) > 2 + 0.25 * np.hypot(*went):
+            if np.hypot(*(first - went)) > 1 + 0.1 * np.hypot(*went):
                 matrix = np.zeros((2, 3))
                 matrix[:, 2] = went
                 parts[0] = Affine(matrix)
@@ -171,11 +174,15 @@ class Track:
         """Velocity over the shortest baselines, (vx, vy) pixels per second."""
         if not self.motions or not self.motions[0].rates:
             return np.zeros(2)
-        rates = list(self.motions[0].rates.values())
-        newest = max(r.time for r in rates)
-        short = min(r.span_s for r in rates)
-        near = [r for r in rates if newest - r.time < 0.3 and r.span_s < short + 0.2] or rates
-        return min(near, key=lambda r: r.sigma).velocity(self.centre)
+        newest = max(r.time for r in self.motions[0].rates.values())
+        fresh = [r for r in self.motions[0].rates.values() if newest - r.time < 0.3]
+        fresh.sort(key=lambda r: r.span_s)
+        best = fresh[0]
+        for rate in fresh[1:]:
+            gap = float(np.hypot(*(rate.velocity(self.centre) - best.velocity(self.centre))))
+            if rate.span_s < BRISK_S and gap < 3 * best.sigma and rate.sigma < best.sigma:
+                best = rate
+        return best.velocity(self.centre)
 
     def best_rate(self) -> Rate | None:
         """The rate of the whole, or of the only part."""

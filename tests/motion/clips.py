@@ -29,7 +29,7 @@ def texture(seed: int, shape: tuple[int, int], low: int = 40, high: int = 200) -
     coarse = rng.uniform(0, 1, shape).astype(np.float32)
     smooth = cv2.GaussianBlur(coarse, (0, 0), 2.0)
     smooth = (smooth - smooth.min()) / (smooth.max() - smooth.min())
-    return (low + smooth * (high - low)).astype(np.uint8)
+    return np.asarray(low + smooth * (high - low), dtype=np.float32).astype(np.uint8)
 
 
 def window(image: Image, x: float, y: float, shape: tuple[int, int]) -> Image:

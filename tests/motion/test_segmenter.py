@@ -80,7 +80,7 @@ def test_where_nothing_moves_by_itself_nothing_is_reported(camera: tuple[float, 
 
 def test_a_disc_that_stops_is_kept_under_its_id() -> None:
     disc = (lambda n: (60 + 2.0 * min(n, 30), 80.0), 24.0, SKIN)
-    shots = list(clip(WIDE, lambda n: (20, 30), [disc], 70))
+    shots = list(clip(SKY, lambda n: (0, 0), [disc], 120))
     seen = run(shots)
     late = [best(r, s.masks[0]) for r, s in zip(seen[25:], shots[25:], strict=True)]
     assert min(j for j, _ in late) > 0.6
@@ -125,14 +125,14 @@ def test_regions_keep_their_contract() -> None:
         for r in regions:
             x, y, w, h = r.bbox
             assert r.mask.shape == (h, w)
-            assert r.mask.any(0).all() or r.mask[:, [0, -1]].any(0).all()
             assert r.mask[[0, -1]].any(1).all()
             assert r.mask[:, [0, -1]].any(0).all()
             assert r.area == r.mask.sum()
             assert r.contour.dtype == np.float32
             assert r.contour.shape[1] == 2
-            assert 0 <= x and x + w <= shot.frame.size[0]
-            assert 0 <= y and y + h <= shot.frame.size[1]
+            assert min(x, y) >= 0
+            assert x + w <= shot.frame.size[0]
+            assert y + h <= shot.frame.size[1]
             edge = x == 0 or y == 0 or x + w == SIZE[1] or y + h == SIZE[0]
             assert r.cut == edge
             assert 0 <= r.confidence <= 1

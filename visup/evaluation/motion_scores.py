@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -143,7 +144,7 @@ def overlaps_of(
         The overlaps.
     """
     objects = {n: int(np.count_nonzero(labels == v)) for n, v in names.items()}
-    common = {}
+    common: dict[tuple[int, str], int] = {}
     for i, mask in regions.items():
         counts = np.bincount(labels[mask], minlength=256)
         common |= {(i, n): int(counts[v]) for n, v in names.items()}
@@ -179,7 +180,8 @@ def object_scores(
     best = {n: best_region([f.iou_by_region(n) for f in apart[n]]) for n in names}
     out = {}
     for name in names:
-        values = [f.iou((best[name],), (name,)) if best[name] else 0.0 for f in apart[name]]
+        own = [i for i in (best[name],) if i is not None]
+        values = [f.iou(own, (name,)) for f in apart[name]]
         switches = id_switches(f.covering((name,)) for f in apart[name])
         for group, together in joined[name].items():
             values += _together(together, group, {best[n] for n in group} - {None})
@@ -247,4 +249,4 @@ def id_switches(ids: Iterable[int | None]) -> int:
         The number of changes between frames with a region, gaps left out.
     """
     known = [i for i in ids if i is not None]
-    return sum(a != b for a, b in zip(known, known[1:], strict=False))
+    return sum(a != b for a, b in itertools.pairwise(known))
