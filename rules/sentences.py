@@ -27,10 +27,12 @@ def believed_name(mind: Mind, object_id: int) -> str | None:
     belief = mind.objects.get(object_id)
     if belief is None or belief.name == UNKNOWN_OBJECT:
         return None
-    for actor, models in sorted(mind.actors.items()):
-        if belief.name in models:
-            return actor
-    return belief.name
+    return called(mind, belief.name)
+
+
+def called(mind: Mind, model: str) -> str:
+    """What an object of a model is called: the actor that is bound to the model, else the model."""
+    return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
 
 
 def describe(mind: Mind, object_id: int, nth: int = 0) -> str:

@@ -35,7 +35,7 @@ from visup.agent import (
 )
 from visup.rules.objects import owners
 from visup.rules.presence import visible_share
-from visup.rules.sentences import describe, spaced
+from visup.rules.sentences import called, spaced
 
 VOTES = "rules.votes"
 Tally = tuple[tuple[str, float], ...]
@@ -231,11 +231,13 @@ def _by_object(mind: Mind, observation: Observation) -> dict[int, tuple[Hypothes
 def _identified(
     mind: Mind, belief: ObjectBelief, before: str | None, observation: Observation
 ) -> Event:
-    words = describe(mind, belief.id).removeprefix("an object, believed to be ")
+    # By its model alone: the part that it plays in a task may be another's, and lags behind.
+    words = spaced(called(mind, belief.name))
     if before is None:
-        text = f"An object is believed to be {words}."
+        text = f"An object is believed to be the {words}."
     else:
-        text = f"The object taken for the {spaced(before)} is now believed to be {words}."
+        was = spaced(called(mind, before))
+        text = f"The object taken for the {was} is now believed to be the {words}."
     data = MappingProxyType({"name": belief.name, "before": before})
     return Event(
         "identified",

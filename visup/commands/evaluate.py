@@ -158,17 +158,26 @@ def _wide(title: str, figures: Mapping[str, Any], keys: list[str]) -> Table:
 
 
 def _tall(title: str, figures: Mapping[str, Any], keys: list[str]) -> Table:
+    """Figures as rows; items as numbered columns, whose names stand below."""
     from rich.table import Table
 
-    table = Table("", title=title, title_justify="left")
-    for name in _rows(figures):
-        table.add_column(name, justify="right", overflow="fold")
+    names = list(figures["items"])
+    table = Table(title=title, title_justify="left", caption_justify="left", padding=(0, 0))
+    table.add_column("", no_wrap=True)
+    for heading in (*(str(n) for n in range(1, len(names) + 1)), "total"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for key in keys:
         table.add_row(key, *(_cell(row.get(key)) for row in _rows(figures).values()))
+    table.caption = ", ".join(f"{n} {name}" for n, name in enumerate(names, start=1))
     return table
 
 
 def _cell(value: object) -> str:
     if value is None:
         return ""
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+    # Verdicts are long words for narrow columns.
+    return {"interrupted": "interr.", "in_progress": "in pr.", "succeeded": "succ."}.get(
+        str(value), str(value)
+    )
