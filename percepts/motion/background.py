@@ -142,7 +142,9 @@ def find_background(
     weight, cell = spread_weights(c.xy, shape, outside)
     still = Affine(STILL)
     to_still = distances(still, c, 0.1)
-    if still_too:
+    # Much that does not move in the image is no object, whatever else fills the view.
+    rests = float(weight[to_still < 9].sum()) > 0.3 * float(weight.sum())
+    if still_too or rests:
         # What is fixed comes first, or a bending fit would swallow it with what drifts.
         moving = _wide(c, outside * (to_still > 9), shape, seed)
         camera = moving or _camera(c, outside, weight, (still, guess), shape, seed)
@@ -154,7 +156,7 @@ def find_background(
         second = _wide(c, outside * away, shape, seed)
         models = models if second is None else [second, models[0]]
     fixed = _is_fixed(c, outside, distances(models[-1], c, 0.15))
-    if fixed and not still_too:
+    if fixed and len(models) < 2:
         models.insert(0, still)
     rest = np.min([distances(m, c, 0.15) for m in models], axis=0)
     ground = ground.seen(c, outside, tuple(models))

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from visup.percepts.motion.dense import CLIP
 from visup.percepts.motion.discovery import discover, middle, rate_of, same_motion, slack_of
 from visup.percepts.motion.image import Floats
-from visup.percepts.motion.layers import distances, fit_affine
+from visup.percepts.motion.layers import Affine, distances, fit_affine
 from visup.percepts.motion.scene import Measured, Scene, moves_like
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Indices, Motion, Track, remember
@@ -198,6 +198,48 @@ def _alone(part: NDArray[np.bool_], scene: Scene, key: int) -> Track | None:
         centre=(float(centre[0]), float(centre[1])),
         evidence=10.0,
     )
+
+
+def release(tracks: Tracks, scene: Scene, winner: Indices) -> Tracks:
+    """Give back to a hidden track what its occluder holds but what moves as the hidden one did.
+
+    The occluder has gone on: where points move as the track did when it was last in view, and not
+    as the occluder does, the track is in view again.
+    """
+    out = list(tracks)
+    for j, t in enumerate(tracks):
+        if not t.id or not t.mostly_hidden or t.hidden is None:
+            continue
+        there = scene.cells.mean(t.hidden) > 0.5
+        for k, o in enumerate(tracks):
+            held = there & (winner == k + 1)
+            if k != j and held.any() and _moves_as(t, o, held, scene):
+                out[j] = replace(out[j], share=np.where(held, 1, out[j].share).astype(np.float32))
+                kept = tuple(m for m in out[k].motions if not moves_like(m, t))
+                out[k] = replace(
+                    out[k],
+                    share=np.where(held, 0, out[k].share).astype(np.float32),
+                    motions=kept or out[k].motions[:1],
+                )
+    return tuple(out)
+
+
+def _moves_as(hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: Scene) -> bool:
+    """Whether points in some cells move as a hidden track did, and not as its occluder."""
+    m = scene.measured[-1]
+    c = m.constraints
+    inside = where[scene.cell_of(c.xy)]
+    rate = occluder.best_rate()
+    if np.count_nonzero(inside) < 6 or rate is None or c.span_s > 0.7:
+        return False
+    own, other = np.zeros((2, 3)), np.zeros((2, 3))
+    own[:, 2] = np.asarray(hidden.pace) * c.span_s
+    other[:, 2] = np.asarray(occluder.pace) * c.span_s
+    if np.hypot(*(own[:, 2] - other[:, 2])) < 1.0:
+        return False
+    to_own = np.median(distances(Affine(own), c, 0.3)[inside])
+    to_other = np.median(distances(Affine(other), c, 0.3)[inside])
+    return bool(to_own < 6 and to_other > 16)
 
 
 def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:

@@ -119,6 +119,10 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
     off[1:] += PART_COST
     nearest = off.argmin(axis=0)
     clear = 0.6 if t.mostly_hidden else 0.0
+    # What the background explains, and no part does, must not draw the track after it.
+    # When that holds for most of it, it has stopped instead.
+    own = mine & ((off.min(axis=0) < 9) | (m.background.distances(c) > 4))
+    mine = own if np.count_nonzero(own) > 0.5 * np.count_nonzero(mine) else mine
     motions = []
     for i, (motion, start) in enumerate(zip(t.motions, models, strict=True)):
         weight = (mine & (nearest == i)).astype(np.float32)

@@ -19,7 +19,7 @@ from visup.percepts.motion.dense import flow_back, label, warped
 from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
-from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, update
+from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
 from visup.percepts.motion.report import obey, report
 from visup.percepts.motion.scene import (
     Measured,
@@ -94,6 +94,7 @@ class MotionSegmenter:
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
         tracks = absorb(tracks, scene, winner, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
+        tracks = release(tracks, scene, winner)
         tracks = merge(tracks, scene, winner, self.settings)
         tracks, self._ids = confirm(
             bury(tracks, scene, self.settings), scene, self._ids, self.settings
