@@ -14,6 +14,7 @@ from visup.percepts.motion.dense import CLIP
 from visup.percepts.motion.discovery import discover, middle, rate_of, same_motion, slack_of
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, distances, fit_affine
+from visup.percepts.motion.salience import is_salient
 from visup.percepts.motion.scene import Measured, Scene, moves_like
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Indices, Motion, Track, remember
@@ -370,7 +371,8 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
         enough = SURE if scene.time - t.born < settings.confirm_s else LIKELY
         if not t.id and _is_thin(t, scene):
             enough = 2 * SURE
-        if not t.id and t.frames >= 3 and t.evidence > enough and t.seen == scene.time:
+        lasts = t.frames >= 3 and t.evidence > enough and t.seen == scene.time
+        if not t.id and lasts and is_salient(t):
             ids += 1
             t = replace(t, id=ids)
         out.append(t)

@@ -21,6 +21,7 @@ from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
 from visup.percepts.motion.report import obey, report
+from visup.percepts.motion.salience import weigh
 from visup.percepts.motion.scene import (
     Measured,
     Scene,
@@ -92,6 +93,7 @@ class MotionSegmenter:
         posterior = label(cells, scene.points, likelihood, has, prior, more, self.settings)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
+        tracks = weigh(tracks, scene, winner)
         tracks = absorb(tracks, scene, winner, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
         tracks = release(tracks, scene, winner)

@@ -123,6 +123,9 @@ class Track:
         path: (time, x, y) of its displacement since birth, over the longest baseline.
         apart: Seconds for which it was seen apart from other tracks, by key.
         alike: Votes that it is one with another track, by key.
+        gone: (x, y) of its displacement since birth against the background, pixels.
+        way: Length of the way it took to get there, pixels.
+        explained: Share of its points that the background explains, by baseline in frames.
     """
 
     key: int
@@ -144,6 +147,9 @@ class Track:
     path: tuple[tuple[float, float, float], ...] = ()
     apart: Mapping[int, float] = field(default_factory=_nothing)
     alike: Mapping[int, float] = field(default_factory=_nothing)
+    gone: tuple[float, float] = (0.0, 0.0)
+    way: float = 0.0
+    explained: Mapping[int, float] = field(default_factory=_nothing)
 
     def predicted(self, lag: int, span_s: float) -> tuple[Affine, ...]:
         """The displacement of each part over a baseline.
