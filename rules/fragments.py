@@ -2,10 +2,11 @@
 
 A camera that sees motion now and then cuts a body in two: a shadow falls along an arm, a face of a
 spinning satellite moves unlike the rest of it. What first shows itself at, or within the outline
-of, something larger is therefore doubted. A doubt ends when the region
-- has been clearly apart from that body for a while, or
-- moves unlike it for longer: both outlines move as one each, their velocities differ steadily over
-  the last second, and so the distance of their hulls changes.
+of, something larger is therefore doubted until it has been clearly apart from that body for a while.
+Motion alone does not end a doubt: a sliver along an edge seems to slide on it (the aperture
+problem), and its outline wanders. The price: of two bodies of unequal size that touch from the
+first sight on, the smaller one is not told before they part.
+
 What came over the image border was never a part of a body inside and is not doubted, even where it
 passes before one soon after; at the start of a video nothing has come over the border yet. Of two
 regions that touch when both are new, the larger one is the body; where they are much of a size,
@@ -17,19 +18,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from visup.agent import Mind, ObjectBelief, Presence, Region
-from visup.rules.fit import theil_sen, velocity
 from visup.rules.geometry import (
     DIRECTIONS,
-    Reach,
     box_overlap,
     grow,
-    hull_separation,
     outline,
     outline_gap,
-    reach,
 )
 from visup.rules.measure import scale
 from visup.rules.tracks import Track, border_sides, expected_box
@@ -46,12 +41,9 @@ class FragmentSettings:
         touch: Outline gap up to which a region touches a body, image diagonals.
         apart: Outline gap beyond which it is clearly apart, image diagonals.
         apart_size: The same as a share of the root of its area; the greater one counts.
-        within: Share of its outline inside a body's convex hull by which it is within the body.
+        within: Share of its outline inside a body's convex hull, or of its box inside the place of
+            the body, by which it is within the body.
         apart_s: How long it must be apart.
-        motion_s: How long it must move unlike the body.
-        motion: Relative speed that counts as such, image diagonals per second.
-        sigmas: How many standard deviations of its slope the trend of the distance must exceed.
-        misfit: How unevenly an outline may move and still have a velocity, image diagonals/s.
     """
 
     part: float = 0.7
@@ -60,22 +52,9 @@ class FragmentSettings:
     apart_size: float = 0.25
     within: float = 0.5
     apart_s: float = 0.5
-    motion_s: float = 1.0
-    motion: float = 0.005
-    sigmas: float = 4.0
-    misfit: float = 0.0075
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sample:
-    """How far a region and the body that it may be a part of reached at one time, in seconds."""
-
-    time: float
-    region: Reach
-    body: Reach
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Doubt:
     """Whether a region that is not confirmed yet may be a part of a body.
 
@@ -83,13 +62,11 @@ class Doubt:
         body: Id of that object, or None while there is none.
         over: Whether it has shown to be an object of its own; that is not doubted again.
         apart_since: Seconds since when it is clearly apart from the body, or None.
-        samples: Of the last `motion_s`.
     """
 
     body: int | None = None
     over: bool = False
     apart_since: float | None = None
-    samples: tuple[Sample, ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -132,7 +109,7 @@ class Doubting:
                 larger = [b for b in bodies if self._may_contain(b, new, of)]
                 if doubt is None:
                     doubt = self._first(new, larger, mind, starting=starting)
-                doubt = doubt if doubt.over else self._again(doubt, new, larger, mind)
+                doubt = doubt if doubt.over else self._again(doubt, new, larger, mind, of)
             if doubt is not None:
                 doubts[new.id] = doubt
         return doubts
@@ -148,7 +125,12 @@ class Doubting:
         return Doubt(over=self._body_of(new.region, there, mind) is None)
 
     def _again(
-        self, doubt: Doubt, new: ObjectBelief, bodies: Iterable[ObjectBelief], mind: Mind
+        self,
+        doubt: Doubt,
+        new: ObjectBelief,
+        bodies: Iterable[ObjectBelief],
+        mind: Mind,
+        of: Mapping[int, Track],
     ) -> Doubt:
         body = self._body_of(new.region, bodies, mind)
         body = body or mind.objects.get(-1 if doubt.body is None else doubt.body)
@@ -156,12 +138,20 @@ class Doubting:
             return Doubt()
         if body.id != doubt.body:
             doubt = Doubt(body.id)
-        doubt = self._with_sample(doubt, new, body, mind)
-        apart = self._gap(new.region, body.region, mind) is None
+        apart = self._gap(new.region, body.region, mind) is None and not self._in_place(
+            new.region, of.get(body.id), mind
+        )
         since = (mind.time if doubt.apart_since is None else doubt.apart_since) if apart else None
         parted = since is not None and mind.time - since >= self.settings.apart_s - 1e-6
-        over = parted or self._moves_away(doubt.samples, mind)
-        return replace(doubt, apart_since=since, over=over, samples=() if over else doubt.samples)
+        return replace(doubt, apart_since=since, over=parted)
+
+    def _in_place(self, region: Region, body: Track | None, mind: Mind) -> bool:
+        """Whether a region is mostly where a body should be, of which little is seen for now."""
+        if body is None:
+            return False
+        x, y, w, h = region.bbox
+        inside = box_overlap(expected_box(body, mind.time), (x, y, w, h))
+        return inside >= self.settings.within * w * h
 
     def _may_contain(self, body: ObjectBelief, new: ObjectBelief, of: Mapping[int, Track]) -> bool:
         """Whether a belief may be the body of a new one: another one in sight, and larger."""
@@ -190,39 +180,6 @@ class Doubting:
             if touches or share_within(region, body.region) >= self.settings.within:
                 near.append((gap, body.id, body))
         return min(near)[2] if near else None
-
-    def _with_sample(
-        self, doubt: Doubt, new: ObjectBelief, body: ObjectBelief, mind: Mind
-    ) -> Doubt:
-        if body.last_seen < mind.time:
-            return doubt
-        reaches = (reach(b.region, mind.frame_size) for b in (new, body))
-        oldest = mind.time - self.settings.motion_s - 1e-6
-        kept = tuple(s for s in doubt.samples if s.time >= oldest)
-        return replace(doubt, samples=(*kept, Sample(mind.time, *reaches)))
-
-    def _moves_away(self, samples: tuple[Sample, ...], mind: Mind) -> bool:
-        """Whether the two have moved unlike each other for all of the time."""
-        s, diagonal = self.settings, scale(mind.frame_size)
-        if len(samples) < 8 or samples[-1].time - samples[0].time < 0.85 * s.motion_s:
-            return False
-        times = np.array([x.time for x in samples])
-        support = np.array([[x.region.support, x.body.support] for x in samples])
-        free = np.array([[x.region.free, x.body.free] for x in samples])
-        half = len(times) // 2
-        early, late = (
-            np.subtract(*velocity(times[part], support[part], free[part], s.misfit * diagonal))
-            for part in (slice(None, half), slice(half, None))
-        )
-        least = s.motion * diagonal
-        speed = np.linalg.norm(early + late) / 2
-        # A segment that changes its shape seems to move too, but unsteadily. An unknown velocity
-        # (NaN) fails both comparisons and so is no proof.
-        if not (speed > least and np.linalg.norm(late - early) < speed):
-            return False
-        distance = np.array([hull_separation(both)[0, 1] for both in support])
-        slope, sigma = theil_sen(times, distance[:, None])
-        return bool(abs(slope[0]) > max(least, s.sigmas * sigma[0]))
 
 
 def share_within(region: Region, body: Region) -> float:

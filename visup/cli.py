@@ -29,6 +29,7 @@ app = typer.Typer(
     help="The visual supervisor: it watches machines work and says in plain words whether it goes well.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help: drawing it with rich would double the time to start
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("watch")(watch)

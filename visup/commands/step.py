@@ -31,7 +31,7 @@ def step(
     fps: Fps = None,
     fov: Fov = None,
 ) -> None:
-    """Step through a video and look at regions, candidates, relations and tasks."""
+    """Step through a video and look into the agent's mind."""
     from visup.session import Session, read_commands
     from visup.supervisor import build_agent, open_video
 

@@ -18,20 +18,28 @@ if TYPE_CHECKING:
 
 Source = Annotated[str, typer.Argument(help="Video file, folder of images, camera index or URL.")]
 Tasks = Annotated[
-    list[str] | None, typer.Option("--task", help="Task file, or the name of a shipped task.")
+    list[str] | None,
+    typer.Option("--task", metavar="FILE", help="Task file, or the name of a shipped task."),
 ]
-Models = Annotated[Path | None, typer.Option(help="Model database (see `visup models build`).")]
-Rules = Annotated[list[Path] | None, typer.Option(help="Rules file, instead of the shipped rules.")]
+Models = Annotated[
+    Path | None, typer.Option(metavar="DB", help="Model database (see `visup models build`).")
+]
+Rules = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="FILE", help="Rules file, instead of the shipped rules."),
+]
 Actors = Annotated[
     list[str] | None,
-    typer.Option("--actor", help="NAME=MODEL: what an actor of the task looks like."),
+    typer.Option("--actor", metavar="NAME=MODEL", help="What an actor of the task looks like."),
 ]
 Every = Annotated[int, typer.Option(help="Use every n-th frame.")]
 Behaviours = Annotated[
-    list[Path] | None, typer.Option("--behaviour", help="Python file with a behaviour of your own.")
+    list[Path] | None,
+    typer.Option("--behaviour", metavar="FILE", help="Python file with a behaviour of your own."),
 ]
 Plugins = Annotated[
-    list[str] | None, typer.Option("--plugin", help="Name of an installed behaviour to add.")
+    list[str] | None,
+    typer.Option("--plugin", metavar="NAME", help="Name of an installed behaviour to add."),
 ]
 Fps = Annotated[float | None, typer.Option(help="Frame rate, where the source has none.")]
 Fov = Annotated[float | None, typer.Option(help="Vertical field of view of the camera, degrees.")]
@@ -71,7 +79,9 @@ def watch(
     task: Tasks = None,
     models: Models = None,
     rules: Rules = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder (default: runs/NAME).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Run folder (default: runs/NAME).")
+    ] = None,
     actor: Actors = None,
     every: Every = 1,
     behaviour: Behaviours = None,
@@ -95,7 +105,10 @@ def demo(
     out: Annotated[Path | None, typer.Option(help="Run folder (default: demo-run).")] = None,
     every: Every = 2,
 ) -> None:
-    """Supervise the clip that ships with visup: an arm tries to capture a satellite, and fails."""
+    """Supervise the shipped clip: a capture that fails.
+
+    An arm tries to capture a satellite, and sends it away spinning. Exit code 0 when visup sees that.
+    """
     from visup.demo import demo_settings, free_folder
 
     result = run_and_tell(demo_settings(every), out or free_folder(Path("demo-run")))
