@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.console import Console
@@ -13,6 +12,7 @@ from rich.text import Text
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.agent import Step
 from visup.agent.encode import event_line
+from visup.wording import worded_once
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
 MARK = {Severity.INFO: " ", Severity.WARNING: "!", Severity.CRITICAL: "‼"}
@@ -55,16 +55,6 @@ class Narrator:
             print(json.dumps(event_line(event), ensure_ascii=False, sort_keys=True), flush=True)
         else:
             self.console.print(line(event))
-
-
-def worded_once(events: Sequence[Event]) -> list[Event]:
-    """Events for people: of several with the same words (a stage fails, an alert opens) the gravest."""
-    gravest: dict[str, Event] = {}
-    for event in events:
-        held = gravest.get(event.text)
-        if held is None or event.severity > held.severity:
-            gravest[event.text] = event
-    return list(gravest.values())
 
 
 def line(event: Event) -> Table:

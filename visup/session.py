@@ -13,7 +13,8 @@ from rich.tree import Tree
 
 from visup.agent import Frame, Mind, ObjectBelief
 from visup.agent.agent import Agent, Step
-from visup.narrative import line, worded_once
+from visup.narrative import line
+from visup.wording import worded_once
 
 Predicate = Callable[[Step], bool]
 HELP = """\

@@ -5,7 +5,8 @@ import io
 from rich.console import Console
 
 from visup.agent import Event, Severity, Verdict
-from visup.narrative import Narrator, verdict_line, worded_once
+from visup.narrative import Narrator, verdict_line
+from visup.wording import worded_once
 
 
 def event(text: str, severity: Severity = Severity.INFO, kind: str = "entry") -> Event:

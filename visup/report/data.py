@@ -39,6 +39,7 @@ from visup.report.records import (
     Subject,
 )
 from visup.rules.geometry import outline_gap
+from visup.wording import worded_once
 
 __all__ = ["Collector", "Limits", "RunData"]
 
@@ -142,14 +143,15 @@ class Collector:
         self._remember_alerts(step.alerts + mind.alerts)
         self._remember_matches(step)
         self._remember_tolls(step)
+        events = worded_once(step.events)
         room = max(0, self.limits.events - len(self._events))
-        self._events.extend(step.events[:room])
-        self._left_out += max(0, len(step.events) - room)
+        self._events.extend(events[:room])
+        self._left_out += max(0, len(events) - room)
         self._spans.note(step.time, state_of(mind))
         self._samples.offer(lambda: sample_of(mind))
         weight = weight_of(step.events) if self._frames > 1 else ENDS_WEIGHT
         if weight and self._pictures.has_room_for(weight):
-            self._pictures.add(self._picture(mind, frame, step.events, weight))
+            self._pictures.add(self._picture(mind, frame, events, weight))
             self._last_pictured = frame.index
 
     def finish(
