@@ -372,7 +372,7 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
         if not t.id and _is_thin(t, scene):
             enough = 2 * SURE
         lasts = t.frames >= 3 and t.evidence > enough and t.seen == scene.time
-        if not t.id and lasts and is_salient(t):
+        if not t.id and lasts and is_salient(t, scene):
             ids += 1
             t = replace(t, id=ids)
         out.append(t)

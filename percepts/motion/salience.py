@@ -24,6 +24,7 @@ EXPLAINED = 0.35  # share of points that fit the background over the baseline th
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
 FOLLOW = 0.3  # weight of the newest frame in running means
 FEWEST = 4
+MOST_BORDER = 0.2  # share of the image border that an object may take up when it is first told
 
 
 def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track, ...]:
@@ -58,8 +59,16 @@ def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track
     return tuple(out)
 
 
-def is_salient(t: Track) -> bool:
-    """Whether a track has left its place, on a course, and over some baseline clearly."""
+def is_salient(t: Track, scene: Scene) -> bool:
+    """Whether a track has left its place, on a course, over some baseline clearly.
+
+    What takes up much of the image border is not surrounded by a ground, it is one: a near wall,
+    the rocks in front.
+    """
+    labels = scene.cells.labels
+    border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    if np.mean(t.share[border] > 0.5) > MOST_BORDER:
+        return False
     gone = float(np.hypot(*t.gone))
     clear = min(t.explained.values(), default=0.0) < EXPLAINED
     return clear and gone >= max(LEAST_GONE, STRAIGHT * t.way)
