@@ -20,6 +20,7 @@ Predicate = Callable[[Step], bool]
 HELP = """\
 step [N]          one step, or N
 run [until WHAT]  until an event of kind WHAT, a stage, a time (12.5), the end
+regions           what moved in the last frame
 objects           who is there, with their most likely identities
 candidates ID     all identities that object ID may have
 relations [ID]    what holds between objects
@@ -51,6 +52,7 @@ class Session:
         self._commands: dict[str, Callable[[Sequence[str]], RenderableType | None]] = {
             "step": self._step,
             "run": self._run,
+            "regions": lambda _: regions_table(self._last),
             "objects": lambda _: objects_table(self.agent.mind),
             "candidates": self._candidates,
             "relations": lambda words: relations_table(self.agent.mind, _number(words)),
@@ -136,6 +138,19 @@ def until(what: str) -> Predicate:
             or any(t.current == what for t in step.mind.tasks)
         )
     return lambda step: step.time >= at
+
+
+def regions_table(step: Step | None) -> RenderableType:
+    """What motion segmentation saw in the last frame."""
+    if step is None:
+        return Text("no step was taken yet")
+    table = Table("region", "box", "area", "velocity px/s", "cut", "confidence")
+    for r in step.observation.of("region"):
+        box = ",".join(map(str, r.bbox))
+        velocity = f"{r.velocity[0]:.1f}, {r.velocity[1]:.1f} ± {r.velocity_sigma:.1f}"
+        cut = "yes" if r.cut else "no"
+        table.add_row(str(r.id), box, f"{r.area:.0f}", velocity, cut, f"{r.confidence:.2f}")
+    return table
 
 
 def objects_table(mind: Mind) -> Table:

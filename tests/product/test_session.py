@@ -44,7 +44,7 @@ def test_every_command_answers_before_and_after_the_first_step() -> None:
     assert "This is a worry." in said
     assert "'nonsense' is not a command" in said
     assert "which object?" in said
-    assert "(run, relations?)" in said
+    assert "(run, regions, relations?)" in said
 
 
 def test_help_names_every_command_and_fits_80_columns() -> None:
