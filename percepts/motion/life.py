@@ -370,7 +370,7 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
     for t in tracks:
         enough = SURE if scene.time - t.born < settings.confirm_s else LIKELY
         if not t.id and _is_thin(t, scene):
-            enough = 2 * SURE
+            enough = max(enough, 2 * LIKELY)
         lasts = t.frames >= 3 and t.evidence > enough and t.seen == scene.time
         if not t.id and lasts and is_salient(t, scene):
             ids += 1
