@@ -19,6 +19,8 @@ from visup.percepts.motion.scene import Measured, Scene
 from visup.percepts.motion.tracking import Indices, Track
 
 LEAST_GONE = 1.0  # pixels against the background: less is told of leaves as well
+FAR_GONE = 4.0  # pixels, for a track too young to have swung back yet
+SWING_S = 0.4
 STRAIGHT = 0.7  # net way as a share of the way
 EXPLAINED = 0.35  # share of points that fit the background over the baseline that tells most
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
@@ -71,7 +73,8 @@ def is_salient(t: Track, scene: Scene) -> bool:
         return False
     gone = float(np.hypot(*t.gone))
     clear = min(t.explained.values(), default=0.0) < EXPLAINED
-    return clear and gone >= max(LEAST_GONE, STRAIGHT * t.way)
+    least = LEAST_GONE if scene.time - t.born >= SWING_S else FAR_GONE
+    return clear and gone >= max(least, STRAIGHT * t.way)
 
 
 def _step(t: Track, m: Measured, seconds: float) -> Doubles:

@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.motion.clips import FPS, SIZE, texture
+from visup.agent import Frame
+from visup.percepts.motion.constraints import find_points
+from visup.percepts.motion.image import prepare
+from visup.percepts.motion.salience import is_salient
+from visup.percepts.motion.scene import Scene
+from visup.percepts.motion.segmenter import MotionSegmenter
+from visup.percepts.motion.superpixels import superpixels
+from visup.percepts.motion.tracking import Track
+
+WIDE = texture(1, SIZE)
+
+
+def scene(time: float = 0.0) -> Scene:
+    image = prepare(Frame(0, time, np.repeat(WIDE[..., None], 3, axis=2)), 512)
+    cells = superpixels(image, 8, 8.0)
+    owner = np.zeros(cells.count, np.int64)
+    return Scene(image, find_points(image, 8, 1.0), cells, owner, 1 / FPS, ())
+
+
+def track(
+    at: Scene, gone: float, way: float, explained: dict[int, float], width: int = 40
+) -> Track:
+    """A track over the columns up to a width, beside the left border but not beyond a cell of it."""
+    x, y = at.cells.centre.T
+    share = ((x < width) & (y > 60) & (y < 100)).astype(np.float32)
+    if width >= SIZE[1]:
+        share = (y > 60).astype(np.float32)
+    rest = MappingProxyType(explained)
+    return Track(1, 0, 0.0, 0.0, share, gone=(gone, 0.0), way=way, explained=rest)
+
+
+@pytest.mark.parametrize(
+    ("gone", "way", "explained", "salient"),
+    [
+        (10.0, 10.5, {1: 0.1}, True),
+        (10.0, 10.5, {1: 0.95, 12: 0.05}, True),  # slow: only a longer baseline tells
+        (10.0, 30.0, {1: 0.1}, False),  # to and fro
+        (0.5, 0.5, {1: 0.1}, False),  # it has not left its place
+        (10.0, 10.5, {1: 0.9, 12: 0.6}, False),  # the background explains it
+        (2.0, 2.0, {1: 0.1}, True),
+    ],
+)
+def test_what_leaves_its_place_on_a_course_is_salient(
+    gone: float, way: float, explained: dict[int, float], salient: bool
+) -> None:
+    at = scene(time=2.0)
+    assert is_salient(track(at, gone, way, explained), at) is salient
+
+
+def test_a_young_track_must_go_further() -> None:
+    young, older = scene(time=0.1), scene(time=1.0)
+    assert not is_salient(track(young, 2.0, 2.0, {1: 0.0}), young)
+    assert is_salient(track(older, 2.0, 2.0, {1: 0.0}), older)
+
+
+def test_what_fills_the_border_is_a_ground() -> None:
+    at = scene()
+    assert is_salient(track(at, 10.0, 10.0, {1: 0.0}), at)
+    assert not is_salient(track(at, 10.0, 10.0, {1: 0.0}, width=SIZE[1]), at)
+
+
+def swaying(n: int, rng: np.random.Generator, phase: np.ndarray) -> Frame:
+    """A still picture but for its upper left, where every leaf swings about its place."""
+    ys, xs = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
+    inside = cv2.GaussianBlur(((xs < 100) & (ys < 80)).astype(np.float32), (0, 0), 4.0)
+    swing = 1.2 * inside * np.sin(0.9 * n + phase)
+    image = cv2.remap(WIDE, xs + swing.astype(np.float32), ys, cv2.INTER_LINEAR)
+    grey = np.clip(np.rint(image + rng.normal(0, 1.0, SIZE)), 0, 255).astype(np.uint8)
+    return Frame(n, n / FPS, np.repeat(grey[..., None], 3, axis=2))
+
+
+def test_leaves_that_sway_are_no_objects() -> None:
+    rng = np.random.default_rng(5)
+    phase = cv2.GaussianBlur(rng.uniform(-40, 40, SIZE).astype(np.float32), (0, 0), 6.0)
+    segmenter = MotionSegmenter()
+    seen = [segmenter.step(swaying(n, rng, phase)) for n in range(60)]
+    assert not any(seen)
