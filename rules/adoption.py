@@ -1,14 +1,26 @@
-"""A new region where a missing object should be is that object, which keeps its id."""
+"""Objects that are given another region: found again, or seen whole after a part of them.
+
+A new region where a missing object should be is that object, which keeps its id. And where a
+larger region shows itself round an object that came over no border and never left its place, only
+a part of that object was seen before: it grows into the larger region.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from visup.agent import ObjectBelief, Presence
+from visup.rules.fragments import share_within
 from visup.rules.geometry import box_iou, box_overlap, grow
 from visup.rules.objects import drop_objects, give_region
-from visup.rules.tracks import expected_box
+from visup.rules.tracks import expected_box, first_sight, sides_of
 from visup.rules.work import Work
+
+PART = 0.7
+"""Share of a region's area up to which an object may have been a part of it."""
+
+WITHIN = 0.5
+"""Share of the object's outline inside the hull of the region by which it is within it."""
 
 
 def adopt(work: Work) -> None:
@@ -24,6 +36,33 @@ def adopt(work: Work) -> None:
         work.mind = give_region(work.mind, new.region.id, old.id)
         taken = replace(old, region=new.region, last_seen=work.now)
         work.put(taken, merged_with=None, changed_at=work.now)
+
+
+def grow_into(work: Work, whole: ObjectBelief) -> bool:
+    """Whether known objects were parts of a new region; the oldest of them then becomes it.
+
+    The others count as parts from now on: they have to show that they are more, as any fragment.
+    """
+    parts = [b for b in work.seen() if b.confirmed and _was_part(work, b, whole)]
+    if not parts:
+        return False
+    work.mind = drop_objects(work.mind, frozenset({whole.id}))
+    work.mind = give_region(work.mind, whole.region.id, parts[0].id)
+    work.of[parts[0].id] = replace(first_sight(whole.region, work.now), told="seen")
+    work.mind = work.mind.with_objects(replace(parts[0], region=whole.region))
+    for other in parts[1:]:
+        work.put(replace(other, confirmed=False), told="")
+    return True
+
+
+def _was_part(work: Work, part: ObjectBelief, whole: ObjectBelief) -> bool:
+    track, size = work.of[part.id], work.mind.frame_size
+    if part.region.area > PART * whole.region.area or sides_of(track.first, size):
+        return False
+    width, height = track.first[2:]
+    x, y, w, h = grow(track.first, round(max(width, height) / 2))
+    stayed = x <= part.region.centroid[0] < x + w and y <= part.region.centroid[1] < y + h
+    return stayed and share_within(part.region, whole.region) >= WITHIN
 
 
 def _likeness(work: Work, new: ObjectBelief, old: ObjectBelief) -> float:

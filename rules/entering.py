@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from visup.agent import ObjectBelief
+from visup.rules.adoption import grow_into
 from visup.rules.fragments import in_place_of_hidden
 from visup.rules.tracks import at_border
 from visup.rules.work import Work
@@ -25,6 +26,8 @@ def enter(work: Work, start: float) -> None:
         at_edge = at_border(track.region, work.mind.frame_size)
         needed = s.entry_s if early or at_edge else s.entry_inside_s
         if work.now - track.coherent_since < needed - 1e-6:
+            continue
+        if grow_into(work, belief):
             continue
         work.put(replace(belief, confirmed=True), told="seen")
         template = "{0} is in view." if early else "{0} enters the field of view."

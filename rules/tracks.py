@@ -44,6 +44,7 @@ class Track:
         changed_at: Seconds when it was given another region; shapes of the older one cannot be
             compared with those of the new one.
         told: What was told last: '', 'seen', 'occluded', 'lost' or 'left'.
+        first: Its box when first seen.
     """
 
     region: Region
@@ -63,6 +64,7 @@ class Track:
     parted_at: float | None = None
     changed_at: float = -1.0
     told: str = ""
+    first: Box = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,7 @@ def first_sight(region: Region, now: float) -> Track:
         whole_at=now,
         reference=region.area,
         changed_at=now,
+        first=region.bbox,
     )
 
 
@@ -180,7 +183,12 @@ def heading_out(track: Track, frame_size: tuple[int, int], margin: int = 3) -> b
 
 def border_sides(region: Region, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
     """Sides of the image that a region reaches: 'left', 'top', 'right', 'bottom'."""
-    x, y, w, h = region.bbox
+    return sides_of(region.bbox, frame_size, margin)
+
+
+def sides_of(box: Box, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
+    """Sides of the image that a box reaches."""
+    x, y, w, h = box
     reached = {
         "left": x <= margin,
         "top": y <= margin,

@@ -201,3 +201,30 @@ def test_the_share_within_a_box_is_what_counting_points_says(
     right, bottom = BODY[0] + BODY[2], BODY[1] + BODY[3]
     inside = [left <= px <= right and top <= py <= bottom for px, py in part.contour]
     assert share_within(part, body) == pytest.approx(sum(inside) / len(inside), abs=0.02)
+
+
+def test_an_object_seen_in_part_at_first_grows_into_the_whole() -> None:
+    """A face of a satellite is told first; when all of it shows, it is that object, not a second."""
+
+    def face(i: int) -> Rect:
+        return (250, 190, 40, 40)
+
+    def whole(i: int) -> Rect | None:
+        return BODY if i >= 40 else None
+
+    thoughts = scene(face, whole)
+    assert kinds(thoughts) == [("entry", 1)]
+    last = thoughts[-1].mind
+    assert [b.id for b in last.present()] == [1]
+    assert last.objects[1].region.bbox == BODY
+
+
+def test_what_came_over_the_border_stays_itself_when_a_body_shows_behind_it() -> None:
+    def passing(i: int) -> Rect:
+        return (min(250, -38 + 12 * i), 190, 40, 40)
+
+    def whole(i: int) -> Rect | None:
+        return BODY if i >= 60 else None
+
+    told = kinds(scene(passing, whole))
+    assert told == [("entry", 1), ("entry", 2)]
