@@ -119,7 +119,7 @@ class Region:
         import numpy as np
 
         out = np.zeros((size[1], size[0]), dtype=bool)
-        x, y, w, h = self.bbox
+        x, y, _, _ = self.bbox
         left, top = max(0, -x), max(0, -y)
         inside = self.mask[top : max(top, size[1] - y), left : max(left, size[0] - x)]
         rows, columns = inside.shape
