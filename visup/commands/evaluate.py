@@ -39,7 +39,6 @@ MISSION_KEYS = (
     "view_deg",
     "fps",
 )
-PUBLIC_MISSION_KEYS = frozenset(MISSION_KEYS) - {"verdict"}
 
 
 @app.command("motion")

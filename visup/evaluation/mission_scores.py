@@ -1,7 +1,7 @@
 """Figures of a supervised mission against its truth, as pure functions.
 
 The definitions are those of the mission data's README: identity, events, stages, latency, alerts, verdict,
-view. Everything that was reported comes in as plain records (`Reported`), everything true as `Truths`,
+view. Everything that was reported comes in as plain records (`Told`, `StageSample`), everything true as `Truths`,
 and the two meet only here.
 """
 
