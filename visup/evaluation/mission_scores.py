@@ -1,8 +1,8 @@
 """Figures of a supervised mission against its truth, as pure functions.
 
 The definitions are those of the mission data's README: identity, events, stages, latency, alerts, verdict,
-view. Everything that was reported comes in as plain records (`Told`, `StageSample`), everything true as `Truths`,
-and the two meet only here.
+view. What was reported comes in as plain records (`Told`, `StageSample`), what is true as `Truths`, and
+the two meet only here.
 """
 
 from __future__ import annotations
