@@ -146,9 +146,10 @@ def _rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 def _wide(title: str, figures: Mapping[str, Any], keys: list[str]) -> Table:
     from rich.table import Table
 
-    table = Table("", title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", padding=(0, 0))
+    table.add_column("", no_wrap=True)
     for key in keys:
-        table.add_column(key, justify="right")
+        table.add_column(key, justify="right", no_wrap=True)
     for name, row in _rows(figures).items():
         if name == "total":
             table.add_section()
