@@ -14,7 +14,7 @@ from visup.percepts.motion.dense import CLIP
 from visup.percepts.motion.discovery import discover, middle, rate_of, same_motion, slack_of
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, distances, fit_affine
-from visup.percepts.motion.salience import is_salient
+from visup.percepts.motion.salience import LITTLE_BORDER, border_share, is_salient
 from visup.percepts.motion.scene import Measured, Scene, moves_like
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Indices, Motion, Track, remember
@@ -25,7 +25,8 @@ APART_S = 1.5
 VOTES = 3.0
 MOST_PARTS = 3
 LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
-SURE = 500.0  # the same for one that has only just appeared
+SURE = 200.0  # the same for one that has only just appeared
+LIMB = 0.5  # how large, as a share of its object, a part may be that is taken for a limb of it
 CONTACT = 5.0  # affinity of two cells that are flat and of one tone
 
 
@@ -157,15 +158,25 @@ def absorb(
         # Whose place it was counts first, then whom it touches.
         k = _most(scene.owner[part], len(tracks), 0.3)
         k = _most(winner[ring], len(tracks), 0.25) if k is None else k
+        size = scene.cells.area[part].sum()
         if k is not None:
             share = np.where(part, 1, out[k].share).astype(np.float32)
             out[k] = replace(out[k], share=share)
-        elif scene.cells.area[part].sum() > least_area(scene, settings):
+        elif size > least_area(scene, settings):
             t = _alone(part, scene, born + 1)
             if t is not None and len(out) < settings.max_regions:
                 born += 1
                 out.append(t)
     return tuple(out)
+
+
+def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: Scene) -> bool:
+    """Whether a part is too large, and reaches too far beyond the image, for a limb of its host."""
+    area = scene.cells.area
+    return bool(
+        area[part].sum() > LIMB * area[host].sum()
+        and border_share(part.astype(np.float32), scene.cells) > LITTLE_BORDER
+    )
 
 
 def _most(labels: Indices, count: int, share: float) -> int | None:
@@ -264,7 +275,7 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
             if not touch[i, j] and not touch[j, i]:
                 out[i] = replace(a, apart=_with(a.apart, b.key, apart + scene.seconds))
                 continue
-            if apart > APART_S:
+            if apart > APART_S or not _may_join(a, b, members[:, i], members[:, j], scene):
                 continue
             votes = a.alike.get(b.key, 0.0)
             if _grown_together(scene, members[:, i], members[:, j]):
@@ -278,6 +289,16 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
                 out[j] = replace(b, id=-1)
                 break
     return tuple(t for t in out if t.id >= 0)
+
+
+def _may_join(
+    a: Track, b: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], scene: Scene
+) -> bool:
+    """Whether one is not the ground on which the other goes; what was told is no ground."""
+    if bool(a.id) == bool(b.id):
+        return True
+    told, other = (in_a, in_b) if a.id else (in_b, in_a)
+    return not _is_ground(other, told, scene)
 
 
 def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, float]:
@@ -368,12 +389,17 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
     """
     out = []
     for t in tracks:
-        enough = SURE if scene.time - t.born < settings.confirm_s else LIKELY
-        if not t.id and _is_thin(t, scene):
-            enough = max(enough, 2 * LIKELY)
-        lasts = t.frames >= 3 and t.evidence > enough and t.seen == scene.time
-        if not t.id and lasts and is_salient(t, scene):
+        if not t.id and t.seen == scene.time and _is_sure(t, scene, settings):
             ids += 1
             t = replace(t, id=ids)
         out.append(t)
     return tuple(out), ids
+
+
+def _is_sure(t: Track, scene: Scene, settings: MotionSettings) -> bool:
+    """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
+    thin = 2.0 if _is_thin(t, scene) else 1.0
+    if t.frames >= 2 and t.evidence > thin * SURE and is_salient(t, scene, at_once=True):
+        return True
+    lasts = t.frames >= 3 and scene.time - t.born >= settings.confirm_s
+    return lasts and t.evidence > thin * LIKELY and is_salient(t, scene)

@@ -1,9 +1,10 @@
-"""Salient motion: whether a track goes somewhere, or only stirs where it is.
+"""Salient motion: whether a track goes somewhere by itself, or is a part of what surrounds it.
 
 Leaves, water and the errors of a background that is no plane move at every moment and get nowhere:
 over a longer baseline the background explains them again. Objects leave their place, and keep a
-course while they do. (Wixson, Detecting salient motion by accumulating directionally-consistent
-flow, 2000.)
+course while they do (Wixson, Detecting salient motion by accumulating directionally-consistent
+flow, 2000). The ground near a moving camera drifts from any one model of the background, but not
+from its own surroundings: so a track is compared with a motion fitted to the ring around it.
 """
 
 from __future__ import annotations
@@ -13,9 +14,14 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
-from visup.percepts.motion.layers import Doubles
+from visup.percepts.motion.background import slack_of
+from visup.percepts.motion.discovery import middle
+from visup.percepts.motion.image import Floats
+from visup.percepts.motion.layers import Affine, Doubles, distances, fit_affine
 from visup.percepts.motion.scene import Measured, Scene
+from visup.percepts.motion.superpixels import Superpixels
 from visup.percepts.motion.tracking import Indices, Track
 
 LEAST_GONE = 1.0  # pixels against the background: less is told of leaves as well
@@ -23,14 +29,19 @@ FAR_GONE = 4.0  # pixels, for a track too young to have swung back yet
 SWING_S = 0.4
 STRAIGHT = 0.7  # net way as a share of the way
 EXPLAINED = 0.35  # share of points that fit the background over the baseline that tells most
+CLEAR = 0.25  # the same for a track that is told at first sight
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
 FOLLOW = 0.3  # weight of the newest frame in running means
 FEWEST = 4
+RING_STEPS = 5  # cells around a track in which its surroundings are looked for
+FEWEST_AROUND = 8
 MOST_BORDER = 0.2  # share of the image border that an object may take up when it is first told
+LITTLE_BORDER = 0.04  # the same for one told at first sight: there parallax is greatest
+AHEAD = 0.4  # how much faster than the background, the same way, a near thing that rests may go
 
 
 def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track, ...]:
-    """Add up how far each track has gone against the background, and how well that explains it.
+    """Add up how far each track has gone from its surroundings, and how well they explain it.
 
     Args:
         tracks: K tracks, updated.
@@ -38,48 +49,109 @@ def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track
         winner: (count,) the label that has each superpixel; label k is track k - 1.
 
     Returns:
-        The tracks.
+        The tracks; those that are confirmed are left as they are.
     """
-    out = []
-    for k, t in enumerate(tracks, 1):
-        explained = dict(t.explained)
-        for m in scene.measured:
-            mine = winner[scene.cell_of(m.constraints.xy)] == k
-            if np.count_nonzero(mine) >= FEWEST:
-                share = float(np.mean(m.background.distances(m.constraints)[mine] < FITS))
-                before = explained.get(m.constraints.lag, share)
-                explained[m.constraints.lag] = before + FOLLOW * (share - before)
-        step = _step(t, scene.measured[0], scene.seconds)
-        out.append(
-            replace(
-                t,
-                explained=MappingProxyType(explained),
-                gone=(t.gone[0] + float(step[0]), t.gone[1] + float(step[1])),
-                way=t.way + float(np.hypot(*step)),
-            )
-        )
-    return tuple(out)
+    return tuple(t if t.id else _weighed(t, k, scene, winner) for k, t in enumerate(tracks, 1))
 
 
-def is_salient(t: Track, scene: Scene) -> bool:
+def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
+    explained = dict(t.explained)
+    ring = scene.cells.reach((winner == k)[:, None], RING_STEPS)[:, 0] & (winner == 0)
+    step: Doubles | None = None
+    for m in scene.measured:
+        at = scene.cell_of(m.constraints.xy)
+        mine, around = winner[at] == k, ring[at]
+        local = surroundings(m, around)
+        if np.count_nonzero(mine) >= FEWEST:
+            share = float(np.mean(_misfit(m, local)[mine] < FITS))
+            before = explained.get(m.constraints.lag, share)
+            explained[m.constraints.lag] = before + FOLLOW * (share - before)
+        if step is None:
+            step = _step(t, m, local, scene.seconds)
+    assert step is not None
+    return replace(
+        t,
+        explained=MappingProxyType(explained),
+        gone=(t.gone[0] + float(step[0]), t.gone[1] + float(step[1])),
+        way=t.way + float(np.hypot(*step)),
+    )
+
+
+def surroundings(m: Measured, around: NDArray[np.bool_]) -> Affine | None:
+    """The motion of what surrounds a region over one baseline; None when too little is seen of it.
+
+    Args:
+        m: Motion over the baseline.
+        around: (N,) bool, which constraints lie around the region.
+
+    Returns:
+        An affine motion fitted to those.
+    """
+    index = np.flatnonzero(around)
+    if len(index) < FEWEST_AROUND:
+        return None
+    c = m.constraints
+    return fit_affine(c, around.astype(np.float32), middle(c, index), rigidity=1.0, slack=0.2)
+
+
+def _misfit(m: Measured, local: Affine | None) -> NDArray[np.float32]:
+    """Squared distance of each constraint to the background or the surroundings, what fits best."""
+    out = m.background.distances(m.constraints)
+    if local is not None:
+        c = m.constraints
+        out = np.minimum(out, distances(local, c, slack_of(local, c)))
+    return out
+
+
+def is_salient(t: Track, scene: Scene, *, at_once: bool = False) -> bool:
     """Whether a track has left its place, on a course, over some baseline clearly.
 
     What takes up much of the image border is not surrounded by a ground, it is one: a near wall,
     the rocks in front.
+
+    Args:
+        t: The track.
+        scene: The frame.
+        at_once: Whether it is to be told at first sight: then its motion must be clearer, and must
+            not be one that a thing at rest near a moving camera may show.
+
+    Returns:
+        Whether it surely moves by itself.
     """
-    labels = scene.cells.labels
-    border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    if np.mean(t.share[border] > 0.5) > MOST_BORDER:
+    if border_share(t.share, scene.cells) > (LITTLE_BORDER if at_once else MOST_BORDER):
         return False
     gone = float(np.hypot(*t.gone))
-    clear = min(t.explained.values(), default=0.0) < EXPLAINED
+    explained = min(t.explained.values(), default=0.0)
+    if at_once:
+        return explained < CLEAR and gone >= LEAST_GONE and not _runs_ahead(t, scene)
     least = LEAST_GONE if scene.time - t.born >= SWING_S else FAR_GONE
-    return clear and gone >= max(least, STRAIGHT * t.way)
+    return explained < EXPLAINED and gone >= max(least, STRAIGHT * t.way)
 
 
-def _step(t: Track, m: Measured, seconds: float) -> Doubles:
+def border_share(share: Floats, cells: Superpixels) -> float:
+    """Share of the image border that a track (count,) takes up, 0 to 1."""
+    labels = cells.labels
+    border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    return float(np.mean(share[border] > 0.5))
+
+
+def _runs_ahead(t: Track, scene: Scene) -> bool:
+    """Whether a track moves as the background does, only faster: as near things at rest do."""
+    at = np.asarray([t.centre], dtype=np.float32)
+    ground = scene.measured[0].background.models[-1].at(at)[0]
+    speed = float(np.hypot(*ground))
+    if speed < 1.0:
+        return False
+    more = t.brisk() * scene.seconds - ground
+    along = float(more @ ground) / speed**2
+    across = abs(float(more[0] * ground[1] - more[1] * ground[0])) / speed**2
+    return along > 0 and across < along + AHEAD
+
+
+def _step(t: Track, m: Measured, local: Affine | None, seconds: float) -> Doubles:
     """(x, y) pixels that a track moved in a frame against the background nearest to its motion."""
     own = t.brisk() * seconds
     at = np.asarray([t.centre], dtype=np.float32)
-    ways = [own - b.at(at)[0] for b in m.background.models]
+    models = m.background.models if local is None else (*m.background.models, local)
+    ways = [own - b.at(at)[0] for b in models]
     return min(ways, key=lambda way: float(np.hypot(*way)))

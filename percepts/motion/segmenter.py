@@ -35,6 +35,8 @@ from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels, superpixels
 from visup.percepts.motion.tracking import Rate, Track, carry, priors, transition
 
+FARTHEST = 0.02  # share of the image that the camera may move over a baseline
+
 
 class MotionSegmenter:
     """Finds and follows what moves by itself; one per video.
@@ -117,13 +119,28 @@ class MotionSegmenter:
         owner = priors(tracks, cells).argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         measured = [self._measure(scene, tracks, 1, flow)]
-        measured += [self._measure(scene, tracks, lag, flow) for lag in self._turn()]
+        measured += [self._measure(scene, tracks, lag, flow) for lag in self._turn(image)]
         return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks
 
-    def _turn(self) -> list[int]:
-        """The longer baseline whose turn it is: they are measured one in each frame."""
-        lags = [lag for lag in self._history.lags(self.settings.lags_s) if lag > 1]
+    def _turn(self, image: WorkImage) -> list[int]:
+        """The longer baseline whose turn it is: they are measured one in each frame.
+
+        Long ones are for slow things. When the camera has turned far away since, there is little to
+        compare, and what there is misleads.
+        """
+        far = FARTHEST * max(image.shape)
+        lags = [
+            lag
+            for lag in self._history.lags(self.settings.lags_s)
+            if lag > 1 and self._turned(image, lag) < far
+        ]
         return [lags[self._count % len(lags)]] if lags else []
+
+    def _turned(self, image: WorkImage, lag: int) -> float:
+        """How far the camera is predicted to have moved the middle of the image, pixels."""
+        camera = self._predicted(image.time, image.time - self._history.back(lag).time)
+        middle = np.asarray([image.shape[::-1]], dtype=np.float32) / 2
+        return float(np.hypot(*camera.at(middle)[0]))
 
     def _measure(self, scene: Scene, tracks: tuple[Track, ...], lag: int, flow: Floats) -> Measured:
         """Constraints over one baseline, and the background that they show."""
