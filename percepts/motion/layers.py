@@ -7,6 +7,7 @@ second wide layer (a planet that drifts behind). Everything else that moves is a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,10 +40,11 @@ class Affine:
 
     def at(self, xy: Floats) -> Floats:
         """Displacements of (N, 2) positions, (N, 2) float32."""
-        out = xy @ self.matrix[:, :2].T + self.matrix[:, 2]
+        place = np.asarray(xy, dtype=np.float32)
+        out = place @ self.matrix[:, :2].T.astype(np.float32) + self.matrix[:, 2].astype(np.float32)
         if self.bend is not None:
-            out = out + _squares(xy) @ self.bend.T
-        return np.asarray(out, dtype=np.float32)
+            out += _squares(place) @ self.bend.T.astype(np.float32)
+        return np.asarray(out)
 
     def scaled(self, factor: float) -> Affine:
         """The same motion over a baseline that is `factor` times as long."""
@@ -50,9 +52,14 @@ class Affine:
         return Affine(self.matrix * factor, self.sigma * factor, self.support, bend)
 
 
-def _squares(xy: Floats) -> Doubles:
-    x, y = xy.T.astype(np.float64)
-    return np.stack([x * x, x * y, y * y], axis=1) / 1000.0
+def _squares(xy: Floats) -> Floats:
+    x, y = xy[:, 0], xy[:, 1]
+    out = np.empty((len(xy), 3), dtype=np.float32)
+    np.multiply(x, x, out=out[:, 0])
+    np.multiply(x, y, out=out[:, 1])
+    np.multiply(y, y, out=out[:, 2])
+    out /= 1000.0
+    return out
 
 
 def fit_bent(c: Constraints, weight: Floats, start: Affine, slack: float = 0.15) -> Affine:
@@ -67,18 +74,15 @@ def fit_bent(c: Constraints, weight: Floats, start: Affine, slack: float = 0.15)
     Returns:
         The bent motion.
     """
-    info = widened(c.information, slack)
-    centre, spread = c.xy.mean(axis=0), float(c.xy.std()) + 1.0
-    x, y = ((c.xy - centre) / spread).T.astype(np.float64)
-    phi = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
-    moved = c.moved.astype(np.float64)
-    fitted = start.at(c.xy)
+    use = np.flatnonzero(weight > 0)
+    if not len(use):
+        return start
+    xy, share = c.xy[use], weight[use]
+    centre, spread = xy.mean(axis=0), float(xy.std()) + 1.0
+    x, y = ((xy - centre) / spread).T.astype(np.float64)
+    phi = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)])
     hold = np.diag([1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-3] * 2) / slack**2
-    for _ in range(5):
-        m2 = mahalanobis((moved - fitted).astype(np.float32), info)
-        w = weight / (1 + m2 / 3.0**2) ** 2
-        model = _solve(phi, info.astype(np.float64), moved, w.astype(np.float64), hold)
-        fitted = np.asarray(phi @ model.T, dtype=np.float32)
+    model, w = _reweighted(_System(c, use, phi, slack), share, start.at(xy), hold, 3.0, 5)
     return _unscaled(model, centre, spread, float(w.sum()))
 
 
@@ -134,12 +138,16 @@ def widened(information: Floats, sigma: float) -> Floats:
     """Information after adding an isotropic variance to the covariance, (N, 3) float32."""
     if sigma <= 0:
         return information
-    a, b, c = information.T.astype(np.float64)
+    a, b, c = np.ascontiguousarray(information.T, dtype=np.float64)
     # (L^-1 + v I)^-1 = L (I + v L)^-1, in closed form for 2 x 2, safe when L is singular.
     v = sigma * sigma
     det = a * c - b * b
-    scale = 1 + v * (a + c) + v * v * det
-    return np.stack([(a + v * det) / scale, b / scale, (c + v * det) / scale], 1).astype(np.float32)
+    scale = 1 / (1 + v * (a + c) + v * v * det)
+    out = np.empty(information.shape, dtype=np.float32)
+    out[:, 0] = (a + v * det) * scale
+    out[:, 1] = b * scale
+    out[:, 2] = (c + v * det) * scale
+    return out
 
 
 def fit_affine(
@@ -169,36 +177,64 @@ def fit_affine(
     total = float(weight.sum())
     if total < 3.0:
         return Affine(guess.matrix, guess.sigma, 0.0)
-    info = widened(c.information, slack)
-    centre = np.average(c.xy, axis=0, weights=weight)
-    spread = float(np.sqrt(np.average(((c.xy - centre) ** 2).sum(1), weights=weight))) + 1.0
-    phi = np.concatenate([(c.xy - centre) / spread, np.ones((len(c), 1))], axis=1)
-    moved = c.moved.astype(np.float64)
-    model = np.zeros((2, 3))
-    fitted = guess.at(c.xy)
+    # What has no weight has no say, and an object has few of the constraints.
+    use = np.flatnonzero(weight > 0)
+    xy, share = c.xy[use], weight[use]
+    centre = (share @ xy) / total
+    spread = float(np.sqrt((share @ ((xy - centre) ** 2).sum(1)) / total)) + 1.0
+    phi = np.ones((3, len(use)))
+    phi[:2] = ((xy - centre) / spread).T
     # Along an edge nothing is known: the least motion is taken there, not a drifting guess.
     hold = np.diag([rigidity, rigidity, 0.01] * 2) / slack**2
-    w = weight.astype(np.float64)
-    for _ in range(rounds):
-        m2 = mahalanobis((moved - fitted).astype(np.float32), info)
-        w = weight / (1 + m2 / cutoff**2) ** 2
-        model = _solve(phi, info.astype(np.float64), moved, w, hold)
-        fitted = np.asarray(phi @ model.T, dtype=np.float32)
+    system = _System(c, use, phi, slack)
+    model, w = _reweighted(system, share, guess.at(xy), hold, cutoff, rounds)
     linear = model[:, :2] / spread
     matrix = np.concatenate([linear, (model[:, 2] - linear @ centre)[:, None]], axis=1)
-    support = float(w.sum())
-    mean_info = float((w * (info[:, 0] + info[:, 2])).sum()) / 2 + 1e-9
-    return Affine(matrix, float(1 / np.sqrt(mean_info)), support)
+    mean_info = float(w @ (system.info[0] + system.info[2])) / 2 + 1e-9
+    return Affine(matrix, float(1 / np.sqrt(mean_info)), float(w.sum()))
 
 
-def _solve(phi: Doubles, info: Doubles, residual: Doubles, w: Doubles, hold: Doubles) -> Doubles:
-    """Weighted normal equations of a model linear in `phi` (N, K); (2, K)."""
-    a, b, c = (info * w[:, None]).T
-    dx, dy = residual.T
-    blocks = [(phi * k[:, None]).T @ phi for k in (a, b, c)]
-    normal = np.block([[blocks[0], blocks[1]], [blocks[1], blocks[2]]]) + hold
-    right = np.concatenate([phi.T @ (a * dx + b * dy), phi.T @ (b * dx + c * dy)])
-    return np.asarray(np.linalg.solve(normal, right).reshape(2, -1))
+class _System:
+    """Least squares for a displacement field that is linear in `phi` (K, N)."""
+
+    def __init__(self, c: Constraints, use: NDArray[np.int64], phi: Doubles, slack: float) -> None:
+        self.phi = phi
+        self.info = widened(c.information[use], slack).T.astype(np.float64)
+        self.moved = c.moved[use].T.astype(np.float64)
+        a, b, d = self.info
+        dx, dy = self.moved
+        self._pull = np.stack([a * dx + b * dy, b * dx + d * dy])
+
+    def solve(self, w: Doubles, hold: Doubles) -> Doubles:
+        """(2, K) coefficients for (N,) weights."""
+        k = len(self.phi)
+        weighted = (self.info * w)[:, None] * self.phi
+        blocks = weighted.reshape(3 * k, -1) @ self.phi.T
+        normal = hold.copy()
+        normal[:k, :k] += blocks[:k]
+        normal[:k, k:] += blocks[k : 2 * k]
+        normal[k:, :k] += blocks[k : 2 * k]
+        normal[k:, k:] += blocks[2 * k :]
+        right = (self._pull * w) @ self.phi.T
+        return np.asarray(np.linalg.solve(normal, right.ravel()).reshape(2, k))
+
+    def squared(self, fitted: Doubles) -> Doubles:
+        """Squared Mahalanobis distance of each constraint to (2, N) displacements, (N,)."""
+        ex, ey = self.moved - fitted
+        a, b, d = self.info
+        return np.asarray((a * ex + 2 * b * ey) * ex + d * ey * ey)
+
+
+def _reweighted(
+    system: _System, weight: Floats, fitted: Floats, hold: Doubles, cutoff: float, rounds: int
+) -> tuple[Doubles, Doubles]:
+    """Iteratively reweighted least squares: (2, K) coefficients and the last (N,) weights."""
+    displaced = fitted.T.astype(np.float64)
+    for _ in range(rounds):
+        w = weight / (1 + system.squared(displaced) / cutoff**2) ** 2
+        model = system.solve(w, hold)
+        displaced = model @ system.phi
+    return model, w
 
 
 def spread_weights(
@@ -241,34 +277,72 @@ def fit_dominant(
     if len(usable) < 8:
         return guesses[0]
     rng = np.random.default_rng(seed)
-    info = widened(c.information, slack)
-
-    def score(model: Affine) -> float:
-        m2 = mahalanobis(model.at(c.xy) - c.moved, info)
-        return float((weight * np.maximum(0, 1 - m2 / 12.0)).sum())
-
-    best, best_score = guesses[0], 1.03 * score(guesses[0]) + 1e-6
-    for guess in guesses[1:]:
-        s = score(guess)
-        if s > best_score:
-            best, best_score = guess, s
-    chance = weight[usable] / weight[usable].sum()
-    if best_score < 0.8 * weight.sum():
-        for _ in range(40):
-            pick = rng.choice(usable, 4, replace=False, p=chance)
-            model = _exact(c, pick)
-            s = score(model)
-            if s > best_score:
-                best, best_score = model, s
+    part = _Part(
+        c.xy[usable], c.moved[usable], widened(c.information[usable], slack), weight[usable]
+    )
+    best, best_score = guesses[0], 1.03 * part.scores(guesses[:1])[0] + 1e-6
+    for guess, score in zip(guesses[1:], part.scores(guesses[1:]), strict=True):
+        if score > best_score:
+            best, best_score = guess, score
+    if best_score < 0.8 * part.weight.sum():
+        samples = _exact(c, usable[_draw(rng, part.weight)])
+        scores = part.scores(samples)
+        first = int(scores.argmax())
+        if scores[first] > best_score:
+            best = samples[first]
     # No ties to the guess: zoom and rotation of the camera must come out whole.
     return fit_affine(c, weight * 20, best, rigidity=0.02, rounds=5, slack=slack, cutoff=2.5)
 
 
-def _exact(c: Constraints, pick: NDArray[np.int64]) -> Affine:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """The constraints that a dominant motion is sought for: (N, 2), (N, 2), (N, 3), (N,)."""
+
+    xy: Floats
+    moved: Floats
+    info: Floats
+    weight: Floats
+
+    def scores(self, models: Sequence[Affine]) -> Floats:
+        """How much weight each of M motions explains, (M,) float32."""
+        if any(m.bend is not None for m in models):
+            each = [mahalanobis(m.at(self.xy) - self.moved, self.info) for m in models]
+            m2 = np.stack(each)
+        elif not len(models):
+            return np.zeros(0, np.float32)
+        else:
+            x, y = np.ascontiguousarray(self.xy.T)
+            matrices = np.stack([m.matrix for m in models]).astype(np.float32)
+            place = np.stack([x, y, np.ones_like(x)])
+            ex = matrices[:, 0] @ place - self.moved[:, 0]
+            ey = matrices[:, 1] @ place - self.moved[:, 1]
+            a, b, d = np.ascontiguousarray(self.info.T)
+            m2 = (a * ex + 2 * b * ey) * ex + d * ey * ey
+        return np.asarray(np.maximum(0, 1 - m2 / 12.0) @ self.weight)
+
+
+def _draw(rng: np.random.Generator, weight: Floats, samples: int = 40) -> NDArray[np.int64]:
+    """Random samples of four, by weight: (samples, 4). A point drawn twice does no harm."""
+    heap = np.cumsum(weight, dtype=np.float64)
+    at = np.searchsorted(heap, rng.random((samples, 4)) * heap[-1], side="right")
+    return np.asarray(np.minimum(at, len(weight) - 1))
+
+
+def _exact(c: Constraints, pick: NDArray[np.int64]) -> list[Affine]:
+    """Affine motions through each of (M, 4) samples of constraints."""
     xy, moved = c.xy[pick].astype(np.float64), c.moved[pick].astype(np.float64)
-    info = c.information[pick].astype(np.float64)
-    centre = xy.mean(0)
-    phi = np.concatenate([(xy - centre) / 50.0, np.ones((len(xy), 1))], axis=1)
-    model = _solve(phi, info, moved, np.ones(len(xy)), np.eye(6) * 1e-2)
-    linear = model[:, :2] / 50.0
-    return Affine(np.concatenate([linear, (model[:, 2] - linear @ centre)[:, None]], axis=1))
+    centre = xy.mean(axis=1)
+    phi = np.ones((*pick.shape, 3))
+    phi[..., :2] = (xy - centre[:, None]) / 50.0
+    a, b, d = np.moveaxis(c.information[pick].astype(np.float64), -1, 0)
+    dx, dy = moved[..., 0], moved[..., 1]
+    normal = np.empty((len(pick), 2, 3, 2, 3))
+    for i, j, k in ((0, 0, a), (0, 1, b), (1, 0, b), (1, 1, d)):
+        normal[:, i, :, j] = np.einsum("mn,mni,mnj->mij", k, phi, phi)
+    pull = np.stack([a * dx + b * dy, b * dx + d * dy], axis=1)
+    right = pull @ phi
+    system = normal.reshape(-1, 6, 6) + np.eye(6) * 1e-2
+    model = np.linalg.solve(system, right.reshape(-1, 6, 1)).reshape(-1, 2, 3)
+    linear = model[..., :2] / 50.0
+    shift = model[..., 2] - np.einsum("mij,mj->mi", linear, centre)
+    return [Affine(np.column_stack([m, s])) for m, s in zip(linear, shift, strict=True)]
