@@ -7,6 +7,7 @@ so a silhouette found on cells is as sharp as the image.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -32,6 +33,7 @@ class Superpixels:
         tone: (count, 3) float32 mean tone.
         link: (count, count) sparse float32, symmetric, affinity of neighbours by the length of
             their common border and the likeness of their tones.
+        runs: The cells along the rows of the image.
     """
 
     labels: NDArray[np.int32]
@@ -40,6 +42,7 @@ class Superpixels:
     centre: Floats
     tone: Floats
     link: sparse.csr_matrix
+    runs: Runs
 
     def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
@@ -50,9 +53,50 @@ class Superpixels:
         return np.asarray(near > 0)
 
     def mean(self, values: Floats) -> Floats:
-        """Mean of an (h, w) map in each cell, (count,) float32."""
-        total = np.bincount(self.labels.ravel(), weights=values.ravel(), minlength=self.count)
+        """Mean of an (h, w) map in each cell, (count,) float32; a map may be zero nearly all over.
+
+        Only the box around what is not zero is looked at.
+        """
+        x, y, w, h = cv2.boundingRect((values != 0).view(np.uint8))
+        if w == 0:
+            return np.zeros(self.count, dtype=np.float32)
+        if w * h > 0.3 * values.size:
+            return np.asarray(self.runs.total(values, self.count) / self.area, dtype=np.float32)
+        part = np.s_[y : y + h, x : x + w]
+        total = np.bincount(
+            self.labels[part].ravel(), weights=values[part].ravel(), minlength=self.count
+        )
         return np.asarray(total / self.area, dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """Where cells begin along the rows of an image: sums over cells are first taken over these.
+
+    Attributes:
+        start: (R,) int64 index of the first pixel of each run in the flattened image.
+        length: (R,) int64 pixels.
+        label: (R,) int64 cell.
+    """
+
+    start: NDArray[np.int64]
+    length: NDArray[np.int64]
+    label: NDArray[np.int64]
+
+    def total(self, values: NDArray[Any], count: int) -> NDArray[np.float64]:
+        """Sum of an (h, w) map over each cell, (count,)."""
+        kind = np.int32 if values.dtype.kind in "bu" else None
+        each = np.add.reduceat(values.ravel(), self.start, dtype=kind)
+        return np.bincount(self.label, weights=each, minlength=count).astype(np.float64)
+
+
+def runs_of(codes: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First index and length of each run of equal values along the rows of an (h, w) map."""
+    height, width = codes.shape
+    begins = np.ones((height, width), dtype=bool)
+    np.not_equal(codes[:, 1:], codes[:, :-1], out=begins[:, 1:])
+    start = np.flatnonzero(begins.ravel())
+    return start, np.diff(start, append=codes.size)
 
 
 def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
@@ -68,33 +112,39 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     """
     height, width = image.shape
     seeds = np.zeros((height, width), dtype=np.int32)
-    ys, xs = _seeds(image, cell)
+    busy = np.abs(image.gx) + np.abs(image.gy)
+    ys, xs = _seeds(busy, cell)
     seeds[ys, xs] = np.arange(1, len(ys) + 1)
     labels = cv2.watershed(image.tone, seeds)
-    grown = cv2.dilate(np.maximum(labels, 0).astype(np.int16), np.ones((3, 3), np.uint8))
-    filled = np.where(labels > 0, labels, grown).astype(np.int32) - 1
-    filled = np.maximum(filled, 0)
+    # Lines between the cells go to the later of the cells beside them.
+    ridge = np.maximum(labels, 0).astype(np.uint16)
+    grown = cv2.dilate(ridge, np.ones((3, 3), np.uint8))
+    filled = np.maximum(np.where(ridge > 0, ridge, grown).astype(np.int32) - 1, 0)
     count = len(ys)
-    flat = filled.ravel()
-    area = np.maximum(np.bincount(flat, minlength=count), 1).astype(np.float32)
-    planes = cv2.split(image.tone)
-    sums = [np.bincount(flat, weights=p.ravel(), minlength=count) for p in planes]
-    tone = (np.stack(sums, axis=1) / area[:, None]).astype(np.float32)
-    h_index, w_index = np.divmod(np.arange(height * width), width)
+    start, length = runs_of(filled)
+    runs = Runs(start, length, filled.ravel()[start].astype(np.int64))
+
+    def mean(total: NDArray[Any]) -> Floats:
+        return np.asarray(total / area, dtype=np.float32)
+
+    area = np.maximum(np.bincount(runs.label, weights=length, minlength=count), 1).astype(
+        np.float32
+    )
+    tone = np.stack([mean(runs.total(p, count)) for p in cv2.split(image.tone)], axis=1)
+    row, col = np.divmod(start, width)
+    xs_of, ys_of = length * (col + (length - 1) / 2), length * row
     centre = np.stack(
-        [np.bincount(flat, weights=w, minlength=count) / area for w in (w_index, h_index)], axis=1
-    ).astype(np.float32)
-    busy = np.abs(image.gx) + np.abs(image.gy)
-    mean = np.bincount(flat, weights=busy.ravel(), minlength=count) / area
-    calm = np.exp(-0.5 * (mean / CALM) ** 2).astype(np.float32)
+        [mean(np.bincount(runs.label, weights=w, minlength=count)) for w in (xs_of, ys_of)], axis=1
+    )
+    calm = np.exp(-0.5 * (mean(runs.total(busy, count)) / CALM) ** 2).astype(np.float32)
     link = _links(filled, count, tone, calm, contrast, cell)
-    return Superpixels(filled, count, area, centre, tone, link)
+    return Superpixels(filled, count, area, centre, tone, link, runs)
 
 
-def _seeds(image: WorkImage, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _seeds(busy: Floats, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The flattest place of each cell, so that no seed sits on an edge."""
-    rows, cols = image.shape[0] // cell, image.shape[1] // cell
-    strength = cv2.boxFilter(np.abs(image.gx) + np.abs(image.gy), -1, (3, 3))
+    rows, cols = busy.shape[0] // cell, busy.shape[1] // cell
+    strength = cv2.boxFilter(busy, -1, (3, 3))
     cells = strength[: rows * cell, : cols * cell].reshape(rows, cell, cols, cell)
     inner = cells[:, 1:-1, :, 1:-1].transpose(0, 2, 1, 3).reshape(rows * cols, -1)
     best, side = inner.argmin(axis=1), cell - 2
@@ -107,16 +157,35 @@ def _links(
 ) -> sparse.csr_matrix:
     pairs = []
     for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
-        differ = a != b
-        pairs.append((a[differ], b[differ]))
-    i = np.concatenate([p[0] for p in pairs])
-    j = np.concatenate([p[1] for p in pairs])
-    ones = np.full(len(i), 1.0 / cell, dtype=np.float32)
-    border = sparse.coo_matrix((ones, (i, j)), shape=(count, count)).tocsr()
-    border = (border + border.T).tocoo()
-    unlike = np.abs(tone[border.row] - tone[border.col]).max(axis=1)
-    stiff = 1 + STIFF * calm[border.row] * calm[border.col]
+        differ = np.flatnonzero(a != b)
+        one, other = a.ravel()[differ], b.ravel()[differ]
+        pairs.append(np.minimum(one, other).astype(np.int64) * count + np.maximum(one, other))
+    # Neighbours in the order of their numbers; how often they touch is the length of the border.
+    pair, pixels = np.unique(np.concatenate(pairs), return_counts=True)
+    i, j = np.divmod(pair, count)
+    unlike = np.abs(tone[i] - tone[j]).max(axis=1)
+    stiff = 1 + STIFF * calm[i] * calm[j]
     alike = stiff * np.exp(-0.5 * (unlike / contrast) ** 2) + LOOSE
-    length = np.minimum(border.data, 2.0)
-    link = sparse.coo_matrix((length * alike, (border.row, border.col)), shape=(count, count))
-    return link.tocsr()
+    value = (np.minimum(pixels / cell, 2.0) * alike).astype(np.float32)
+    both = np.concatenate([value, value]), (np.concatenate([i, j]), np.concatenate([j, i]))
+    return sparse.coo_matrix(both, shape=(count, count)).tocsr()
+
+
+def overlap(old: Superpixels, new: Superpixels, from_where: NDArray[np.int32]) -> sparse.csr_matrix:
+    """Which old cells the pixels of each new cell come from.
+
+    Args:
+        old: Cells of the old image.
+        new: Cells of the new image.
+        from_where: (h, w) int32 old cell of each pixel of the new image, -1 for none.
+
+    Returns:
+        (new count, old count) sparse float32 shares; rows sum to 1, or less.
+    """
+    code = new.labels.astype(np.int64) * (old.count + 1) + (from_where + 1)
+    start, length = runs_of(code)
+    i, j = np.divmod(code.ravel()[start], old.count + 1)
+    known = j > 0
+    i, j = i[known], j[known] - 1
+    share = (length[known] / new.area[i]).astype(np.float32)
+    return sparse.coo_matrix((share, (i, j)), shape=(new.count, old.count)).tocsr()

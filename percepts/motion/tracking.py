@@ -17,7 +17,7 @@ from scipy import sparse
 
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, Doubles
-from visup.percepts.motion.superpixels import Superpixels
+from visup.percepts.motion.superpixels import Superpixels, overlap
 
 Indices = NDArray[np.int64]
 BRISK_S = 0.25  # baselines up to which a velocity is that of the moment, seconds
@@ -220,11 +220,7 @@ def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=-1,
     )
-    i, j = new.labels.ravel(), from_where.ravel().astype(np.int64)
-    known = j >= 0
-    i, j = i[known], j[known]
-    joint = sparse.coo_matrix((np.ones(len(i), np.float32), (i, j)), (new.count, old.count)).tocsr()
-    return sparse.diags(1.0 / new.area).astype(np.float32) @ joint
+    return overlap(old, new, from_where.astype(np.int32))
 
 
 def carry(
