@@ -117,30 +117,41 @@ def compare(
     old: WorkImage,
     models: Sequence[Affine],
     box: tuple[int, int, int, int],
-    noise: float,
+    precision: Floats,
 ) -> Floats:
     """Log likelihood of pixels when the old image is warped by a layer's motions (the best counts).
 
     Args:
         new: The newest image.
         old: The older image.
-        models: Displacements from old to new.
+        models: Displacements from old to new; at least one.
         box: (x, y, width, height) of the part to compare.
-        noise: Standard deviation of grey values.
+        precision: (h, w) float32 inverse variance of grey values, of the whole image.
 
     Returns:
         (height, width) float32, from -4.5 to 0.
     """
     x, y, w, h = box
-    here = new.grey[y : y + h, x : x + w].astype(np.float32)
-    slope = np.hypot(new.gx[y : y + h, x : x + w], new.gy[y : y + h, x : x + w])
-    sigma2 = (1.5 * noise) ** 2 + (0.35 * slope) ** 2
-    best = np.full((h, w), np.inf, dtype=np.float32)
+    part = np.s_[y : y + h, x : x + w]
+    off: Floats | None = None
     for model in models:
-        there = _warp(old.grey, model, box)
-        off = cv2.blur(np.abs(here - there.astype(np.float32)), (3, 3))
-        best = np.minimum(best, off * off)
-    return np.asarray(-0.5 * np.minimum(best / sigma2, 9.0), dtype=np.float32)
+        there = cv2.absdiff(new.grey[part], _warp(old.grey, model, box))
+        each = cv2.boxFilter(there, cv2.CV_32F, (3, 3))
+        off = np.asarray(each) if off is None else np.minimum(off, each, out=off)
+    assert off is not None, "a layer has a motion"
+    np.multiply(off, off, out=off)
+    np.multiply(off, precision[part], out=off)
+    np.minimum(off, 9.0, out=off)
+    return np.multiply(off, np.float32(-0.5), out=off)
+
+
+def precision_of(image: WorkImage, noise: float) -> Floats:
+    """Inverse variance to expect of a warped image's grey values, (h, w) float32.
+
+    Where the image is steep, a small error of the motion makes a large one of the grey value.
+    """
+    slope2 = image.gx * image.gx + image.gy * image.gy
+    return np.asarray(1 / ((1.5 * noise) ** 2 + 0.35**2 * slope2), dtype=np.float32)
 
 
 def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]) -> NDArray[Any]:
@@ -179,50 +190,48 @@ def warped(
     any_near = np.asarray(near.any(axis=1))
     if not any_near.any():
         return out
-    box = _box_of(any_near[cells.labels])
-    zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, noise), box)
+    precision = precision_of(scene.image, noise)
+    box = cells.box(any_near)
+    zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, precision), box)
     out[any_near, 0] = zero[any_near]
     out[any_near, 1:] = -4.5
     for k, t in enumerate(tracks, 1):
-        mine = near[:, k - 1]
-        if mine.any():
-            box = _box_of(mine[cells.labels])
-            fit = compare(scene.image, old, t.predicted(c.lag, c.span_s), box, noise)
+        mine = np.flatnonzero(near[:, k - 1])
+        if len(mine):
+            models = t.predicted(c.lag, c.span_s)
+            box = cells.box(near[:, k - 1])
+            fit = compare(scene.image, old, models, box, precision)
             out[mine, k] = _cell_mean(cells, fit, box)[mine]
-            hid = mine & _was_hidden(scene, t.predicted(c.lag, c.span_s)[0], k)
+            hid = mine[_was_hidden(scene, mine, models[0], k)]
             out[hid, 0] = np.maximum(out[hid, 0], out[hid, k])
     out[any_near, -1] = out[any_near, :-1].max(axis=1)
     return out
 
 
-def _was_hidden(scene: Scene, model: Affine, k: int) -> NDArray[np.bool_]:
-    """Cells that, were they background, the track would have hidden in the older image.
+def _was_hidden(scene: Scene, which: NDArray[np.int64], model: Affine, k: int) -> NDArray[np.bool_]:
+    """Which of some cells, were they background, the track would have hidden in the older image.
 
     There the background need not look as it does now, so a poor comparison says nothing against it.
     """
     cells, background = scene.cells, scene.measured[-1].background.models
     height, width = cells.labels.shape
-    out = np.zeros(cells.count, dtype=bool)
+    centre = cells.centre[which]
+    out = np.zeros(len(which), dtype=bool)
     for ground in background:
-        away = model.at(cells.centre) - ground.at(cells.centre)
-        away += 2.0 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-3)
-        at = np.rint(cells.centre + 1.2 * away).astype(np.int64)
+        away = model.at(centre) - ground.at(centre)
+        away += 2.0 * away / np.maximum(np.hypot(away[:, :1], away[:, 1:]), 1e-3)
+        at = np.rint(centre + 1.2 * away).astype(np.int64)
         x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
         out |= scene.owner[cells.labels[y, x]] == k
     return out
 
 
-def _box_of(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
-    return x, y, w, h
-
-
 def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
+    """Mean of a map of a box in each cell; only of cells that lie in it whole."""
     x, y, w, h = box
-    where = cells.labels[y : y + h, x : x + w].ravel()
+    where = cells.labels[y : y + h, x : x + w].ravel().astype(np.int64)
     total = np.bincount(where, weights=values.ravel(), minlength=cells.count)
-    number = np.bincount(where, minlength=cells.count)
-    return np.asarray(total / np.maximum(number, 1), dtype=np.float32)
+    return np.asarray(total / cells.area, dtype=np.float32)
 
 
 def label(

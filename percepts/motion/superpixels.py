@@ -33,7 +33,8 @@ class Superpixels:
         tone: (count, 3) float32 mean tone.
         link: (count, count) sparse float32, symmetric, affinity of neighbours by the length of
             their common border and the likeness of their tones.
-        runs: The cells along the rows of the image.
+        pixels: (count, h * w) sparse float32, 1 where a pixel is in a cell, in scan order: sums
+            over cells are products with it.
     """
 
     labels: NDArray[np.int32]
@@ -42,7 +43,7 @@ class Superpixels:
     centre: Floats
     tone: Floats
     link: sparse.csr_matrix
-    runs: Runs
+    pixels: sparse.csr_matrix
 
     def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
@@ -53,50 +54,21 @@ class Superpixels:
         return np.asarray(near > 0)
 
     def mean(self, values: Floats) -> Floats:
-        """Mean of an (h, w) map in each cell, (count,) float32; a map may be zero nearly all over.
+        """Mean of an (h, w) map in each cell, (count,) float32."""
+        return np.asarray(self.pixels @ values.ravel() / self.area)
 
-        Only the box around what is not zero is looked at.
-        """
-        x, y, w, h = cv2.boundingRect((values != 0).view(np.uint8))
-        if w == 0:
-            return np.zeros(self.count, dtype=np.float32)
-        if w * h > 0.3 * values.size:
-            return np.asarray(self.runs.total(values, self.count) / self.area, dtype=np.float32)
-        part = np.s_[y : y + h, x : x + w]
-        total = np.bincount(
-            self.labels[part].ravel(), weights=values[part].ravel(), minlength=self.count
-        )
-        return np.asarray(total / self.area, dtype=np.float32)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Runs:
-    """Where cells begin along the rows of an image: sums over cells are first taken over these.
-
-    Attributes:
-        start: (R,) int64 index of the first pixel of each run in the flattened image.
-        length: (R,) int64 pixels.
-        label: (R,) int64 cell.
-    """
-
-    start: NDArray[np.int64]
-    length: NDArray[np.int64]
-    label: NDArray[np.int64]
-
-    def total(self, values: NDArray[Any], count: int) -> NDArray[np.float64]:
-        """Sum of an (h, w) map over each cell, (count,)."""
-        kind = np.int32 if values.dtype.kind in "bu" else None
-        each = np.add.reduceat(values.ravel(), self.start, dtype=kind)
-        return np.bincount(self.label, weights=each, minlength=count).astype(np.float64)
-
-
-def runs_of(codes: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First index and length of each run of equal values along the rows of an (h, w) map."""
-    height, width = codes.shape
-    begins = np.ones((height, width), dtype=bool)
-    np.not_equal(codes[:, 1:], codes[:, :-1], out=begins[:, 1:])
-    start = np.flatnonzero(begins.ravel())
-    return start, np.diff(start, append=codes.size)
+    def box(self, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+        """(x, y, width, height) of the smallest box around some cells; empty when there are none."""
+        rows = np.flatnonzero(members & (np.diff(self.pixels.indptr) > 0))
+        if not len(rows):
+            return 0, 0, 0, 0
+        first, end = self.pixels.indptr[rows], self.pixels.indptr[rows + 1]
+        width = self.labels.shape[1]
+        top = int(self.pixels.indices[first].min()) // width
+        bottom = int(self.pixels.indices[end - 1].max()) // width + 1
+        inside = members[self.labels[top:bottom]].view(np.uint8)
+        x, _, w, _ = cv2.boundingRect(inside)
+        return x, top, w, bottom - top
 
 
 def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
@@ -121,24 +93,18 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     grown = cv2.dilate(ridge, np.ones((3, 3), np.uint8))
     filled = np.maximum(np.where(ridge > 0, ridge, grown).astype(np.int32) - 1, 0)
     count = len(ys)
-    start, length = runs_of(filled)
-    runs = Runs(start, length, filled.ravel()[start].astype(np.int64))
+    pixels = _pixels(filled, count)
+    area = np.maximum(np.diff(pixels.indptr), 1).astype(np.float32)
 
-    def mean(total: NDArray[Any]) -> Floats:
-        return np.asarray(total / area, dtype=np.float32)
+    def mean(values: NDArray[Any]) -> Floats:
+        return np.asarray(pixels @ values.ravel().astype(np.float32, copy=False) / area)
 
-    area = np.maximum(np.bincount(runs.label, weights=length, minlength=count), 1).astype(
-        np.float32
-    )
-    tone = np.stack([mean(runs.total(p, count)) for p in cv2.split(image.tone)], axis=1)
-    row, col = np.divmod(start, width)
-    xs_of, ys_of = length * (col + (length - 1) / 2), length * row
-    centre = np.stack(
-        [mean(np.bincount(runs.label, weights=w, minlength=count)) for w in (xs_of, ys_of)], axis=1
-    )
-    calm = np.exp(-0.5 * (mean(runs.total(busy, count)) / CALM) ** 2).astype(np.float32)
+    tone = np.stack([mean(plane) for plane in cv2.split(image.tone)], axis=1)
+    grid = np.mgrid[:height, :width].astype(np.float32)
+    centre = np.stack([mean(grid[1]), mean(grid[0])], axis=1)
+    calm = np.exp(-0.5 * (mean(busy) / CALM) ** 2).astype(np.float32)
     link = _links(filled, count, tone, calm, contrast, cell)
-    return Superpixels(filled, count, area, centre, tone, link, runs)
+    return Superpixels(filled, count, area, centre, tone, link, pixels)
 
 
 def _seeds(busy: Floats, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -150,6 +116,15 @@ def _seeds(busy: Floats, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64
     best, side = inner.argmin(axis=1), cell - 2
     number = np.arange(rows * cols)
     return (number // cols) * cell + best // side + 1, (number % cols) * cell + best % side + 1
+
+
+def _pixels(labels: NDArray[np.int32], count: int) -> sparse.csr_matrix:
+    """Which pixels each cell consists of, in scan order."""
+    ones = np.ones(labels.size, dtype=np.float32)
+    places = labels.ravel(), np.arange(labels.size, dtype=np.int32)
+    members = sparse.coo_matrix((ones, places), shape=(count, labels.size))
+    members.has_canonical_format = True  # no pixel is in two cells: nothing to sum
+    return members.tocsr()
 
 
 def _links(
@@ -180,12 +155,11 @@ def overlap(old: Superpixels, new: Superpixels, from_where: NDArray[np.int32]) -
         from_where: (h, w) int32 old cell of each pixel of the new image, -1 for none.
 
     Returns:
-        (new count, old count) sparse float32 shares; rows sum to 1, or less.
+        (new count, old count) sparse float32 shares, entries not summed; rows sum to 1, or less.
     """
-    code = new.labels.astype(np.int64) * (old.count + 1) + (from_where + 1)
-    start, length = runs_of(code)
-    i, j = np.divmod(code.ravel()[start], old.count + 1)
-    known = j > 0
-    i, j = i[known], j[known] - 1
-    share = (length[known] / new.area[i]).astype(np.float32)
-    return sparse.coo_matrix((share, (i, j)), shape=(new.count, old.count)).tocsr()
+    source = from_where.ravel()[new.pixels.indices]
+    known = source >= 0
+    # Each pixel is an entry of its own: products cost less than finding those that are alike.
+    share = known / np.repeat(new.area, np.diff(new.pixels.indptr))
+    entries = share.astype(np.float32), np.where(known, source, 0), new.pixels.indptr
+    return sparse.csr_matrix(entries, shape=(new.count, old.count))
