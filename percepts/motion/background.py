@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -94,9 +94,18 @@ class Background:
     fixed: bool | None
     ground: Ground
     sure: bool
+    _known: list[tuple[Constraints, Floats]] = field(default_factory=list, repr=False)
 
     def distances(self, c: Constraints) -> Floats:
-        """Squared distance of each constraint to the likeliest background motion, (N,) float32."""
+        """Squared distance of each constraint to the likeliest background motion, (N,) float32.
+
+        Every track asks for it with the same constraints, so the last answer is kept.
+        """
+        if not self._known or self._known[0][0] is not c:
+            self._known[:] = [(c, self._distances(c))]
+        return self._known[0][1]
+
+    def _distances(self, c: Constraints) -> Floats:
         prior = self.ground.log_prior(c.xy, len(self.models))
         each = [distances(m, c, slack_of(m, c)) / self.scale**2 for m in self.models]
         return np.asarray(np.min(np.stack(each) - 2 * prior, axis=0), dtype=np.float32)

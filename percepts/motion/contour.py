@@ -80,9 +80,11 @@ def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
     largest = int(areas.max())
     if largest < least:
         return None
-    keep = np.zeros(count, dtype=bool)
+    keep = np.ones(count, dtype=bool)
     keep[1:] = areas >= max(0.1 * largest, 0.25 * least)
-    return _filled(np.asarray(keep[labels]), HOLE * largest)
+    # Most regions are of one piece without a hole: then there is nothing to repaint.
+    whole = mask if keep.all() else mask & keep[labels]
+    return _filled(whole, HOLE * largest)
 
 
 def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
@@ -91,7 +93,7 @@ def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] <= most
     small[[0, labels[0, 0]]] = False
-    return np.asarray(mask | small[labels][1:-1, 1:-1])
+    return np.asarray(mask | small[labels][1:-1, 1:-1]) if small.any() else mask
 
 
 def describe(mask: NDArray[np.bool_], origin: tuple[int, int], size: tuple[int, int]) -> Outline:

@@ -67,7 +67,8 @@ def prepare(frame: Frame, work_size: int) -> WorkImage:
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     gx = np.asarray(cv2.Scharr(grey, cv2.CV_32F, 1, 0, scale=1 / 32), dtype=np.float32)
     gy = np.asarray(cv2.Scharr(grey, cv2.CV_32F, 0, 1, scale=1 / 32), dtype=np.float32)
-    return WorkImage(frame.time, scale, grey, np.asarray(LIFT[image]), gx, gy)
+    tone = np.asarray(cv2.LUT(image, LIFT), dtype=np.uint8)
+    return WorkImage(frame.time, scale, grey, tone, gx, gy)
 
 
 class History:

@@ -40,26 +40,22 @@ class Affine:
 
     def at(self, xy: Floats) -> Floats:
         """Displacements of (N, 2) positions, (N, 2) float32."""
-        place = np.asarray(xy, dtype=np.float32)
-        out = place @ self.matrix[:, :2].T.astype(np.float32) + self.matrix[:, 2].astype(np.float32)
-        if self.bend is not None:
-            out += _squares(place) @ self.bend.T.astype(np.float32)
-        return np.asarray(out)
+        x, y = np.ascontiguousarray(xy.T, dtype=np.float32)
+        out = np.empty((len(xy), 2), dtype=np.float32)
+        bend = np.zeros((2, 3)) if self.bend is None else self.bend / 1000.0
+        for i, ((a, b, c), (d, e, f)) in enumerate(
+            zip(self.matrix.tolist(), bend.tolist(), strict=True)
+        ):
+            if self.bend is None:
+                out[:, i] = a * x + b * y + c
+            else:
+                out[:, i] = (a + d * x + e * y) * x + (b + f * y) * y + c
+        return out
 
     def scaled(self, factor: float) -> Affine:
         """The same motion over a baseline that is `factor` times as long."""
         bend = None if self.bend is None else self.bend * factor
         return Affine(self.matrix * factor, self.sigma * factor, self.support, bend)
-
-
-def _squares(xy: Floats) -> Floats:
-    x, y = xy[:, 0], xy[:, 1]
-    out = np.empty((len(xy), 3), dtype=np.float32)
-    np.multiply(x, x, out=out[:, 0])
-    np.multiply(x, y, out=out[:, 1])
-    np.multiply(y, y, out=out[:, 2])
-    out /= 1000.0
-    return out
 
 
 def fit_bent(c: Constraints, weight: Floats, start: Affine, slack: float = 0.15) -> Affine:

@@ -47,15 +47,23 @@ class Superpixels:
 
     def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
-        near = members.astype(np.float32)
+        near = members
         for _ in range(steps):
-            near = np.minimum(near + self.link @ near, 1.0)
-            near = (near > 0).astype(np.float32)
-        return np.asarray(near > 0)
+            amount = near.astype(np.float32)
+            near = self.link @ amount + amount > 0
+        return np.asarray(near)
 
     def mean(self, values: Floats) -> Floats:
         """Mean of an (h, w) map in each cell, (count,) float32."""
         return np.asarray(self.pixels @ values.ravel() / self.area)
+
+    def paint(self, members: NDArray[np.bool_]) -> Floats:
+        """A map that is 1 in some cells and 0 elsewhere, (h, w) float32."""
+        out = np.zeros(self.labels.shape, dtype=np.float32)
+        x, y, w, h = self.box(members)
+        part = np.s_[y : y + h, x : x + w]
+        out[part] = members[self.labels[part]]
+        return out
 
     def box(self, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
         """(x, y, width, height) of the smallest box around some cells; empty when there are none."""
@@ -100,8 +108,8 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
         return np.asarray(pixels @ values.ravel().astype(np.float32, copy=False) / area)
 
     tone = np.stack([mean(plane) for plane in cv2.split(image.tone)], axis=1)
-    grid = np.mgrid[:height, :width].astype(np.float32)
-    centre = np.stack([mean(grid[1]), mean(grid[0])], axis=1)
+    along = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)
+    centre = np.stack([mean(np.tile(along[0], height)), mean(np.repeat(along[1], width))], axis=1)
     calm = np.exp(-0.5 * (mean(busy) / CALM) ** 2).astype(np.float32)
     link = _links(filled, count, tone, calm, contrast, cell)
     return Superpixels(filled, count, area, centre, tone, link, pixels)

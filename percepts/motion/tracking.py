@@ -253,7 +253,7 @@ def carry(
     last = track.path[-1] if track.path else (track.born, 0.0, 0.0)
     here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
     path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
-    own = (track.share > 0.5).astype(np.float32)[old.labels]
+    own = old.paint(track.share > 0.5)
     if track.hidden is not None:
         own = np.maximum(own, track.hidden)
     own = shift(own, int(whole[0]), int(whole[1]))
@@ -353,7 +353,7 @@ def remember(
     covered = (winner > 0) & ~mine & (track.own > 0.5 if track.own is not None else False)
     # A cell or two beside another object is no occlusion.
     much = cells.area[covered].sum() > max(0.05 * area, 0.3 * least)
-    hidden = covered.astype(np.float32)[cells.labels] if much else None
+    hidden = cells.paint(covered) if much else None
     return replace(
         track,
         share=share,
