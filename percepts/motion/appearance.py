@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
@@ -38,7 +40,7 @@ def appearance(cells: Superpixels, prior: Floats, least: float = 12.0) -> Floats
     return np.asarray(out / out.sum(axis=1, keepdims=True), dtype=np.float32)
 
 
-def _smooth(histogram: NDArray[np.float64]) -> NDArray[np.float64]:
+def _smooth(histogram: NDArray[Any]) -> NDArray[Any]:
     """A flat histogram after a Gaussian along each of its three axes."""
     out = histogram
     for _ in range(3):
