@@ -152,8 +152,12 @@ def track(
         return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_nothing())
     start = points.xy.reshape(-1, 1, 2).copy()
     begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
-    there, found, misfit = _follow(new.grey, old.grey, start, begin)
-    home, back, _ = _follow(old.grey, new.grey, there, start.copy())
+    there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 2)
+    # The way back is nearly known: it needs no coarse images. It begins as far beside as the guess
+    # was off, for a search that begins where it should end proves little; over a long baseline,
+    # where guesses are poor, no more than that can be asked.
+    aside = there - begin if lag == 1 else np.float32(0)
+    home, back, _ = _follow(old.grey, new.grey, there, start + aside, 0)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # What is said of points that were lost is not even finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
@@ -171,7 +175,11 @@ def track(
 
 
 def _follow(
-    source: NDArray[np.uint8], target: NDArray[np.uint8], start: Floats, begin: Floats
+    source: NDArray[np.uint8],
+    target: NDArray[np.uint8],
+    start: Floats,
+    begin: Floats,
+    levels: int,
 ) -> tuple[Floats, NDArray[np.uint8], Floats]:
     """Pyramidal Lucas-Kanade from given starting values: (N, 1, 2), (N, 1), (N, 1)."""
     end, found, misfit = cv2.calcOpticalFlowPyrLK(
@@ -180,7 +188,7 @@ def _follow(
         start,
         begin,
         winSize=(WINDOW, WINDOW),
-        maxLevel=2,
+        maxLevel=levels,
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         minEigThreshold=1e-5,
     )

@@ -106,6 +106,8 @@ def spread(
         system.tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
+        relax=1,  # cells have so few neighbours that there is nothing to gather in dense blocks
+        panel_size=1,
         options={"SymmetricMode": True},
     ).solve(right.astype(np.float64))
     out = np.maximum(out, 0)
