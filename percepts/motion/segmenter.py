@@ -8,13 +8,20 @@ them best, and the outlines so found say which constraints a layer may use in th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import cv2
 import numpy as np
 
 from visup.agent import Directive, Frame, Region
 from visup.percepts.motion.background import bare_ground, find_background
-from visup.percepts.motion.constraints import find_points, track, with_flow
+from visup.percepts.motion.constraints import (
+    Constraints,
+    Points,
+    find_points,
+    track,
+    with_flow,
+)
 from visup.percepts.motion.dense import flow_back, label, warped
 from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
@@ -47,6 +54,8 @@ class MotionSegmenter:
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
         self.settings = settings or MotionSettings()
+        # Cells and points do not need each other: one core each. What is found is the same.
+        self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._reset((0, 0))
 
@@ -76,19 +85,21 @@ class MotionSegmenter:
         image = prepare(frame, self.settings.work_size)
         self._history.push(image)
         self._count += 1
-        cells = superpixels(image, self.settings.cell, self.settings.contrast)
-        before, self._cells = self._cells, cells
+        coming = self._beside.submit(superpixels, image, self.settings.cell, self.settings.contrast)
+        before = self._cells
         if before is None:
+            self._cells = coming.result()
             self._grid = _grid(image.shape)
             self._ground = bare_ground(image.shape)
             return ()
-        scene, tracks = self._look(image, before, cells)
+        scene, tracks = self._look(image, before, coming)
+        cells = self._cells = scene.cells
         tracks = fit_tracks(tracks, scene)
         tracks = bear(tracks, scene, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
-        likelihood, has = explain(scene, tracks, priors(tracks, cells), self.settings)
-        likelihood = obey(directives, scene, likelihood)
         prior = priors(tracks, cells)
+        likelihood, has = explain(scene, tracks, prior, self.settings)
+        likelihood = obey(directives, scene, likelihood)
         near = reach_of(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
@@ -107,19 +118,22 @@ class MotionSegmenter:
         return report(tracks, scene, self._size, directives, self.settings)
 
     def _look(
-        self, image: WorkImage, before: Superpixels, cells: Superpixels
+        self, image: WorkImage, before: Superpixels, coming: Future[Superpixels]
     ) -> tuple[Scene, tuple[Track, ...]]:
         """Measure motion, and carry the tracks to the newest image."""
         old = self._history.back(1)
         seconds = image.time - old.time
         points = find_points(image, self.settings.cell, self.settings.noise)
         flow = flow_back(image.grey, old.grey, self._engine)
+        first = self._follow(points, flow, old, image)
+        cells = coming.result()
         step = transition(before, cells, flow, self._grid)
         tracks = tuple(carry(t, step, before, cells, seconds) for t in self._tracks)
         owner = priors(tracks, cells).argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
-        measured = [self._measure(scene, tracks, 1, flow)]
-        measured += [self._measure(scene, tracks, lag, flow) for lag in self._turn(image)]
+        later = [self._later(scene, tracks, lag) for lag in self._turn(image)]
+        measured = [self._measure(scene, first)]
+        measured += [self._measure(scene, c.result()) for c in later]
         return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks
 
     def _turn(self, image: WorkImage) -> list[int]:
@@ -142,19 +156,31 @@ class MotionSegmenter:
         middle = np.asarray([image.shape[::-1]], dtype=np.float32) / 2
         return float(np.hypot(*camera.at(middle)[0]))
 
-    def _measure(self, scene: Scene, tracks: tuple[Track, ...], lag: int, flow: Floats) -> Measured:
-        """Constraints over one baseline, and the background that they show."""
-        image, points = scene.image, scene.points
+    def _follow(
+        self, points: Points, flow: Floats, old: WorkImage, image: WorkImage
+    ) -> Constraints:
+        """Constraints over one frame, from where dense flow expects the points."""
+        x, y = points.xy.astype(np.int64).T
+        c = track(points, points.xy + flow[y, x], old, image, 1, self.settings.noise)
+        return with_flow(c, points, flow, old, image, self.settings.noise)
+
+    def _later(self, scene: Scene, tracks: tuple[Track, ...], lag: int) -> Future[Constraints]:
+        """Begin to search for the points over a longer baseline, as the camera was last known."""
+        camera = self._predicted(scene.time, scene.time - self._history.back(lag).time)
+        return self._beside.submit(self._search, scene, tracks, lag, camera)
+
+    def _search(
+        self, scene: Scene, tracks: tuple[Track, ...], lag: int, camera: Affine
+    ) -> Constraints:
+        """Constraints over a longer baseline, from where known motions expect the points."""
         old = self._history.back(lag)
-        camera = self._predicted(image.time, image.time - old.time)
-        if lag == 1:
-            x, y = points.xy.astype(np.int64).T
-            guess = points.xy + flow[y, x]
-        else:
-            guess = expected(scene, tracks, camera, lag, image.time - old.time)
-        c = track(points, guess, old, image, lag, self.settings.noise)
-        if lag == 1:
-            c = with_flow(c, points, flow, old, image, self.settings.noise)
+        guess = expected(scene, tracks, camera, lag, scene.time - old.time)
+        return track(scene.points, guess, old, scene.image, lag, self.settings.noise)
+
+    def _measure(self, scene: Scene, c: Constraints) -> Measured:
+        """The background that constraints over one baseline show."""
+        image, lag = scene.image, c.lag
+        camera = self._predicted(image.time, c.span_s)
         # Until a baseline is long enough to tell, what is still in the image may be background.
         still_too = self._fixed_until is None or image.time < self._fixed_until
         clear = outside(scene)[c.index]
