@@ -76,7 +76,8 @@ def find_points(image: WorkImage, cell: int, noise: float, most: int = 2500) -> 
     Returns:
         Points, in scan order.
     """
-    strength = image.gx**2 + image.gy**2
+    strength = image.gx * image.gx
+    strength += image.gy * image.gy
     margin = 3
     strength[:margin] = strength[-margin:] = 0
     strength[:, :margin] = strength[:, -margin:] = 0
@@ -91,8 +92,12 @@ def find_points(image: WorkImage, cell: int, noise: float, most: int = 2500) -> 
     y = (keep // cols) * cell + best[keep] // cell
     x = (keep % cols) * cell + best[keep] % cell
     size = (WINDOW, WINDOW)
-    products = (image.gx * image.gx, image.gx * image.gy, image.gy * image.gy)
-    sums = [cv2.boxFilter(p, -1, size, normalize=False)[y, x] for p in products]
+    pairs = ((image.gx, image.gx), (image.gx, image.gy), (image.gy, image.gy))
+    product = np.empty_like(strength)
+    sums = [
+        cv2.boxFilter(np.multiply(a, b, out=product), -1, size, normalize=False)[y, x]
+        for a, b in pairs
+    ]
     gradient = np.stack([image.gx[y, x], image.gy[y, x]], axis=1)
     normal = gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-6)
     xy = np.stack([x, y], axis=1).astype(np.float32)

@@ -18,6 +18,7 @@ from visup.percepts.motion.image import Floats
 
 Doubles = NDArray[np.float64]
 GRID = (6, 8)
+SETTLED = 0.003  # pixels: a fit that moves by less is done
 STILL: Doubles = np.zeros((2, 3))
 
 
@@ -229,7 +230,9 @@ def _reweighted(
     for _ in range(rounds):
         w = weight / (1 + system.squared(displaced) / cutoff**2) ** 2
         model = system.solve(w, hold)
-        displaced = model @ system.phi
+        before, displaced = displaced, model @ system.phi
+        if np.abs(displaced - before).max() < SETTLED:
+            break
     return model, w
 
 

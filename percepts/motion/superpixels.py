@@ -139,13 +139,15 @@ def _links(
     labels: NDArray[np.int32], count: int, tone: Floats, calm: Floats, contrast: float, cell: int
 ) -> sparse.csr_matrix:
     pairs = []
+    # Two cells are one number, short if that will do: short numbers are sorted sooner.
+    kind = np.int32 if count < 46_000 else np.int64
     for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
-        differ = np.flatnonzero(a != b)
-        one, other = a.ravel()[differ], b.ravel()[differ]
-        pairs.append(np.minimum(one, other).astype(np.int64) * count + np.maximum(one, other))
+        differ = a != b
+        one, other = a[differ].astype(kind), b[differ].astype(kind)
+        pairs.append(np.minimum(one, other) * kind(count) + np.maximum(one, other))
     # Neighbours in the order of their numbers; how often they touch is the length of the border.
     pair, pixels = np.unique(np.concatenate(pairs), return_counts=True)
-    i, j = np.divmod(pair, count)
+    i, j = np.divmod(pair, kind(count))
     unlike = np.abs(tone[i] - tone[j]).max(axis=1)
     stiff = 1 + STIFF * calm[i] * calm[j]
     alike = stiff * np.exp(-0.5 * (unlike / contrast) ** 2) + LOOSE
