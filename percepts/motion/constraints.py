@@ -63,6 +63,17 @@ class Constraints:
     def __len__(self) -> int:
         return len(self.xy)
 
+    def take(self, which: Ints) -> Constraints:
+        """Some of them, by (M,) place among these."""
+        return Constraints(
+            self.lag,
+            self.span_s,
+            self.index[which],
+            self.xy[which],
+            self.moved[which],
+            self.information[which],
+        )
+
 
 def find_points(image: WorkImage, cell: int, noise: float, most: int = 2500) -> Points:
     """The strongest gradient of each cell, where it stands out of the noise.

@@ -114,9 +114,11 @@ def _unexplained(
         if not out.any():
             break
         parts = t.predicted(c.lag, c.span_s)
-        off = np.min([distances(p, c, slack_of(p, t.centre)) for p in parts], axis=0)
         near = scene.cells.reach((t.share > 0.3)[:, None], NEAR_STEPS)[:, 0]
-        out &= ~((off < 16) & near[at])
+        left = np.flatnonzero(out & near[at])
+        some = c.take(left)
+        off = np.min([distances(p, some, slack_of(p, t.centre)) for p in parts], axis=0)
+        out[left] = off >= 16
     return np.asarray(out)
 
 

@@ -114,6 +114,7 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
     models = t.predicted(c.lag, c.span_s)
     if not mine.any():
         return t
+    known, c = m.background.distances(c)[mine], c.take(np.flatnonzero(mine))
     off = np.stack([distances(m, c, slack_of(m, t.centre)) for m in models])
     # The first part comes first: an edge along the motion fits any part, and must not feed them.
     off[1:] += PART_COST
@@ -121,11 +122,11 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
     clear = 0.6 if t.mostly_hidden else 0.0
     # What the background explains, and no part does, must not draw the track after it.
     # When that holds for most of it, it has stopped instead.
-    own = mine & ((off.min(axis=0) < 9) | (m.background.distances(c) > 4))
-    mine = own if np.count_nonzero(own) > 0.5 * np.count_nonzero(mine) else mine
+    own = (off.min(axis=0) < 9) | (known > 4)
+    own = own if np.count_nonzero(own) > 0.5 * len(own) else np.ones_like(own)
     motions = []
     for i, (motion, start) in enumerate(zip(t.motions, models, strict=True)):
-        weight = (mine & (nearest == i)).astype(np.float32)
+        weight = (own & (nearest == i)).astype(np.float32)
         fit = fit_affine(c, weight, start, slack=slack_of(start, t.centre))
         if i == 0 and fit.support < 0.5 * weight.sum():
             # It may have stopped or turned: what most of its points do is tried as well.
@@ -146,7 +147,7 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
     whole = t.whole
     if len(motions) > 1:
         # One shift for all parts together: what the edges of one leave open, those of others close.
-        fit = fit_affine(c, mine.astype(np.float32), models[0], rigidity=1e4, slack=0.5)
+        fit = fit_affine(c, own.astype(np.float32), models[0], rigidity=1e4, slack=0.5)
         if fit.support >= 5:
             whole = rate_of(fit, c, now)
     return replace(t, motions=tuple(motions), whole=whole)
@@ -188,10 +189,12 @@ def explain(
         zero = m.background.log_likelihood(c)
         for k, t in enumerate(tracks, 1):
             parts = t.predicted(c.lag, c.span_s)
-            each = np.stack([log_likelihood(p, c, slack_of(p, t.centre)) for p in parts])
-            fit = each.max(axis=0)
-            fit = np.where(near[c.index, k - 1], fit, 3 * least)
-            out[c.index, k] += np.maximum(fit, 3 * least)
+            within = np.flatnonzero(near[c.index, k - 1])
+            some = c.take(within)
+            each = [log_likelihood(p, some, slack_of(p, t.centre)) for p in parts]
+            fit = np.full(len(c), 3 * least, dtype=np.float32)
+            fit[within] = np.maximum(np.max(each, axis=0), 3 * least)
+            out[c.index, k] += fit
         out[c.index, 0] += np.maximum(zero, 3 * least)
         out[c.index, -1] += least
     return out, has

@@ -165,17 +165,12 @@ class MotionSegmenter:
         return with_flow(c, points, flow, old, image, self.settings.noise)
 
     def _later(self, scene: Scene, tracks: tuple[Track, ...], lag: int) -> Future[Constraints]:
-        """Begin to search for the points over a longer baseline, as the camera was last known."""
-        camera = self._predicted(scene.time, scene.time - self._history.back(lag).time)
-        return self._beside.submit(self._search, scene, tracks, lag, camera)
-
-    def _search(
-        self, scene: Scene, tracks: tuple[Track, ...], lag: int, camera: Affine
-    ) -> Constraints:
-        """Constraints over a longer baseline, from where known motions expect the points."""
+        """Begin to look for the points over a longer baseline, where known motions expect them."""
         old = self._history.back(lag)
-        guess = expected(scene, tracks, camera, lag, scene.time - old.time)
-        return track(scene.points, guess, old, scene.image, lag, self.settings.noise)
+        span = scene.time - old.time
+        guess = expected(scene, tracks, self._predicted(scene.time, span), lag, span)
+        noise = self.settings.noise
+        return self._beside.submit(track, scene.points, guess, old, scene.image, lag, noise)
 
     def _measure(self, scene: Scene, c: Constraints) -> Measured:
         """The background that constraints over one baseline show."""

@@ -55,6 +55,12 @@ class Superpixels:
 
     def mean(self, values: Floats) -> Floats:
         """Mean of an (h, w) map in each cell, (count,) float32."""
+        x, y, w, h = cv2.boundingRect((values != 0).view(np.uint8))
+        if w * h < 0.2 * values.size:  # little of it is not zero
+            part = np.s_[y : y + h, x : x + w]
+            where = self.labels[part].ravel().astype(np.int64)
+            total = np.bincount(where, weights=values[part].ravel(), minlength=self.count)
+            return np.asarray(total / self.area, dtype=np.float32)
         return np.asarray(self.pixels @ values.ravel() / self.area)
 
     def paint(self, members: NDArray[np.bool_]) -> Floats:
@@ -99,7 +105,8 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     # Lines between the cells go to the later of the cells beside them.
     ridge = np.maximum(labels, 0).astype(np.uint16)
     grown = cv2.dilate(ridge, np.ones((3, 3), np.uint8))
-    filled = np.maximum(np.where(ridge > 0, ridge, grown).astype(np.int32) - 1, 0)
+    np.copyto(ridge, grown, where=ridge == 0)
+    filled = np.maximum(np.subtract(ridge, 1, dtype=np.int32), 0)
     count = len(ys)
     pixels = _pixels(filled, count)
     area = np.maximum(np.diff(pixels.indptr), 1).astype(np.float32)
