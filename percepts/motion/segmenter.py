@@ -153,7 +153,7 @@ class MotionSegmenter:
     def _turned(self, image: WorkImage, lag: int) -> float:
         """How far the camera is predicted to have moved the middle of the image, pixels."""
         camera = self._predicted(image.time, image.time - self._history.back(lag).time)
-        middle = np.asarray([image.shape[::-1]], dtype=np.float32) / 2
+        middle = np.asarray([image.shape[::-1]], dtype=np.float32) / np.float32(2)
         return float(np.hypot(*camera.at(middle)[0]))
 
     def _follow(
