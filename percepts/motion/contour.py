@@ -71,9 +71,7 @@ def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
     Returns:
         (H, W) bool, or None when the largest part is too small.
     """
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        mask.astype(np.uint8), connectivity=4
-    )
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=4)
     if count < 2:
         return None
     areas = stats[1:, cv2.CC_STAT_AREA]
@@ -89,7 +87,8 @@ def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
 
 def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
     """Fill holes of up to `most` pixels: what is quite enclosed and small is seldom background."""
-    padded = np.pad(~mask, 1, constant_values=True).astype(np.uint8)
+    padded = np.ones((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
+    np.logical_not(mask, out=padded[1:-1, 1:-1].view(bool))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] <= most
     small[[0, labels[0, 0]]] = False
@@ -107,19 +106,20 @@ def describe(mask: NDArray[np.bool_], origin: tuple[int, int], size: tuple[int, 
     Returns:
         The outline.
     """
-    x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
     crop = np.ascontiguousarray(mask[y : y + h, x : x + w])
     x, y = x + origin[0], y + origin[1]
     found, _ = cv2.findContours(
-        crop.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(x, y)
+        crop.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(x, y)
     )
     largest = max(found, key=cv2.contourArea)
-    ys, xs = np.nonzero(crop)
+    sums = cv2.moments(crop.view(np.uint8), binaryImage=True)
+    area = sums["m00"]
     return Outline(
         bbox=(x, y, w, h),
         mask=crop,
         contour=largest.reshape(-1, 2).astype(np.float32),
-        centroid=(float(xs.mean()) + x, float(ys.mean()) + y),
-        area=float(len(xs)),
+        centroid=(sums["m10"] / area + x, sums["m01"] / area + y),
+        area=area,
         cut=bool(x == 0 or y == 0 or x + w == size[0] or y + h == size[1]),
     )

@@ -175,8 +175,8 @@ def overlap(old: Superpixels, new: Superpixels, from_where: NDArray[np.int32]) -
         (new count, old count) sparse float32 shares, entries not summed; rows sum to 1, or less.
     """
     source = from_where.ravel()[new.pixels.indices]
-    known = source >= 0
     # Each pixel is an entry of its own: products cost less than finding those that are alike.
-    share = known / np.repeat(new.area, np.diff(new.pixels.indptr))
-    entries = share.astype(np.float32), np.where(known, source, 0), new.pixels.indptr
+    share = np.repeat(1 / new.area, np.diff(new.pixels.indptr))
+    share *= source >= 0
+    entries = share, np.maximum(source, 0), new.pixels.indptr
     return sparse.csr_matrix(entries, shape=(new.count, old.count))

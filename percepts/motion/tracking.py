@@ -212,10 +212,11 @@ def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -
     Returns:
         (new count, old count) sparse shares; rows sum to 1, or less where the image came into view.
     """
+    from_x, from_y = cv2.split(grid + flow)
     from_where = cv2.remap(
         old.labels.astype(np.float32),
-        np.ascontiguousarray(grid[..., 0] + flow[..., 0]),
-        np.ascontiguousarray(grid[..., 1] + flow[..., 1]),
+        from_x,
+        from_y,
         cv2.INTER_NEAREST,
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=-1,
