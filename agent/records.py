@@ -54,6 +54,7 @@ class HealthStatus(StrEnum):
     BLOCKED = "blocked"
     NOISY = "noisy"
     SCRAMBLED = "scrambled"
+    DROPPED = "dropped"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
