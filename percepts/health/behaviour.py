@@ -1,0 +1,161 @@
+"""Health of the camera's image: what must never be taken for motion (dark, frozen, noisy, ...).
+
+The tests are conservative. A black sky with stars is not dark, a nearly still scene with sensor
+noise is not frozen, a white cloud is not saturation: each fault must fill the image, or come from
+one frame to the next as nothing in a scene does, and it must last.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import (
+    Contract,
+    Directive,
+    Frame,
+    Health,
+    HealthStatus,
+    Observation,
+    Percept,
+)
+from visup.percepts.health.cells import Cells
+from visup.percepts.health.flow import Arrivals
+from visup.percepts.health.picture import Picture, measure
+from visup.percepts.health.settings import HealthSettings
+
+OK = Health(HealthStatus.OK)
+USUAL = 25  # sound images that say what is usual
+FEWEST = 4
+
+
+class HealthBehaviour:
+    """Reports the state of the camera's image for every frame.
+
+    Args:
+        settings: Thresholds.
+    """
+
+    contract = Contract("health", gives=("health",))
+
+    def __init__(self, settings: HealthSettings | None = None) -> None:
+        self._settings = settings or HealthSettings()
+        self._usual: deque[Picture] = deque(maxlen=USUAL)
+        self._cells = Cells(self._settings.covered)
+        self._arrivals = Arrivals(self._settings.lost, self._settings.gap)
+        self._last: NDArray[np.uint8] | None = None
+        self._same_since: float | None = None
+        self._was_lively = False
+        self._fault_since: float | None = None
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report the health of one frame; one percept of kind 'health'."""
+        health = self._judge(frame)
+        return [Percept("health", health, frame.time, self.contract.name)]
+
+    def _judge(self, frame: Frame) -> Health:
+        same = self._repeats(frame)
+        missing = self._arrivals.come(frame.index, frame.time, same and self._was_lively)
+        frozen = self._frozen(frame.time, same)
+        picture = measure(frame.image)
+        health = _of_picture(picture, self._usual, self._settings)
+        if health is OK:
+            health = self._of_cells(picture, frame.time)
+            if self._cells.halt is None:
+                self._usual.append(picture)
+        else:
+            self._cells.forget()
+        health = self._lasting(health, frame.time)
+        if health is OK and frozen:
+            return Health(HealthStatus.FROZEN, "The image does not change at all.")
+        if health is OK and missing:
+            return Health(HealthStatus.DROPPED, f"About {missing} frames are missing.")
+        return health
+
+    def _of_cells(self, picture: Picture, now: float) -> Health:
+        halt = self._cells.see(picture.small, picture.factor, now)
+        if halt is None:
+            return OK
+        if halt.whole:
+            return Health(HealthStatus.FROZEN, "All that moved stands still since one moment.")
+        return Health(HealthStatus.BLOCKED, "A large part of the view is covered.")
+
+    def _lasting(self, health: Health, now: float) -> Health:
+        """Only faults that last are told; recovery is told at once."""
+        if health is OK:
+            self._fault_since = None
+            return health
+        self._fault_since = now if self._fault_since is None else self._fault_since
+        return health if now - self._fault_since >= self._settings.lasting_s else OK
+
+    def _repeats(self, frame: Frame) -> bool:
+        """Whether the image is the very same as the one before."""
+        last, self._last = self._last, frame.image
+        if last is None:
+            return False
+        same = last.shape == frame.image.shape and bool(np.array_equal(last, frame.image))
+        self._was_lively = self._was_lively or not same
+        return same
+
+    def _frozen(self, now: float, same: bool) -> bool:
+        """The very same image again and again from a source that did change before."""
+        if not same:
+            self._same_since = None
+            return False
+        self._same_since = now if self._same_since is None else self._same_since
+        return self._was_lively and now - self._same_since >= self._settings.same_s
+
+
+def _of_picture(picture: Picture, usual: Sequence[Picture], settings: HealthSettings) -> Health:
+    """What one image shows, in the light of those before it."""
+    known = len(usual) >= FEWEST
+    if _dark(picture, usual, settings, known):
+        return Health(HealthStatus.DARK, "The image is dark.")
+    if _saturated(picture, usual, settings, known):
+        return Health(HealthStatus.SATURATED, "The image is saturated.")
+    if known and picture.spread < settings.flat and _most(usual, "spread") > 4 * settings.flat:
+        return Health(HealthStatus.BLOCKED, "The whole view is covered.")
+    if _noisy(picture, usual, settings, known):
+        return Health(HealthStatus.NOISY, "The image is noisy.")
+    if _broken(picture, usual, settings, known):
+        return Health(HealthStatus.SCRAMBLED, "The image is broken into blocks.")
+    return OK
+
+
+def _most(usual: Sequence[Picture], name: str) -> float:
+    return max((float(getattr(p, name)) for p in usual), default=0.0)
+
+
+def _dark(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+    if p.high < settings.dark:
+        return True
+    sudden = known and p.high < 0.25 * min(u.high for u in usual)
+    return sudden and p.high < 2 * settings.dark
+
+
+def _saturated(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+    if p.low > settings.bright:
+        return True
+    sudden = known and p.low > 30 + _most(usual, "low")
+    return sudden and p.low > settings.bright - 30 and p.spread < 2 * settings.flat
+
+
+def _noisy(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+    if p.noise > settings.noisy or p.impulses > settings.impulses:
+        return True
+    if not known:
+        return False
+    grain = p.noise > max(settings.rather_noisy, 3.0 * _most(usual, "noise"))
+    specks = p.impulses > max(settings.rather_impulses, 3.0 * _most(usual, "impulses"))
+    return grain or specks
+
+
+def _broken(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+    if p.steps > settings.broken:
+        return True
+    return known and p.steps > settings.rather_broken + 2.0 * _most(usual, "steps")

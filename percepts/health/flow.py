@@ -1,0 +1,90 @@
+"""Whether frames come as they should: gaps in their numbers or times, repeats in their place."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+WINDOW_S = 1.0
+MOST = 128
+ENOUGH = 6  # intervals before anything is said of what is usual
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """One frame's arrival.
+
+    Attributes:
+        time: Seconds.
+        index: Its number.
+        step: Frames since the one before, by number.
+        wait: Seconds since the one before.
+        stale: How many frames before this one only repeated another, if this one is new.
+    """
+
+    time: float
+    index: int
+    step: int
+    wait: float
+    stale: int
+
+
+class Arrivals:
+    """The last seconds of arrivals.
+
+    Args:
+        lost: Share of frames that must be missing within a second.
+        gap: Frames missing in a row that are told at once.
+    """
+
+    def __init__(self, lost: float, gap: int) -> None:
+        self._lost, self._gap = lost, gap
+        self._recent: deque[Arrival] = deque(maxlen=MOST)
+        self._steps: deque[int] = deque(maxlen=MOST)
+        self._waits: deque[float] = deque(maxlen=MOST)
+        self._repeats: deque[bool] = deque(maxlen=MOST)
+        self._run = 0
+        self._last: tuple[int, float] | None = None
+
+    def come(self, index: int, time: float, repeated: bool) -> int:
+        """Take in a frame.
+
+        Args:
+            index: Its number.
+            time: Seconds.
+            repeated: Whether its image is that of the frame before.
+
+        Returns:
+            How many frames are missing of late, when that is too many; else 0.
+        """
+        last, self._last = self._last, (index, time)
+        if last is None:
+            return 0
+        stale, self._run = (0, self._run + 1) if repeated else (self._run, 0)
+        self._recent.append(Arrival(time, index, index - last[0], time - last[1], stale))
+        while self._recent and time - self._recent[0].time >= WINDOW_S:
+            self._recent.popleft()
+        missing = self._missing()
+        if not missing:
+            self._steps.append(index - last[0])
+            self._waits.append(time - last[1])
+            self._repeats.append(repeated)
+        return missing
+
+    def _missing(self) -> int:
+        if len(self._waits) < ENOUGH:
+            return 0
+        step = max(1.0, float(np.median(self._steps)))
+        wait = float(np.quantile(self._waits, 0.75))
+        # Many cameras repeat frames always, for want of light or to fill a rate.
+        habit = float(np.mean(self._repeats)) > 0.04
+        gaps = [max(a.step / step, a.wait / wait) - 1.0 for a in self._recent]
+        total = sum(g for g in gaps if g > 0.6)
+        stale = 0 if habit else sum(a.stale for a in self._recent)
+        due = WINDOW_S / wait
+        if max(gaps, default=0.0) > self._gap - 0.4:
+            return round(total)
+        missing = total + stale
+        return round(missing) if missing >= max(3.0, self._lost * due) else 0
