@@ -120,10 +120,11 @@ def _of_picture(picture: Picture, usual: Sequence[Picture], settings: HealthSett
         return Health(HealthStatus.SATURATED, "The image is saturated.")
     if known and picture.spread < settings.flat and _most(usual, "spread") > 4 * settings.flat:
         return Health(HealthStatus.BLOCKED, "The whole view is covered.")
-    if _noisy(picture, usual, settings, known):
-        return Health(HealthStatus.NOISY, "The image is noisy.")
+    # Noise has no straight steps, but small blocks have as many specks as noise.
     if _broken(picture, usual, settings, known):
         return Health(HealthStatus.SCRAMBLED, "The image is broken into blocks.")
+    if _noisy(picture, usual, settings, known):
+        return Health(HealthStatus.NOISY, "The image is noisy.")
     return OK
 
 

@@ -22,6 +22,7 @@ AFTER_S = 0.42  # how long what is new must have stood
 KEPT_S = 1.0
 MOST = 48  # looks that are kept, whatever the frame rate
 FEWEST = 3  # looks before the change
+JUMP = 2.2  # grey levels; keyframes of codecs stir a still scene by less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,9 +129,12 @@ class Cells:
         lively = least > 0.4 + 2.0 * noise
         stopped = lively & stands & (now.slow < 0.25 * least)
         then = before[-1].small
-        jump = per_cell(cv2.absdiff(now.small, then)) > 1.2 + 3.0 * most
+        # Light and codecs change what is bright by more than what is dark.
+        calls_for = JUMP + 0.1 * per_cell(then) + 3.0 * most
+        jump = per_cell(cv2.absdiff(now.small, then)) > calls_for
         bare = (texture > 3.0) & (now.texture < 0.3 * texture)
-        if _all_stopped(lively, stopped, jump):
+        moving = now.slow > np.maximum(still, 0.25 * least)
+        if not moving.any() and _all_stopped(lively, stopped):
             return Halt(True, lively, now.small, after[0].time)
         taken = stands & (stopped | jump | bare)
         goes_on = float(np.mean(lively & ~stopped)) > 0.05
@@ -163,13 +167,13 @@ def _goes_on(halt: Halt, small: Floats, still: float) -> bool:
     return float(np.mean(apart < still + 1.0)) > (0.9 if halt.whole else 0.6)
 
 
-def _all_stopped(lively: Mask, stopped: Mask, jump: Mask) -> bool:
+def _all_stopped(lively: Mask, stopped: Mask) -> bool:
     """Whether all that moved stopped at once: more than one thing, or a large part of the view."""
     moved = int(lively.sum())
-    if moved == 0 or stopped.sum() < 0.97 * moved or float(jump.mean()) > 0.2 :
+    if moved == 0 or stopped.sum() < 0.97 * moved:
         return False
     groups = cv2.connectedComponents(lively.astype(np.uint8), connectivity=8)[0] - 1
-    return float(lively.mean()) > 0.3 or groups > 1
+    return float(lively.mean()) > (0.04 if groups > 1 else 0.3)
 
 
 def _largest(cells: Mask) -> Mask:

@@ -18,16 +18,16 @@ class Arrival:
 
     Attributes:
         time: Seconds.
-        index: Its number.
         step: Frames since the one before, by number.
         wait: Seconds since the one before.
+        repeated: Its image is that of the one before.
         stale: How many frames before this one only repeated another, if this one is new.
     """
 
     time: float
-    index: int
     step: int
     wait: float
+    repeated: bool
     stale: int
 
 
@@ -63,13 +63,18 @@ class Arrivals:
         if last is None:
             return 0
         stale, self._run = (0, self._run + 1) if repeated else (self._run, 0)
-        self._recent.append(Arrival(time, index, index - last[0], time - last[1], stale))
-        while self._recent and time - self._recent[0].time >= WINDOW_S:
-            self._recent.popleft()
+        new = Arrival(time, index - last[0], time - last[1], repeated, stale)
+        self._recent.append(new)
         missing = self._missing()
+        while time - self._recent[0].time >= WINDOW_S:
+            old = self._recent.popleft()
+            if not missing:
+                self._repeats.append(old.repeated)
         if not missing:
-            self._steps.append(index - last[0])
-            self._waits.append(time - last[1])
+            self._steps.append(new.step)
+            self._waits.append(new.wait)
+        if len(self._repeats) < ENOUGH:
+            # Until the window has filled, the first frames are all that tells of habits.
             self._repeats.append(repeated)
         return missing
 

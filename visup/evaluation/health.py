@@ -155,7 +155,9 @@ def plan(sources: Sequence[Path], faults: int, seed: int) -> Iterator[Trial]:
 def run_trial(trial: Trial) -> Told:
     """Inject one fault and tell how it was reported."""
     frames = _clip(trial)
-    begin = frames[0].time + trial.sound_s
+    # A short video leaves less time before the fault: what counts is the second after it.
+    longest = frames[-1].time - frames[0].time - FAULTY_S
+    begin = frames[0].time + max(SOUND_S[0], min(trial.sound_s, longest))
     start = next((n for n, f in enumerate(frames) if f.time >= begin), len(frames) // 2)
     since = frames[start].time
     seen = [(f.time, s) for f, s in statuses(inject(frames, start, trial.kind, trial.seed))]
