@@ -10,9 +10,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from visup.agent import (
     Contract,
     Directive,
@@ -23,8 +20,9 @@ from visup.agent import (
     Percept,
 )
 from visup.percepts.health.cells import Cells
-from visup.percepts.health.flow import Arrivals
+from visup.percepts.health.arrivals import Arrivals
 from visup.percepts.health.picture import Picture, measure
+from visup.percepts.health.repeats import Repeats
 from visup.percepts.health.settings import HealthSettings
 
 OK = Health(HealthStatus.OK)
@@ -45,10 +43,9 @@ class HealthBehaviour:
         self._settings = settings or HealthSettings()
         self._usual: deque[Picture] = deque(maxlen=USUAL)
         self._cells = Cells(self._settings.covered)
-        self._arrivals = Arrivals(self._settings.lost, self._settings.gap)
-        self._last: NDArray[np.uint8] | None = None
+        self._arrivals = Arrivals(self._settings.lost, self._settings.gap, self._settings.same_s)
+        self._repeats = Repeats()
         self._same_since: float | None = None
-        self._was_lively = False
         self._fault_since: float | None = None
 
     def perceive(
@@ -59,10 +56,10 @@ class HealthBehaviour:
         return [Percept("health", health, frame.time, self.contract.name)]
 
     def _judge(self, frame: Frame) -> Health:
-        same = self._repeats(frame)
-        missing = self._arrivals.come(frame.index, frame.time, same and self._was_lively)
-        frozen = self._frozen(frame.time, same)
         picture = measure(frame.image)
+        same, near = self._repeats.compare(frame.image, picture.small)
+        missing = self._arrivals.come(frame.index, frame.time, near)
+        frozen = self._frozen(frame.time, same)
         health = _of_picture(picture, self._usual, self._settings)
         if health is OK:
             health = self._of_cells(picture, frame.time)
@@ -93,22 +90,13 @@ class HealthBehaviour:
         self._fault_since = now if self._fault_since is None else self._fault_since
         return health if now - self._fault_since >= self._settings.lasting_s else OK
 
-    def _repeats(self, frame: Frame) -> bool:
-        """Whether the image is the very same as the one before."""
-        last, self._last = self._last, frame.image
-        if last is None:
-            return False
-        same = last.shape == frame.image.shape and bool(np.array_equal(last, frame.image))
-        self._was_lively = self._was_lively or not same
-        return same
-
     def _frozen(self, now: float, same: bool) -> bool:
         """The very same image again and again from a source that did change before."""
         if not same:
             self._same_since = None
             return False
         self._same_since = now if self._same_since is None else self._same_since
-        return self._was_lively and now - self._same_since >= self._settings.same_s
+        return now - self._same_since >= self._settings.same_s
 
 
 def _of_picture(picture: Picture, usual: Sequence[Picture], settings: HealthSettings) -> Health:
@@ -159,4 +147,4 @@ def _noisy(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known
 def _broken(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
     if p.steps > settings.broken:
         return True
-    return known and p.steps > settings.rather_broken + 2.0 * _most(usual, "steps")
+    return known and p.steps > settings.rather_broken + 1.7 * _most(usual, "steps")

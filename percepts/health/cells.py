@@ -22,7 +22,7 @@ AFTER_S = 0.42  # how long what is new must have stood
 KEPT_S = 1.0
 MOST = 48  # looks that are kept, whatever the frame rate
 FEWEST = 3  # looks before the change
-JUMP = 2.2  # grey levels; keyframes of codecs stir a still scene by less
+JUMP = 1.0  # grey levels; keyframes of codecs stir a dark scene by less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +125,7 @@ class Cells:
         most = np.max([k.change for k in before], axis=0)
         texture = np.min([k.texture for k in before], axis=0)
         stands = calm < still
-        noise = float(np.quantile(least, 0.1))
+        noise = min(still, float(np.quantile(least, 0.1)))
         lively = least > 0.4 + 2.0 * noise
         stopped = lively & stands & (now.slow < 0.25 * least)
         then = before[-1].small

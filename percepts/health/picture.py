@@ -123,9 +123,9 @@ def _steps(grey: Grey) -> tuple[float, float]:
     """Shares of pixels on straight steps, and on steps of any kind."""
     straight = edges = 0
     for image in (grey, np.ascontiguousarray(grey.T)):
-        step = cv2.absdiff(image[:, 1:], image[:, :-1])
-        if step.shape[1] < 3 or step.shape[0] < RUN:
+        if image.shape[1] < 4 or image.shape[0] < RUN:
             continue
+        step = cv2.absdiff(image[:, 1:], image[:, :-1])
         edges += cv2.countNonZero(cv2.threshold(step, STEP - 1, 1, cv2.THRESH_BINARY)[1])
         beside = cv2.max(step[:, 2:], step[:, :-2])
         # An image seen through a lens rises over several pixels; a cut between blocks does not.

@@ -20,7 +20,7 @@ class HealthSettings:
         impulses: Share of pixels that stick out, always too much.
         rather_impulses: The same, when it is also three times what is usual.
         broken: Share of pixels on straight steps, always too much.
-        rather_broken: The same beyond twice what is usual.
+        rather_broken: The same beyond 1.7 times what is usual.
         covered: Share of the view that must be covered to be blocked.
         lost: Share of frames that must be missing within a second.
         gap: Frames that are missing in a row.
@@ -36,7 +36,7 @@ class HealthSettings:
     impulses: float = 0.06
     rather_impulses: float = 0.02
     broken: float = 0.02
-    rather_broken: float = 0.0012
+    rather_broken: float = 0.0007
     covered: float = 0.22
     lost: float = 0.2
     gap: int = 3

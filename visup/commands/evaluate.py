@@ -40,6 +40,18 @@ MISSION_KEYS = (
     "fps",
 )
 
+HEALTH_KEYS = (
+    "clips",
+    "found",
+    "named",
+    "latency_s",
+    "early",
+    "false_reports",
+    "hours",
+    "false_reports_per_hour",
+    "ms",
+)
+
 
 @app.command("motion")
 def motion(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
@@ -78,6 +90,26 @@ def missions(
         figures = evaluate_missions(folder, models=models, limit=limit, progress=tell)
     settings = {"limit": limit, "models": str(models) if models else None}
     _show("missions", folder, figures, MISSION_KEYS, json_file, settings)
+
+
+@app.command("health")
+def health(
+    folder: Annotated[Path, typer.Argument(help="Folder with sound video anywhere below it.")],
+    json_file: Json = None,
+    faults: Annotated[int, typer.Option(min=1, help="How many faults are injected.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Of the faults that are drawn.")] = 0,
+    limit: Annotated[
+        int | None, typer.Option(min=1, help="Frames of each video when it is run unharmed.")
+    ] = None,
+) -> None:
+    """Camera faults put into sound video: found within 1 s, rightly named, false reports."""
+    from visup.evaluation.health import evaluate_health
+
+    _checked(folder, json_file)
+    with _told("watching") as tell:
+        figures = evaluate_health(folder, faults=faults, seed=seed, limit=limit, progress=tell)
+    settings = {"faults": faults, "seed": seed, "limit": limit}
+    _show("health", folder, figures, HEALTH_KEYS, json_file, settings)
 
 
 def _checked(folder: Path, json_file: Path | None) -> None:

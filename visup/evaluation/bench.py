@@ -16,6 +16,8 @@ EVALUATIONS = (
     ("motion", "video/static"),
     ("motion", "video/mot"),
     ("missions", "missions"),
+    ("health", "video"),
+    ("health", "missions"),
 )
 
 

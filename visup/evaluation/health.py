@@ -200,7 +200,6 @@ def _unharmed(
             progress(f"{path.name}, unharmed")
         before = HealthStatus.OK
         with open_source(str(path)) as source:
-            start = time.perf_counter()
             last = 0.0
             behaviour = HealthBehaviour()
             for frame in islice(source, limit):

@@ -37,15 +37,17 @@ class Arrivals:
     Args:
         lost: Share of frames that must be missing within a second.
         gap: Frames missing in a row that are told at once.
+        frozen_s: Repeats that go on for this long are another fault, seconds.
     """
 
-    def __init__(self, lost: float, gap: int) -> None:
-        self._lost, self._gap = lost, gap
+    def __init__(self, lost: float, gap: int, frozen_s: float) -> None:
+        self._lost, self._gap, self._frozen_s = lost, gap, frozen_s
         self._recent: deque[Arrival] = deque(maxlen=MOST)
         self._steps: deque[int] = deque(maxlen=MOST)
         self._waits: deque[float] = deque(maxlen=MOST)
         self._repeats: deque[bool] = deque(maxlen=MOST)
         self._run = 0
+        self._run_s = 0.0
         self._last: tuple[int, float] | None = None
 
     def come(self, index: int, time: float, repeated: bool) -> int:
@@ -62,7 +64,7 @@ class Arrivals:
         last, self._last = self._last, (index, time)
         if last is None:
             return 0
-        stale, self._run = (0, self._run + 1) if repeated else (self._run, 0)
+        stale = self._stale(repeated, time - last[1])
         new = Arrival(time, index - last[0], time - last[1], repeated, stale)
         self._recent.append(new)
         missing = self._missing()
@@ -77,6 +79,12 @@ class Arrivals:
             # Until the window has filled, the first frames are all that tells of habits.
             self._repeats.append(repeated)
         return missing
+
+    def _stale(self, repeated: bool, wait: float) -> int:
+        """Length of the run of repeats that ends with this frame."""
+        run, lasted = self._run, self._run_s
+        self._run, self._run_s = (run + 1, lasted + wait) if repeated else (0, 0.0)
+        return 0 if repeated or lasted >= self._frozen_s else run
 
     def _missing(self) -> int:
         if len(self._waits) < ENOUGH:
