@@ -35,7 +35,7 @@ class Arrivals:
     """The last seconds of arrivals.
 
     Args:
-        lost: Share of frames that must be missing within a second.
+        lost: Share of frames that must be missing within a second; twice that for repeats.
         gap: Frames missing in a row that are told at once.
         frozen_s: Repeats that go on for this long are another fault, seconds.
     """
@@ -99,5 +99,7 @@ class Arrivals:
         due = WINDOW_S / wait
         if max(gaps, default=0.0) > self._gap - 0.4:
             return round(total)
-        missing = total + stale
-        return round(missing) if missing >= max(3.0, self._lost * due) else 0
+        # Numbers do not lie; an image may repeat another for a frame or two by chance.
+        sure = total >= max(3.0, self._lost * due)
+        told = sure or total + stale >= max(3.0, 2.0 * self._lost * due)
+        return round(total + stale) if told else 0

@@ -19,8 +19,8 @@ from visup.agent import (
     Observation,
     Percept,
 )
-from visup.percepts.health.cells import Cells
 from visup.percepts.health.arrivals import Arrivals
+from visup.percepts.health.cells import Cells
 from visup.percepts.health.picture import Picture, measure
 from visup.percepts.health.repeats import Repeats
 from visup.percepts.health.settings import HealthSettings
@@ -28,6 +28,7 @@ from visup.percepts.health.settings import HealthSettings
 OK = Health(HealthStatus.OK)
 USUAL = 25  # sound images that say what is usual
 FEWEST = 4
+SUSPECTED = 0.5
 
 
 class HealthBehaviour:
@@ -51,14 +52,22 @@ class HealthBehaviour:
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """Report the health of one frame; one percept of kind 'health'."""
+        """Report the health of one frame; one percept of kind 'health'.
+
+        Its confidence is below 1 while a fault shows that has not lasted long enough to be told:
+        such a frame should not be learnt from.
+        """
         health = self._judge(frame)
-        return [Percept("health", health, frame.time, self.contract.name)]
+        suspected = health is OK and self._fault_since is not None
+        confidence = SUSPECTED if suspected else 1.0
+        return [Percept("health", health, frame.time, self.contract.name, confidence)]
 
     def _judge(self, frame: Frame) -> Health:
         picture = measure(frame.image)
         same, near = self._repeats.compare(frame.image, picture.small)
-        missing = self._arrivals.come(frame.index, frame.time, near)
+        # An image that is all dark repeats itself too, and no frame is missing for that.
+        repeated = near and self._fault_since is None
+        missing = self._arrivals.come(frame.index, frame.time, repeated)
         frozen = self._frozen(frame.time, same)
         health = _of_picture(picture, self._usual, self._settings)
         if health is OK:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -147,7 +148,7 @@ class Cells:
         return Halt(False, part, now.small, after[0].time)
 
 
-def per_cell(values: Floats) -> Floats:
+def per_cell(values: NDArray[np.integer[Any] | np.floating[Any]]) -> Floats:
     """Means over cells of `CELL` x `CELL`, about."""
     rows, columns = (max(1, round(n / CELL)) for n in values.shape)
     out = cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA)

@@ -22,7 +22,8 @@ class HealthSettings:
         broken: Share of pixels on straight steps, always too much.
         rather_broken: The same beyond 1.7 times what is usual.
         covered: Share of the view that must be covered to be blocked.
-        lost: Share of frames that must be missing within a second.
+        lost: Share of frames that must be missing within a second; twice that when others are
+            repeated in their place.
         gap: Frames that are missing in a row.
         same_s: How long an image must be the very same before it is called frozen, seconds.
         lasting_s: How long other faults must last before they are reported, seconds.
@@ -38,7 +39,7 @@ class HealthSettings:
     broken: float = 0.02
     rather_broken: float = 0.0007
     covered: float = 0.22
-    lost: float = 0.2
+    lost: float = 0.1
     gap: int = 3
     same_s: float = 0.5
     lasting_s: float = 0.3

@@ -8,6 +8,9 @@ from visup.agent import Contract, Directive, Frame, HealthStatus, Observation, P
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.settings import MotionSettings
 
+HARMED = frozenset(HealthStatus) - {HealthStatus.OK, HealthStatus.DROPPED}
+"""Faults of the image itself; where frames are missing, those that come are sound."""
+
 
 class MotionBehaviour:
     """Reports regions; nothing while the camera's image is not to be trusted.
@@ -28,13 +31,18 @@ class MotionBehaviour:
 
         Args:
             frame: The next frame.
-            seen: What was reported before of this frame; unless its health is OK, nothing moves.
+            seen: What was reported before of this frame; unless its health is OK beyond doubt,
+                nothing moves.
             directives: 'expect_regions', 'look_at' and 'ignore' are obeyed.
 
         Returns:
             Percepts of kind 'region', by id.
         """
-        if any(health.status is not HealthStatus.OK for health in seen.of("health")):
+        health = [p for r in seen.reports for p in r.percepts if p.kind == "health"]
+        # Tracks live on over frames that are left out, but not over black ones taken for sight.
+        if any(p.confidence < 1.0 or p.value.status in HARMED for p in health):
             return []
         regions = self._segmenter.step(frame, directives)
+        if any(p.value.status is not HealthStatus.OK for p in health):
+            return []
         return [Percept("region", r, frame.time, self.contract.name, r.confidence) for r in regions]

@@ -54,6 +54,29 @@ def test_motion_reports_regions_and_none_when_the_image_is_not_to_be_trusted() -
         assert not list(blind.perceive(frame, seen_with(HealthStatus.BLOCKED, frame), ()))
 
 
+def drifting() -> list[Frame]:
+    disc = (lambda n: (60 + 0.5 * n, 80.0), 24.0, texture(2, (320, 480), 0, 255))
+    return [s.frame for s in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 50)]
+
+
+def test_slow_regions_keep_their_ids_over_a_fault() -> None:
+    motion, health = MotionBehaviour(), HealthBehaviour()
+    told = []
+    for frame in drifting():
+        dark = 30 <= frame.index < 42
+        image = np.zeros_like(frame.image) if dark else frame.image
+        shown = Frame(frame.index, frame.time, image)
+        percepts = tuple(
+            health.perceive(shown, Observation(frame.index, frame.time, frame.size), ())
+        )
+        report = Report("health", ReportState.RAN, ("health",), percepts)
+        seen = Observation(frame.index, frame.time, frame.size, (report,))
+        told.append([p.value.id for p in motion.perceive(shown, seen, ())])
+    assert told[29]
+    assert not any(told[30:42])
+    assert told[42] == told[29], told
+
+
 def statuses(frames: list[Frame], change: Change, start: int = 15) -> list[HealthStatus]:
     behaviour = HealthBehaviour()
     rng = np.random.default_rng(3)

@@ -49,7 +49,7 @@ def _each(change: Callable[[Image], NDArray[np.generic]], frames: Sequence[Frame
 
 
 def _bytes(values: NDArray[np.generic]) -> Image:
-    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(values), 0, 255), dtype=np.uint8)
 
 
 def _tone(frames: Sequence[Frame], rng: Random, level: float) -> list[Frame]:
@@ -152,8 +152,12 @@ def scrambled(frames: Sequence[Frame], rng: Random) -> list[Frame]:
             y, x = places[to]
             v, u = places[source]
             if shifted:
-                v = int(np.clip(y + draw.integers(-2 * size, 2 * size + 1), 0, image.shape[0] - size))
-                u = int(np.clip(x + draw.integers(-2 * size, 2 * size + 1), 0, image.shape[1] - size))
+                v = int(
+                    np.clip(y + draw.integers(-2 * size, 2 * size + 1), 0, image.shape[0] - size)
+                )
+                u = int(
+                    np.clip(x + draw.integers(-2 * size, 2 * size + 1), 0, image.shape[1] - size)
+                )
             out[y : y + size, x : x + size] = image[v : v + size, u : u + size]
         return out
 
