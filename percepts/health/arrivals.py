@@ -50,13 +50,14 @@ class Arrivals:
         self._run_s = 0.0
         self._last: tuple[int, float] | None = None
 
-    def come(self, index: int, time: float, repeated: bool) -> int:
+    def come(self, index: int, time: float, repeated: bool | None) -> int:
         """Take in a frame.
 
         Args:
             index: Its number.
             time: Seconds.
-            repeated: Whether its image is that of the frame before.
+            repeated: Whether its image is that of the frame before; None when a fault of the
+                image leaves that untold.
 
         Returns:
             How many frames are missing of late, when that is too many; else 0.
@@ -65,7 +66,7 @@ class Arrivals:
         if last is None:
             return 0
         stale = self._stale(repeated, time - last[1])
-        new = Arrival(time, index - last[0], time - last[1], repeated, stale)
+        new = Arrival(time, index - last[0], time - last[1], repeated is True, stale)
         self._recent.append(new)
         missing = self._missing()
         while time - self._recent[0].time >= WINDOW_S:
@@ -77,11 +78,14 @@ class Arrivals:
             self._waits.append(new.wait)
         if len(self._repeats) < ENOUGH:
             # Until the window has filled, the first frames are all that tells of habits.
-            self._repeats.append(repeated)
+            self._repeats.append(new.repeated)
         return missing
 
-    def _stale(self, repeated: bool, wait: float) -> int:
+    def _stale(self, repeated: bool | None, wait: float) -> int:
         """Length of the run of repeats that ends with this frame."""
+        if repeated is None:
+            self._run, self._run_s = 0, 0.0
+            return 0
         run, lasted = self._run, self._run_s
         self._run, self._run_s = (run + 1, lasted + wait) if repeated else (0, 0.0)
         return 0 if repeated or lasted >= self._frozen_s else run

@@ -48,6 +48,7 @@ class HealthBehaviour:
         self._repeats = Repeats()
         self._same_since: float | None = None
         self._fault_since: float | None = None
+        self._harmed = False
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]
@@ -66,11 +67,12 @@ class HealthBehaviour:
         picture = measure(frame.image)
         same, near = self._repeats.compare(frame.image, picture.small)
         # An image that is all dark repeats itself too, and no frame is missing for that.
-        repeated = near and self._fault_since is None
+        repeated = None if self._harmed else near
         missing = self._arrivals.come(frame.index, frame.time, repeated)
         frozen = self._frozen(frame.time, same)
         health = _of_picture(picture, self._usual, self._settings)
-        if health is OK:
+        self._harmed = health is not OK
+        if not self._harmed:
             health = self._of_cells(picture, frame.time)
             if self._cells.halt is None:
                 self._usual.append(picture)
