@@ -27,6 +27,7 @@ from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
+from visup.percepts.motion.looked import Looked
 from visup.percepts.motion.report import obey, report
 from visup.percepts.motion.salience import weigh
 from visup.percepts.motion.scene import (
@@ -50,6 +51,10 @@ class MotionSegmenter:
 
     Args:
         settings: What can be set.
+
+    Attributes:
+        settings: As given.
+        looked: How the last frame was understood; None before the second one of a size.
     """
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
@@ -61,6 +66,7 @@ class MotionSegmenter:
 
     def _reset(self, size: tuple[int, int]) -> None:
         self._size = size
+        self.looked: Looked | None = None
         self._history = History(max(self.settings.lags_s) * 1.1)
         self._tracks: tuple[Track, ...] = ()
         self._cells: Superpixels | None = None
@@ -104,6 +110,7 @@ class MotionSegmenter:
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
         posterior = label(cells, scene.points, likelihood, has, prior, more, self.settings)
+        keys = tuple(t.key for t in tracks)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
         tracks = weigh(tracks, scene, winner)
@@ -115,6 +122,7 @@ class MotionSegmenter:
             bury(tracks, scene, self.settings), scene, self._ids, self.settings
         )
         self._tracks = tracks
+        self.looked = Looked(scene, tracks, keys, posterior)
         return report(tracks, scene, self._size, directives, self.settings)
 
     def _look(
