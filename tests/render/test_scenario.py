@@ -46,7 +46,7 @@ FAULTS = [
     ("size = [64, 48]", "size = [4, 48]", "camera.size.1", "16"),
     ("duration_s = 2.0", "", "duration_s", "missing"),
     ("duration_s = 2.0", 'duration_s = "long"', "duration_s", "number"),
-    ("fps = 5", "fps = 5\nzoom = 2", "camera.zoom", "no such setting"),
+    ("fps = 5", "fps = 5\nlens = 2", "camera.lens", "no such setting"),
     ("sun = [-1, 0, 0]", "sun = [0, 0, 0]", "light.sun", "zero"),
     ("look_at = [1, 0, 0]", "look_at = [0, 0, 0]", "camera.track.1", "line of sight"),
     ("look_at = [1, 0, 0]", "look_at = [0, 0, 3]", "camera.track.1", "line of sight"),

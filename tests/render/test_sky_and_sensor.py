@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from visup.render.background import AIR_KM, EARTH_RADIUS_KM, clouds, earth, stars
-from visup.render.scenario import Camera, CameraKey, Earth, Light, Sensor, Stars
+from visup.render.optics import Camera, CameraKey, Earth, Light, Sensor, Stars
 from visup.render.sensor import expose
 
 CAMERA = Camera(size=(120, 120), track=(CameraKey(position=(0, 0, 0), look_at=(1, 0, 0)),))

@@ -1,4 +1,4 @@
-"""What is behind everything: stars that stand still in the world, or a cloudy Earth with its limb."""
+"""What is behind everything: stars, a cloudy Earth with its limb, or a patterned surface far away."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from visup.render.scenario import Camera, Earth, Light, Stars
+from visup.render.optics import Camera, Earth, Light, Panorama, Stars
+from visup.render.texture import pattern
 from visup.render.tracks import spin_about
 
 Floats = NDArray[np.float32]
@@ -86,6 +87,21 @@ def earth(
     haze = np.clip((closest[ground] / EARTH_RADIUS_KM - 0.97) / 0.03, 0.0, 1.0)[:, None] ** 2 * 0.5
     radiance[ground] = (surface * (1 - haze) + AIR * haze) * lit[:, None]
     return radiance * np.float32(settings.brightness), glow | ground
+
+
+def panorama(rays: Floats, settings: Panorama) -> Floats:
+    """A patterned surface far away on all sides, still in the world.
+
+    Args:
+        rays: (N, 3) float32 unit directions, world.
+        settings: Its colours and the size of its blotches.
+
+    Returns:
+        (N, 3) float32 radiance, BGR.
+    """
+    blend = (0.5 + 0.5 * pattern(rays / np.radians(settings.size_deg), settings.seed))[:, None]
+    dark, light = (np.array(c[::-1], np.float32) for c in settings.colours)
+    return np.asarray(dark + np.clip(blend, 0, 1) * (light - dark), np.float32)
 
 
 def ground_turn(settings: Earth, time: float) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from visup.agent.errors import SettingsError
 from visup.render import things
-from visup.render.shapes import Colour, Solid, ball, box, cone, from_trimesh, join
+from visup.render.shapes import GREY, Colour, Solid, ball, box, cone, from_trimesh, join
 
 WHITE: Colour = (0.80, 0.80, 0.78)
 FOIL: Colour = (0.62, 0.60, 0.52)
@@ -82,10 +82,16 @@ def sill() -> Solid:
     )
 
 
+def slab() -> Solid:
+    """A floor or wall: 40 by 40 m, 0.2 m thick; origin in the middle of its upper face (+z)."""
+    return box((40, 40, 0.2), (0, 0, -0.1), GREY)
+
+
 MESHES: dict[str, Callable[[], Solid]] = {
     "spartan": spartan,
     "payload_bay": payload_bay,
     "sill": sill,
+    "slab": slab,
     **things.THINGS,
 }
 """Every mesh built in code that stands still in itself; the arm is in `arm.py`."""

@@ -61,6 +61,7 @@ class Caster:
     """
 
     def __init__(self, bodies: Sequence[Body]) -> None:
+        self.bodies = tuple(bodies)
         placed = [b.solid.transformed(b.pose) for b in bodies]
         triangles = np.concatenate([s.vertices[s.faces] for s in placed]).astype(np.float32)
         self.body = np.repeat(

@@ -14,10 +14,12 @@ from visup.agent.errors import SettingsError
 from visup.render import arm as arm_model
 from visup.render import background as sky
 from visup.render.meshes import mesh
+from visup.render.optics import Camera, Earth, Light, Panorama
 from visup.render.raycast import Body, Caster, Hits
-from visup.render.scenario import Camera, Earth, PoseKey, Scenario, SceneObject
+from visup.render.scenario import PoseKey, Scenario, SceneObject
 from visup.render.sensor import expose
 from visup.render.shapes import Solid
+from visup.render.texture import pattern
 from visup.render.tracks import (
     Matrix,
     inverse,
@@ -71,6 +73,25 @@ def pixel_rays(camera: Camera, at: NDArray[np.float64] | None = None) -> Floats:
     return np.column_stack([flat, np.ones(len(flat))]).astype(np.float32)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """How the scene is seen at a time.
+
+    Attributes:
+        time: Seconds.
+        camera: As zoomed.
+        pose: (4, 4), from the camera's frame to the world's.
+        light: As strong as it is.
+        rays: (H * W, 3) float32 through the pixels, row by row, in the camera's frame.
+    """
+
+    time: float
+    camera: Camera
+    pose: Matrix
+    light: Light
+    rays: Floats
+
+
 class Renderer:
     """Makes any frame of a scenario, in any order.
 
@@ -85,7 +106,7 @@ class Renderer:
         self.scenario = scenario
         self._solids = {o.name: _solid(o) for o in scenario.object if o.mesh != "arm"}
         self._objects = {o.name: o for o in scenario.object}
-        self._rays = pixel_rays(scenario.camera)
+        self._rays: tuple[float, Floats] | None = None
         self._sky: tuple[object, Floats] | None = None
 
     def picture(self, index: int) -> Picture:
@@ -97,35 +118,40 @@ class Renderer:
         Returns:
             The frame; the same for the same scenario and index, whatever was rendered before.
         """
-        time = index / self.scenario.camera.fps
-        camera = self.camera_pose(time)
-        bodies = self.bodies(time, camera)
+        view = self.view(index)
+        bodies = self.bodies(view.time, view.pose)
         caster = Caster(bodies)
-        width, height = self.scenario.camera.size
-        inside = self._window(bodies)
-        hits = _spread(caster.from_pinhole(self._rays[inside]), inside)
-        behind = self._background(time, camera)
-        radiance = self._shade(caster, hits, self._rays, behind.reshape(-1, 3), camera)
-        self._smooth_edges(radiance, caster, hits, behind.reshape(-1, 3), camera)
-        image = expose(
-            radiance.reshape(height, width, 3), self.scenario.sensor, self.scenario.seed, index
-        )
+        width, height = view.camera.size
+        inside = self._window(bodies, view)
+        hits = _spread(caster.from_pinhole(view.rays[inside]), inside)
+        behind = self._background(view).reshape(-1, 3)
+        radiance = self._shade(caster, hits, view.rays, behind, view)
+        self._smooth_edges(radiance, caster, hits, behind, view)
+        sensor = self.scenario.sensor.at(view.time)
+        image = expose(radiance.reshape(height, width, 3), sensor, self.scenario.seed, index)
         return Picture(
             index,
             image,
             self._labels(bodies, hits),
-            self._amodal(bodies),
+            self._amodal(bodies, view),
             {b.name: b.pose for b in bodies if b.label and b.name in self._solids},
         )
 
     def mask(self, index: int) -> NDArray[np.uint8]:
         """The mask of a frame alone, (H, W) uint8, as in `picture` but in a fraction of its time."""
+        view = self.view(index)
+        bodies = self.bodies(view.time, view.pose)
+        inside = self._window(bodies, view)
+        return self._labels(bodies, _spread(Caster(bodies).from_pinhole(view.rays[inside]), inside))
+
+    def view(self, index: int) -> View:
+        """How the scene is seen in a frame."""
         time = index / self.scenario.camera.fps
-        bodies = self.bodies(time, self.camera_pose(time))
-        inside = self._window(bodies)
-        return self._labels(
-            bodies, _spread(Caster(bodies).from_pinhole(self._rays[inside]), inside)
-        )
+        camera = self.scenario.camera.at(time)
+        if self._rays is None or self._rays[0] != camera.fov_vertical_deg:
+            self._rays = (camera.fov_vertical_deg, pixel_rays(camera))
+        light = self.scenario.light.at(time)
+        return View(time, camera, self.camera_pose(time), light, self._rays[1])
 
     def _labels(self, bodies: list[Body], hits: Hits) -> NDArray[np.uint8]:
         """(H, W): the label of what each ray met."""
@@ -191,49 +217,56 @@ class Renderer:
     def _arm_solid(self, item: SceneObject, time: float) -> Solid:
         return _coloured(arm_model.arm_solid(self._joints(item, time)), item)
 
-    def _window(self, bodies: list[Body]) -> NDArray[np.bool_]:
+    def _window(self, bodies: list[Body], view: View) -> NDArray[np.bool_]:
         """(H * W,): the pixels inside the boxes that the bodies project to."""
-        width, height = self.scenario.camera.size
+        width, height = view.camera.size
         window = np.zeros((height, width), bool)
         for body in bodies:
-            x0, y0, x1, y1 = _projected_box(body, self.scenario.camera)
+            x0, y0, x1, y1 = _projected_box(body, view.camera)
             window[y0:y1, x0:x1] = True
         return window.ravel()
 
-    def _amodal(self, bodies: list[Body]) -> dict[str, int]:
+    def _amodal(self, bodies: list[Body], view: View) -> dict[str, int]:
         """Pixels of each labelled object were it alone."""
         counts = {}
         for body in bodies:
             if not body.label:
                 continue
-            window = self._window([body])
-            hits = Caster([body]).from_pinhole(self._rays[window])
+            window = self._window([body], view)
+            hits = Caster([body]).from_pinhole(view.rays[window])
             counts[body.name] = int(np.count_nonzero(hits.body >= 0))
         return counts
 
-    def _background(self, time: float, camera: Matrix) -> Floats:
-        """(H, W, 3) radiance; kept from frame to frame while neither camera nor Earth turn."""
+    def _background(self, view: View) -> Floats:
+        """(H, W, 3) radiance; kept from frame to frame while nothing of it changes."""
         settings = self.scenario.background
         moving = isinstance(settings, Earth) and settings.turn_deg_per_s != 0
-        key = (camera[:3, :3].tobytes(), time if moving else 0.0)
+        lens, light = view.camera.fov_vertical_deg, view.light.strength
+        key = (view.pose[:3, :3].tobytes(), lens, light, view.time if moving else 0.0)
         if self._sky is None or self._sky[0] != key:
-            self._sky = (key, self._draw_background(time, camera[:3, :3]))
+            self._sky = (key, self._draw_background(view))
         return self._sky[1]
 
-    def _draw_background(self, time: float, rotation: Matrix) -> Floats:
-        settings, camera = self.scenario.background, self.scenario.camera
-        drawn = sky.stars(camera, rotation, settings)
+    def _draw_background(self, view: View) -> Floats:
+        settings, rotation = self.scenario.background, view.pose[:3, :3]
+        width, height = view.camera.size
+        if isinstance(settings, Panorama):
+            drawn = sky.panorama(self._looking(view), settings) * np.float32(view.light.strength)
+            return np.asarray(drawn.reshape(height, width, 3))
+        drawn = sky.stars(view.camera, rotation, settings)
         if isinstance(settings, Earth):
-            rays = self._rays @ rotation.T.astype(np.float32)
-            rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-            light, met = sky.earth(
-                rays, sky.ground_turn(settings, time), settings, self.scenario.light
-            )
-            drawn.reshape(-1, 3)[met] = light[met]
+            turn = sky.ground_turn(settings, view.time)
+            light, met = sky.earth(self._looking(view), turn, settings, view.light)
+            drawn.reshape(-1, 3)[met] = light[met] * np.float32(view.light.strength)
         return drawn
 
+    def _looking(self, view: View) -> Floats:
+        """(H * W, 3) unit directions through the pixels, world."""
+        rays = view.rays @ view.pose[:3, :3].T.astype(np.float32)
+        return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
     def _shade(
-        self, caster: Caster, hits: Hits, rays: Floats, behind: Floats, camera: Matrix
+        self, caster: Caster, hits: Hits, rays: Floats, behind: Floats, view: View
     ) -> Floats:
         """(N, 3) radiance along rays from the pinhole, BGR."""
         radiance = behind.copy()
@@ -243,21 +276,36 @@ class Renderer:
         normals = caster.normals[face]
         # Thin shells are seen from both sides: a surface always shows the side that is turned to us.
         normals = np.where(np.sum(normals * rays, axis=1, keepdims=True) > 0, -normals, normals)
-        light = self.scenario.light
-        sun, earth = (_to_camera(camera, d) for d in (light.sun, light.earth))
+        light = view.light
+        sun, earth = (_to_camera(view.pose, d) for d in (light.sun, light.earth))
         facing = np.clip(normals @ sun, 0.0, None)
         towards = np.flatnonzero(facing > 0)
         facing[towards[caster.blocked(points[towards], normals[towards], sun)]] = 0.0
         # The Earth fills half the sky: its light falls off gently with the angle to it.
         glow = light.earthshine * (0.5 + 0.5 * (normals @ earth))
-        radiance[met] = caster.albedo[face][:, ::-1] * (facing + glow)[:, None]
+        strength = np.float32(light.strength) * (facing + glow)
+        albedo = caster.albedo[face] * self._grain(caster, hits.body[met], points)[:, None]
+        radiance[met] = albedo[:, ::-1] * strength[:, None]
         return radiance
 
+    def _grain(self, caster: Caster, body: NDArray[np.int32], points: Floats) -> Floats:
+        """(N,) factors of reflectance at points on bodies, by the textures of these."""
+        factor = np.ones(len(points), np.float32)
+        for number, placed in enumerate(caster.bodies):
+            texture = self._objects[placed.name].texture
+            mine = body == number
+            if texture is not None and mine.any():
+                back = inverse(placed.pose)
+                own = points[mine] @ back[:3, :3].T + back[:3, 3]
+                grain = pattern(own / texture.size, texture.seed)
+                factor[mine] = np.maximum(1 + texture.contrast * grain, 0)
+        return factor
+
     def _smooth_edges(
-        self, radiance: Floats, caster: Caster, hits: Hits, behind: Floats, camera: Matrix
+        self, radiance: Floats, caster: Caster, hits: Hits, behind: Floats, view: View
     ) -> None:
         """Replace pixels on edges by the mean over a grid of rays within them."""
-        width, height = self.scenario.camera.size
+        width, height = view.camera.size
         edge = np.flatnonzero(
             _edges(radiance.reshape(height, width, 3), hits.body.reshape(height, width))
         )
@@ -267,9 +315,9 @@ class Renderer:
         grid = np.array([(x, y) for y in steps for x in steps])
         centres = np.column_stack([edge % width, edge // width]).astype(float)
         points = (centres[:, None] + grid).reshape(-1, 2)
-        rays = pixel_rays(self.scenario.camera, points)
+        rays = pixel_rays(view.camera, points)
         hidden = np.repeat(behind[edge], len(grid), axis=0)
-        fine = self._shade(caster, caster.from_pinhole(rays), rays, hidden, camera)
+        fine = self._shade(caster, caster.from_pinhole(rays), rays, hidden, view)
         radiance[edge] = fine.reshape(len(edge), len(grid), 3).mean(axis=1)
 
 

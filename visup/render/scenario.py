@@ -6,33 +6,29 @@ The format is told in ``docs/scenarios.md``. World coordinates are metres, right
 from __future__ import annotations
 
 import tomllib
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from visup.agent.errors import ManyErrors, Place, SettingsError, VisupError
-
-Vector = tuple[float, float, float]
-
-
-def _not_zero(v: Vector) -> Vector:
-    if not any(v):
-        raise ValueError("a direction must not be zero")
-    return v
-
-
-Direction = Annotated[Vector, AfterValidator(_not_zero)]
-Seconds = Annotated[float, Field(ge=0)]
-
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from visup.render.optics import (
+    Camera,
+    Direction,
+    Earth,
+    Light,
+    Panorama,
+    Seconds,
+    Sensor,
+    Stars,
+    Strict,
+    Texture,
+    Vector,
+    rising,
+)
 
 
-class PoseKey(_Model):
+class PoseKey(Strict):
     """Where an object is at a time; at most one way to give its orientation, none for unturned."""
 
     at_s: Seconds = 0.0
@@ -49,25 +45,7 @@ class PoseKey(_Model):
         return self
 
 
-class CameraKey(_Model):
-    """Where the camera is at a time, and the point it looks at."""
-
-    at_s: Seconds = 0.0
-    position: Vector
-    look_at: Vector
-    up: Direction = (0.0, 0.0, 1.0)
-
-    @model_validator(mode="after")
-    def _sees(self) -> CameraKey:
-        sight = np.subtract(self.look_at, self.position)
-        if np.linalg.norm(np.cross(sight, self.up)) < 1e-9:
-            raise ValueError(
-                "look_at must differ from position, and up must not lie along the line of sight"
-            )
-        return self
-
-
-class TipKey(_Model):
+class TipKey(Strict):
     """Where the tip of an arm is at a time, and the way its end effector points (world)."""
 
     at_s: Seconds = 0.0
@@ -75,14 +53,14 @@ class TipKey(_Model):
     direction: Direction
 
 
-class JointKey(_Model):
+class JointKey(Strict):
     """The six joint angles of an arm at a time, degrees, from the shoulder to the tip."""
 
     at_s: Seconds = 0.0
     angles_deg: tuple[float, float, float, float, float, float]
 
 
-class Spin(_Model):
+class Spin(Strict):
     """A steady turn about an axis of the world, from a time on, added to the track."""
 
     axis: Direction
@@ -90,91 +68,17 @@ class Spin(_Model):
     from_s: Seconds = 0.0
 
 
-class Shake(_Model):
-    """An unsteady hand."""
-
-    amplitude_deg: Annotated[float, Field(ge=0, le=5)]
-    frequency_hz: Annotated[float, Field(gt=0, le=50)] = 1.0
-    seed: int = 0
+Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(rising)]
 
 
-def _rising(keys: tuple[Any, ...]) -> tuple[Any, ...]:
-    times = [k.at_s for k in keys]
-    if any(b <= a for a, b in pairwise(times)):
-        raise ValueError("at_s must rise from key to key")
-    return keys
-
-
-Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(_rising)]
-
-
-class Camera(_Model):
-    """The camera and its track."""
-
-    size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = (
-        640,
-        480,
-    )
-    fps: Annotated[float, Field(gt=0, le=1000)] = 25.0
-    fov_vertical_deg: Annotated[float, Field(gt=0.1, lt=170)] = 38.0
-    track: Annotated[tuple[CameraKey, ...], Field(min_length=1), AfterValidator(_rising)]
-    shake: Shake | None = None
-    smooth: bool = False
-
-    @property
-    def focal_px(self) -> float:
-        """Distance from the pinhole to the image, in pixels."""
-        return float(self.size[1] / 2 / np.tan(np.radians(self.fov_vertical_deg) / 2))
-
-
-class Light(_Model):
-    """One distant sun, and the weak light of the Earth."""
-
-    sun: Direction
-    earth: Direction = (0.0, 0.0, -1.0)
-    earthshine: Annotated[float, Field(ge=0, le=1)] = 0.05
-
-
-class Stars(_Model):
-    """Stars that stand still in the world."""
-
-    kind: Literal["stars"] = "stars"
-    count: Annotated[int, Field(ge=0, le=100_000)] = 4000
-    brightness: Annotated[float, Field(ge=0)] = 0.25
-    seed: int = 0
-
-
-class Earth(_Model):
-    """A cloudy Earth with its limb before the stars; `light.earth` says where it is."""
-
-    kind: Literal["earth"]
-    altitude_km: Annotated[float, Field(ge=100, le=40_000)] = 300.0
-    clouds: Annotated[float, Field(ge=0, le=1)] = 0.5
-    brightness: Annotated[float, Field(ge=0)] = 0.6
-    turn_deg_per_s: float = 0.0
-    turn_axis: Direction = (0.0, 1.0, 0.0)
-    count: Annotated[int, Field(ge=0, le=100_000)] = 4000
-    seed: int = 0
-
-
-class Sensor(_Model):
-    """What the camera makes of the light."""
-
-    exposure: Annotated[float, Field(gt=0)] = 1.0
-    gamma: Annotated[float, Field(ge=1, le=3)] = 2.2
-    black: Annotated[float, Field(ge=0, le=100)] = 4.0
-    noise: Annotated[float, Field(ge=0, le=64)] = 1.5
-    blur_px: Annotated[float, Field(ge=0, le=10)] = 0.5
-
-
-class Attachment(_Model):
+class Attachment(Strict):
     """From a time on the object moves as if bolted to another (the tip, when that is an arm)."""
 
     to: str
     from_s: Seconds
 
 
-class SceneObject(_Model):
+class SceneObject(Strict):
     """Something in the scene: a rigid body on a track, or an arm led by its tip or its joints.
 
     Objects with label 0 are scenery: they are seen but belong to the background.
@@ -186,13 +90,14 @@ class SceneObject(_Model):
     model: str | None = None
     actor: bool = False
     colour: tuple[float, float, float] | None = None
+    texture: Texture | None = None
     scale: Annotated[float, Field(gt=0)] = 1.0
     smooth: bool = False
     track: Keys
     spin: tuple[Spin, ...] = ()
     attach: Attachment | None = None
-    tip: Annotated[tuple[TipKey, ...], AfterValidator(_rising)] = ()
-    joints: Annotated[tuple[JointKey, ...], AfterValidator(_rising)] = ()
+    tip: Annotated[tuple[TipKey, ...], AfterValidator(rising)] = ()
+    joints: Annotated[tuple[JointKey, ...], AfterValidator(rising)] = ()
     roll_deg: float = 0.0
     elbow_up: bool = True
 
@@ -205,10 +110,12 @@ class SceneObject(_Model):
             raise ValueError("an arm needs either tip or joints keys")
         if self.mesh != "arm" and led:
             raise ValueError("only the mesh 'arm' has tip or joints keys")
+        if self.mesh == "arm" and self.texture:
+            raise ValueError("an arm bends, and a texture is that of a rigid body")
         return self
 
 
-class StageTruth(_Model):
+class StageTruth(Strict):
     """A stage that a supervisor should see, and how it goes."""
 
     stage: str
@@ -217,7 +124,7 @@ class StageTruth(_Model):
     outcome: Literal["complete", "failing", "unsafe"]
 
 
-class AlertTruth(_Model):
+class AlertTruth(Strict):
     """An alert that a supervisor should raise."""
 
     kind: str
@@ -225,7 +132,7 @@ class AlertTruth(_Model):
     objects: tuple[str, ...] = ()
 
 
-class CouplingTruth(_Model):
+class CouplingTruth(Strict):
     """Two objects take hold of each other, or let go."""
 
     kind: Literal["coupled", "decoupled"]
@@ -233,7 +140,7 @@ class CouplingTruth(_Model):
     at_s: Seconds
 
 
-class Truth(_Model):
+class Truth(Strict):
     """What is meant by the scene; the geometry gives the rest."""
 
     verdict: Literal["succeeded", "failed", "interrupted", "in_progress"] = "in_progress"
@@ -243,7 +150,7 @@ class Truth(_Model):
     spin_of: str | None = None
 
 
-class Scenario(_Model):
+class Scenario(Strict):
     """A whole scenario file."""
 
     name: Annotated[str, Field(pattern=r"^[\w-]+$")]
@@ -252,7 +159,7 @@ class Scenario(_Model):
     seed: int = 0
     camera: Camera
     light: Light
-    background: Annotated[Stars | Earth, Field(discriminator="kind")] = Stars()
+    background: Annotated[Stars | Earth | Panorama, Field(discriminator="kind")] = Stars()
     sensor: Sensor = Sensor()
     object: Annotated[tuple[SceneObject, ...], Field(min_length=1)]
     truth: Truth = Truth()
@@ -361,7 +268,9 @@ def _root_faults(error: ValidationError) -> list[dict[str, Any]]:
 
 def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
     """One fault that pydantic found, in the user's words."""
-    steps = [s for s in error["loc"] if s not in ("stars", "earth") or len(error["loc"]) == 1]
+    steps = [
+        s for s in error["loc"] if s not in ("stars", "earth", "panorama") or len(error["loc"]) == 1
+    ]
     where = ".".join(str(s + 1) if isinstance(s, int) else str(s) for s in steps)
     message = str(error["msg"]).removeprefix("Value error, ").rstrip(".")
     if error["type"] == "extra_forbidden":

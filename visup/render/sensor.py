@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.render.scenario import Sensor
+from visup.render.optics import Sensor
 
 
 def expose(

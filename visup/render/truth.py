@@ -136,7 +136,7 @@ def mission(scenario: Scenario) -> dict[str, Any]:
     return {
         "task": scenario.task,
         "actors": {o.name: o.model or o.mesh for o in scenario.labelled if o.actor},
-        "fov_vertical_deg": scenario.camera.fov_vertical_deg,
+        "fov_vertical_deg": scenario.camera.at(0.0).fov_vertical_deg,
         "fps": scenario.camera.fps,
         "size": list(scenario.camera.size),
     }

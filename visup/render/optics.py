@@ -1,0 +1,194 @@
+"""The settings of a scenario that say how the scene is seen: camera, light, background, sensor.
+
+What changes with time (zoom, the strength of the light, exposure) has keyframes and an `at`, which gives the
+settings as they are at a time.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+Vector = tuple[float, float, float]
+
+
+def _not_zero(v: Vector) -> Vector:
+    if not any(v):
+        raise ValueError("a direction must not be zero")
+    return v
+
+
+Direction = Annotated[Vector, AfterValidator(_not_zero)]
+Seconds = Annotated[float, Field(ge=0)]
+
+
+class Strict(BaseModel):
+    """Settings that cannot be changed, and know of no other keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def rising(keys: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Keyframes whose times rise."""
+    times = [k.at_s for k in keys]
+    if any(b <= a for a, b in pairwise(times)):
+        raise ValueError("at_s must rise from key to key")
+    return keys
+
+
+class CameraKey(Strict):
+    """Where the camera is at a time, and the point it looks at."""
+
+    at_s: Seconds = 0.0
+    position: Vector
+    look_at: Vector
+    up: Direction = (0.0, 0.0, 1.0)
+
+    @model_validator(mode="after")
+    def _sees(self) -> CameraKey:
+        sight = np.subtract(self.look_at, self.position)
+        if np.linalg.norm(np.cross(sight, self.up)) < 1e-9:
+            raise ValueError(
+                "look_at must differ from position, and up must not lie along the line of sight"
+            )
+        return self
+
+
+class Shake(Strict):
+    """An unsteady hand."""
+
+    amplitude_deg: Annotated[float, Field(ge=0, le=5)]
+    frequency_hz: Annotated[float, Field(gt=0, le=50)] = 1.0
+    seed: int = 0
+
+
+FieldOfView = Annotated[float, Field(gt=0.1, lt=170)]
+Exposure = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0)]
+
+
+class ZoomKey(Strict):
+    """The vertical field of view at a time."""
+
+    at_s: Seconds = 0.0
+    fov_vertical_deg: FieldOfView
+
+
+class LightKey(Strict):
+    """How strong the light is at a time."""
+
+    at_s: Seconds = 0.0
+    strength: Share
+
+
+class ExposureKey(Strict):
+    """How much the sensor makes of the light at a time."""
+
+    at_s: Seconds = 0.0
+    exposure: Exposure
+
+
+class Camera(Strict):
+    """The camera and its track."""
+
+    size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = (
+        640,
+        480,
+    )
+    fps: Annotated[float, Field(gt=0, le=1000)] = 25.0
+    fov_vertical_deg: FieldOfView = 38.0
+    track: Annotated[tuple[CameraKey, ...], Field(min_length=1), AfterValidator(rising)]
+    shake: Shake | None = None
+    smooth: bool = False
+    zoom: Annotated[tuple[ZoomKey, ...], AfterValidator(rising)] = ()
+
+    def at(self, time: float) -> Camera:
+        """The camera as it is zoomed at a time."""
+        return _at(self, self.zoom, "fov_vertical_deg", time)
+
+    @property
+    def focal_px(self) -> float:
+        """Distance from the pinhole to the image, in pixels."""
+        return float(self.size[1] / 2 / np.tan(np.radians(self.fov_vertical_deg) / 2))
+
+
+class Light(Strict):
+    """One distant sun, and the weak light of the Earth."""
+
+    sun: Direction
+    earth: Direction = (0.0, 0.0, -1.0)
+    earthshine: Annotated[float, Field(ge=0, le=1)] = 0.05
+    strength: Share = 1.0
+    track: Annotated[tuple[LightKey, ...], AfterValidator(rising)] = ()
+
+    def at(self, time: float) -> Light:
+        """The light as strong as it is at a time."""
+        return _at(self, self.track, "strength", time)
+
+
+class Stars(Strict):
+    """Stars that stand still in the world."""
+
+    kind: Literal["stars"] = "stars"
+    count: Annotated[int, Field(ge=0, le=100_000)] = 4000
+    brightness: Annotated[float, Field(ge=0)] = 0.25
+    seed: int = 0
+
+
+class Earth(Strict):
+    """A cloudy Earth with its limb before the stars; `light.earth` says where it is."""
+
+    kind: Literal["earth"]
+    altitude_km: Annotated[float, Field(ge=100, le=40_000)] = 300.0
+    clouds: Annotated[float, Field(ge=0, le=1)] = 0.5
+    brightness: Annotated[float, Field(ge=0)] = 0.6
+    turn_deg_per_s: float = 0.0
+    turn_axis: Direction = (0.0, 1.0, 0.0)
+    count: Annotated[int, Field(ge=0, le=100_000)] = 4000
+    seed: int = 0
+
+
+class Panorama(Strict):
+    """A patterned surface far away on all sides; its pattern blends two colours."""
+
+    kind: Literal["panorama"]
+    colours: tuple[Vector, Vector] = ((0.10, 0.13, 0.12), (0.42, 0.38, 0.30))
+    size_deg: Annotated[float, Field(gt=0, le=90)] = 6.0
+    seed: int = 0
+
+
+class Texture(Strict):
+    """A pattern that goes through a body, as grain goes through wood."""
+
+    contrast: Annotated[float, Field(ge=0, le=1)] = 0.5
+    size: Annotated[float, Field(gt=0)] = 0.3
+    seed: int = 0
+
+
+class Sensor(Strict):
+    """What the camera makes of the light."""
+
+    exposure: Exposure = 1.0
+    track: Annotated[tuple[ExposureKey, ...], AfterValidator(rising)] = ()
+    gamma: Annotated[float, Field(ge=1, le=3)] = 2.2
+    black: Annotated[float, Field(ge=0, le=100)] = 4.0
+    noise: Annotated[float, Field(ge=0, le=64)] = 1.5
+    blur_px: Annotated[float, Field(ge=0, le=10)] = 0.5
+
+    def at(self, time: float) -> Sensor:
+        """The sensor as it is exposed at a time."""
+        return _at(self, self.track, "exposure", time)
+
+
+Settings = TypeVar("Settings", Camera, Light, Sensor)
+
+
+def _at(settings: Settings, keys: tuple[Any, ...], name: str, time: float) -> Settings:
+    """The settings with one number as its keyframes say: straight between them, held outside."""
+    if not keys:
+        return settings
+    value = np.interp(time, [k.at_s for k in keys], [getattr(k, name) for k in keys])
+    return settings.model_copy(update={name: float(value)})

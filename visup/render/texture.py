@@ -1,0 +1,49 @@
+"""A pattern in space: value noise of several sizes, which a surface cuts as a saw cuts wood."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+Floats = NDArray[np.float32]
+SIDE = 32
+"""Values along each side of the lattice, after which the pattern repeats."""
+
+OCTAVES = 4
+STEEP = 2.2
+"""Sums of noise crowd round the middle: this spreads them over the range."""
+
+
+def pattern(points: NDArray[np.floating], seed: int) -> Floats:
+    """The pattern at points in space.
+
+    Args:
+        points: (N, 3), in units of its largest blotches.
+        seed: Chooses the pattern.
+
+    Returns:
+        (N,) float32, -1 to 1, about 0 in the mean.
+    """
+    lattice = _lattice(seed)
+    total = np.zeros(len(points), np.float32)
+    at = np.asarray(points, np.float32)
+    weight, most = 1.0, 0.0
+    for _ in range(OCTAVES):
+        cell = np.floor(at)
+        step = at - cell
+        # Eased within each cell, or the eye sees the lattice.
+        eased = cell + step * step * (3 - 2 * step)
+        total += np.float32(weight) * map_coordinates(lattice, eased.T, order=1, mode="grid-wrap")
+        most += weight
+        # Shifted as well, so that the corners of the lattices do not coincide.
+        weight, at = 0.6 * weight, 2 * at + np.float32(7.3)
+    return np.asarray(np.clip(STEEP * total / most, -1, 1), np.float32)
+
+
+@lru_cache(maxsize=16)
+def _lattice(seed: int) -> Floats:
+    values = np.random.default_rng(seed).uniform(-1, 1, (SIDE, SIDE, SIDE))
+    return values.astype(np.float32)
