@@ -10,6 +10,7 @@ import typer
 
 import visup
 from visup.agent.errors import VisupError
+from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.evaluate import app as evaluate_app
 from visup.commands.models import app as models_app
@@ -40,6 +41,7 @@ app.command("doctor")(doctor)
 app.add_typer(task_app, name="task", help="Check, show and list task files.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
 app.add_typer(evaluate_app, name="eval", help="Compute figures against ground truth.")
+app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")
 
 
 def _version(wanted: bool) -> None:

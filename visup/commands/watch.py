@@ -136,7 +136,7 @@ def run_and_tell(
     folder = fresh_folder(out, settings.source)
     narrator = Narrator(console, as_json)
     silent = quiet or as_json
-    with _progress(console, shown=not silent) as progress:
+    with progress_bar(console, "watching", shown=not silent) as progress:
         result = supervise(
             settings,
             folder,
@@ -149,12 +149,21 @@ def run_and_tell(
 
 
 @contextmanager
-def _progress(console: Console, *, shown: bool) -> Iterator[Progress]:
-    """A progress bar on a terminal; nothing where the output is not one."""
+def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[Progress]:
+    """A progress bar on a terminal; nothing where the output is not one.
+
+    Args:
+        console: Where it is shown.
+        word: What is being done.
+        shown: Whether to show it at all.
+
+    Yields:
+        What is to be told frames done and frames in all.
+    """
     from rich import progress
 
     bar = progress.Progress(
-        "watching",
+        word,
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TimeRemainingColumn(),
@@ -163,7 +172,7 @@ def _progress(console: Console, *, shown: bool) -> Iterator[Progress]:
         disable=not (shown and console.is_terminal),
     )
     with bar:
-        task = bar.add_task("watching", total=None)
+        task = bar.add_task(word, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 

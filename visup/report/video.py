@@ -23,16 +23,18 @@ FOURCC = "VP80"
 class VideoWriter:
     """Writes pictures as WebM with VP8, which every browser plays.
 
-    The first picture fixes the size, at most 960 pixels wide; the file appears with it.
+    The first picture fixes the size; the file appears with it.
 
     Args:
         path: The file to write, `.webm`.
         fps: Frames per second to play, more than 0.
+        most_width: Wider pictures are reduced to it, pixels.
     """
 
-    def __init__(self, path: Path, fps: float) -> None:
+    def __init__(self, path: Path, fps: float, most_width: int = MOST_WIDTH) -> None:
         self.path = path
         self.fps = fps
+        self._most_width = most_width
         self._size: tuple[int, int] | None = None
         self._writer: cv2.VideoWriter | None = None
 
@@ -46,7 +48,7 @@ class VideoWriter:
             OutputError: The file cannot be written.
         """
         if self._writer is None:
-            self._size = playable_size(image.shape[1], image.shape[0])
+            self._size = playable_size(image.shape[1], image.shape[0], self._most_width)
             self._writer = self._opened(self._size)
         if self._size is not None and (image.shape[1], image.shape[0]) != self._size:
             image = np.asarray(
@@ -103,15 +105,16 @@ class AnnotatedVideo(VideoWriter):
         self.write(annotate(frame.image, step.mind))
 
 
-def playable_size(width: int, height: int) -> tuple[int, int]:
-    """The size of the video: at most 960 wide, proportions kept, both sides even and at least 16.
+def playable_size(width: int, height: int, most: int = MOST_WIDTH) -> tuple[int, int]:
+    """The size of the video: no wider than allowed, proportions kept, sides even and at least 16.
 
     Args:
         width: Of the frames, pixels.
         height: Of the frames, pixels.
+        most: Greatest width, pixels.
 
     Returns:
         (width, height), pixels.
     """
-    scale = min(1.0, MOST_WIDTH / width)
+    scale = min(1.0, most / width)
     return max(16, round(width * scale / 2) * 2), max(16, round(height * scale / 2) * 2)

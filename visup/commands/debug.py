@@ -1,0 +1,113 @@
+"""`visup debug`: pictures of the workings, for those who improve them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from visup.percepts.video import Source
+    from visup.run import Progress
+
+app = typer.Typer(no_args_is_help=True)
+
+MOST_WIDTH = 1284
+"""Pixels: two panels and what stands between them."""
+
+
+@app.callback()
+def group() -> None:
+    """Pictures of the workings, for those who improve them."""
+
+
+@app.command("motion")
+def motion(
+    source: Annotated[str, typer.Argument(help="Video file, folder of images or mission folder.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Video to write (default: NAME-motion.webm)."),
+    ] = None,
+    every: Annotated[int, typer.Option(help="Use every n-th frame.")] = 1,
+    limit: Annotated[int | None, typer.Option(min=1, help="Most frames to use.")] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frame rate, where the source has none.")
+    ] = None,
+) -> None:
+    """Write a video of how motion is seen: constraints, layers, labels, regions."""
+    from rich.console import Console
+
+    from visup.commands.watch import progress_bar
+    from visup.percepts.video import open_source
+
+    target = checked_target(out or Path(f"{_name(source)}-motion.webm"))
+    console = Console(highlight=False, soft_wrap=True)
+    with (
+        open_source(video_of(source), every=every, fps=fps) as video,
+        progress_bar(console, "seeing") as advance,
+    ):
+        written = _write(video, target, limit, advance)
+    if video.problem:
+        console.print(f"The source: {video.problem}", markup=False)
+    console.print(f"{written} frames in {target}", markup=False)
+
+
+def _write(video: Source, target: Path, limit: int | None, advance: Progress) -> int:
+    """Segment, draw and write; the number of frames written."""
+    from itertools import islice
+
+    from visup.percepts.motion.segmenter import MotionSegmenter
+    from visup.report.debug_motion import draw_motion
+    from visup.report.video import VideoWriter
+
+    segmenter, written = MotionSegmenter(), 0
+    known = [n for n in (_given(video), limit) if n is not None]
+    with VideoWriter(target, video.fps / video.every, MOST_WIDTH) as writer:
+        for frame in islice(video, limit):
+            regions = segmenter.step(frame)
+            writer.write(draw_motion(frame, segmenter.looked, regions))
+            written += 1
+            advance(written, min(known, default=None))
+    return written
+
+
+def _given(video: Source) -> int | None:
+    """How many frames a source gives, where it is known."""
+    return None if video.frame_count is None else -(-video.frame_count // video.every)
+
+
+def video_of(source: str) -> str:
+    """What to open: the video of a mission folder, else the source itself."""
+    folder = Path(source)
+    if (folder / "truth.json").is_file() or (folder / "mission.json").is_file():
+        videos = sorted(folder.glob("video.*"))
+        return str(videos[0]) if videos else source
+    return source
+
+
+def checked_target(path: Path) -> Path:
+    """Refuse a file that cannot be written before minutes of work.
+
+    Raises:
+        SettingsError: It is not WebM.
+        OutputError: Its folder does not exist.
+    """
+    from visup.agent.errors import OutputError, SettingsError
+
+    if path.suffix != ".webm":
+        raise SettingsError(
+            f"a video of the kind {path.suffix or path.name!r} is not written here",
+            where=str(path),
+            expected="a name that ends in .webm",
+        )
+    if not path.absolute().parent.is_dir():
+        raise OutputError("its folder does not exist", where=str(path))
+    return path
+
+
+def _name(source: str) -> str:
+    """What the source is called, without folders and endings."""
+    path = Path(source)
+    word = path.parent.name if path.stem in ("video", "frames") else path.stem
+    return word or "source"
