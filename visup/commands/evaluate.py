@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from visup.commands.clips import clips
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
 app = typer.Typer(no_args_is_help=True)
+app.command("clips")(clips)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]
@@ -59,7 +62,7 @@ def motion(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
     from visup.evaluation.motion import evaluate_motion
 
     _checked(folder, json_file)
-    with _told("seeing") as tell:
+    with told("seeing") as tell:
         figures = evaluate_motion(folder, limit=limit, progress=tell)
     _show("motion", folder, figures, MOTION_KEYS, json_file, {"limit": limit})
 
@@ -70,7 +73,7 @@ def shapes(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
     from visup.evaluation.shapes import evaluate_shapes
 
     _checked(folder, json_file)
-    with _told("comparing") as tell:
+    with told("comparing") as tell:
         figures = evaluate_shapes(folder, limit=limit, progress=tell)
     _show("shapes", folder, figures, SHAPE_KEYS, json_file, {"limit": limit})
 
@@ -86,7 +89,7 @@ def missions(
     from visup.evaluation.missions import evaluate_missions
 
     _checked(folder, json_file)
-    with _told("supervising") as tell:
+    with told("supervising") as tell:
         figures = evaluate_missions(folder, models=models, limit=limit, progress=tell)
     settings = {"limit": limit, "models": str(models) if models else None}
     _show("missions", folder, figures, MISSION_KEYS, json_file, settings)
@@ -114,15 +117,31 @@ def health(
 
 def _checked(folder: Path, json_file: Path | None) -> None:
     """Refuse what cannot work before an evaluation of minutes begins."""
-    from visup.agent.errors import OutputError, SettingsError
+    from visup.agent.errors import SettingsError
 
     if not folder.is_dir():
         raise SettingsError("there is no such folder", where=str(folder))
+    writable(json_file)
+
+
+def told(word: str) -> _Told:
+    """A line of progress on standard error: call it with what is being done."""
+    return _Told(word)
+
+
+def writable(json_file: Path | None) -> None:
+    """Refuse a file for the figures whose folder does not exist.
+
+    Raises:
+        OutputError: It does not.
+    """
+    from visup.agent.errors import OutputError
+
     if json_file and not json_file.absolute().parent.is_dir():
         raise OutputError("its folder does not exist", where=str(json_file))
 
 
-class _told:
+class _Told:
     """A line of progress on standard error, replaced as items are done."""
 
     def __init__(self, word: str) -> None:
@@ -131,7 +150,7 @@ class _told:
         self._status = Console(stderr=True).status(word)
         self._word = word
 
-    def __enter__(self) -> _told:
+    def __enter__(self) -> _Told:
         self._status.start()
         return self
 

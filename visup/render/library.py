@@ -8,23 +8,36 @@ from pathlib import Path
 from visup.agent.errors import SettingsError
 from visup.render.scenario import Scenario, load_scenario, parse_scenario
 
+BENCH = "bench"
+"""Folder of the scenarios that the bench scores."""
+
 
 def shipped_names() -> tuple[str, ...]:
-    """Names of the shipped scenarios, sorted."""
-    files = resources.files("visup.render").iterdir()
+    """Names of the shipped scenarios, sorted, but for those of the bench."""
+    return _names(".")
+
+
+def bench_names() -> tuple[str, ...]:
+    """Names of the scenarios that the bench scores, sorted."""
+    return _names(BENCH)
+
+
+def _names(folder: str) -> tuple[str, ...]:
+    files = (resources.files("visup.render") / folder).iterdir()
     return tuple(sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml")))
 
 
 def shipped_scenario(name: str) -> Scenario:
-    """A shipped scenario by its name.
+    """A shipped scenario by its name, such as `sts87`, or `bench/pan` for one of the bench.
 
     Raises:
         SettingsError: There is none of that name.
     """
-    if name not in shipped_names():
+    known = (*shipped_names(), *(f"{BENCH}/{n}" for n in bench_names()))
+    if name not in known:
         raise SettingsError(
             f"there is no scenario {name!r}",
-            expected=f"a file, or one of {', '.join(shipped_names())}",
+            expected=f"a file, or one of {', '.join(known)}",
         )
     text = (resources.files("visup.render") / f"{name}.toml").read_text(encoding="utf-8")
     return parse_scenario(text, f"{name}.toml")

@@ -282,7 +282,7 @@ class Renderer:
         towards = np.flatnonzero(facing > 0)
         facing[towards[caster.blocked(points[towards], normals[towards], sun)]] = 0.0
         # The Earth fills half the sky: its light falls off gently with the angle to it.
-        glow = light.earthshine * (0.5 + 0.5 * (normals @ earth))
+        glow = light.earthshine * np.maximum(0.5 + 0.5 * (normals @ earth), 0.0)
         strength = np.float32(light.strength) * (facing + glow)
         albedo = caster.albedo[face] * self._grain(caster, hits.body[met], points)[:, None]
         radiance[met] = albedo[:, ::-1] * strength[:, None]
