@@ -189,3 +189,56 @@ def test_a_body_behind_the_camera_is_not_seen(tmp_path: Path) -> None:
     assert not picture.mask.any()
     assert picture.amodal_px["thing"] == 0
     assert "bbox" not in frame_truth(picture, {"thing": 1})["thing"]
+
+
+@settings(max_examples=10, deadline=None)
+@given(fov=st.floats(20.0, 60.0), time=st.integers(0, 10))
+def test_zooming_is_another_field_of_view(fov: float, time: int) -> None:
+    """A frame of a camera that zooms is that of one whose field of view is what it has come to."""
+    track = [{"position": (0, 0, 0), "look_at": (1, 0, 0)}]
+    zoom = [{"at_s": 0, "fov_vertical_deg": 30}, {"at_s": 1, "fov_vertical_deg": fov}]
+    base = {"size": TINY, "fps": 10, "track": track}
+    dog = thing("dog", (5, 0, 0))
+    back = {"kind": "panorama"}
+    zooming = scene([dog], camera={**base, "zoom": zoom}, background=back, duration_s=2)
+    now = 30 + (fov - 30) * min(time / 10, 1)
+    fixed = scene([dog], camera={**base, "fov_vertical_deg": now}, background=back, duration_s=2)
+    a, b = Renderer(zooming).picture(time), Renderer(fixed).picture(time)
+    assert np.array_equal(a.mask, b.mask)
+    assert np.array_equal(a.image, b.image)
+    assert a.amodal_px == b.amodal_px
+
+
+@pytest.mark.parametrize("background", [{"kind": "panorama"}, {"kind": "earth", "count": 0}])
+def test_light_and_exposure_scale_the_picture_alike(background: dict[str, object]) -> None:
+    """Half the light at twice the exposure is the same picture, for bodies and what is behind them."""
+    dog = thing("dog", (5, 0, 0), texture={"contrast": 0.5})
+    light = {"sun": (-1, 0, 0.5), "earth": (1, 0, -0.4), "earthshine": 0.2}
+    plain = scene([dog], light=light, background=background)
+    dim = {**light, "track": [{"at_s": 0, "strength": 1}, {"at_s": 1, "strength": 0.5}]}
+    twice = {**QUIET, "track": [{"at_s": 0, "exposure": 1}, {"at_s": 1, "exposure": 2}]}
+    changed = scene([dog], light=dim, sensor=twice, background=background)
+    dimmed = scene([dog], light=dim, background=background)
+    whole, same, half = (
+        Renderer(s).picture(10).image.astype(float) for s in (plain, changed, dimmed)
+    )
+    below = whole < 255
+    assert whole[below].mean() > 5
+    # Which pixels are smoothed as edges hangs on contrast: a few may differ by more.
+    assert (abs(same - whole)[below] <= 1).mean() > 0.99
+    assert (abs(half - whole / 2)[below] <= 1).mean() > 0.99
+
+
+def test_a_texture_goes_with_its_body(tmp_path: Path) -> None:
+    """Shifted by whole pixels before a sun that stands behind the camera, a face looks the same."""
+    panel = box_file(tmp_path, (0.1, 1.0, 1.0))
+    focal = scene([thing(panel, (5, 0, 0))]).camera.focal_px
+    texture = {"contrast": 0.8, "size": 0.4, "seed": 3}
+    images = []
+    for shift in (0, 10):
+        at = (5.05, -shift * 5.0 / focal, 0.0)
+        picture = Renderer(scene([thing(panel, at, texture=texture)])).picture(0)
+        x = slice(70 + shift, 90 + shift)
+        images.append(picture.image[50:70, x].astype(float))
+    assert images[0].std() > 10
+    np.testing.assert_allclose(images[0], images[1], atol=2)

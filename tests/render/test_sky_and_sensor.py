@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from visup.render.background import AIR_KM, EARTH_RADIUS_KM, clouds, earth, stars
-from visup.render.optics import Camera, CameraKey, Earth, Light, Sensor, Stars
+from visup.render.background import AIR_KM, EARTH_RADIUS_KM, clouds, earth, panorama, stars
+from visup.render.optics import Camera, CameraKey, Earth, Light, Panorama, Sensor, Stars
 from visup.render.sensor import expose
+from visup.render.texture import pattern
 
 CAMERA = Camera(size=(120, 120), track=(CameraKey(position=(0, 0, 0), look_at=(1, 0, 0)),))
 
@@ -86,3 +87,28 @@ def test_noise_has_its_size_and_its_seed() -> None:
     assert np.array_equal(a, same)
     assert abs(np.corrcoef(a[..., 0].ravel(), next_frame[..., 0].ravel())[0, 1]) < 0.03
     assert not np.array_equal(a, other)
+
+
+def test_the_panorama_stands_still_and_blends_its_colours() -> None:
+    random = np.random.default_rng(0)
+    rays = random.standard_normal((5000, 3))
+    rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
+    wall = Panorama(kind="panorama", colours=((0.1, 0.2, 0.3), (0.5, 0.4, 0.6)))
+    drawn = panorama(rays, wall)
+    assert np.array_equal(drawn, panorama(rays, wall))
+    assert (drawn >= np.array([0.3, 0.2, 0.1]) - 1e-6).all()  # BGR
+    assert (drawn <= np.array([0.6, 0.4, 0.5]) + 1e-6).all()
+    assert (drawn.std(axis=0) > 0.02).all()
+    other = panorama(rays, wall.model_copy(update={"seed": 1}))
+    assert abs(np.corrcoef(drawn[:, 0], other[:, 0])[0, 1]) < 0.3
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 50), at=st.tuples(*[st.floats(-50, 50)] * 3))
+def test_the_pattern_is_smooth_and_within_its_range(
+    seed: int, at: tuple[float, float, float]
+) -> None:
+    points = np.array(at) + np.linspace(0, 1, 400)[:, None] * np.array([1.0, 0.4, -0.3])
+    values = pattern(points, seed)
+    assert (abs(values) <= 1).all()
+    assert abs(np.diff(values)).max() < 0.15

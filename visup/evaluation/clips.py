@@ -23,6 +23,9 @@ from visup.render.library import bench_names, shipped_scenario
 MARK = "made-of.txt"
 """File of a cached clip that says what it was made of."""
 
+NO_RENDERERS = {"__init__.py", "library.py", "demo_clip.py", "demo_models.py"}
+"""Files beside the renderer that do not change what it makes."""
+
 
 @dataclass(frozen=True, slots=True)
 class Bar:
@@ -148,7 +151,8 @@ def _recipe(name: str) -> str:
     """What a clip is made of: the digest of its scenario and of all code that renders."""
     digest = hashlib.sha256()
     package = resources.files("visup.render")
-    code = sorted((f for f in package.iterdir() if f.name.endswith(".py")), key=lambda f: f.name)
+    beside = [f for f in package.iterdir() if f.name.endswith(".py")]
+    code = sorted((f for f in beside if f.name not in NO_RENDERERS), key=lambda f: f.name)
     for file in (*code, package / "bench" / f"{name}.toml"):
         digest.update(file.read_bytes())
     return digest.hexdigest() + "\n"
