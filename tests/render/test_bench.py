@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from visup.agent.errors import SettingsError
+from visup.commands.clips import clips_table
 from visup.evaluation.clips import MARK, Bar, bar_of, evaluate_clips, judged, rendered
 from visup.render.library import bench_names, find_scenario, shipped_names, shipped_scenario
 from visup.render.renderer import Renderer
@@ -89,6 +92,26 @@ def test_a_clip_is_rendered_once_and_again_when_it_changed(
     (folder / MARK).write_text("of another scenario\n")
     rendered("slow", tmp_path)
     assert (folder / "truth.json").stat().st_mtime_ns > made
+
+
+def test_a_clip_is_scored_from_its_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camel = shipped_scenario("bench/exposure").resized((160, 120))
+    short = camel.model_copy(update={"duration_s": 2.8})
+    monkeypatch.setattr("visup.evaluation.clips.shipped_scenario", lambda _: short)
+    told: list[str] = []
+    figures = evaluate_clips(tmp_path, ["exposure"], workers=1, progress=told.append)
+    assert told == ["1 of 1 clips"]
+    item = figures["items"]["exposure"]
+    assert item["objects"]["camel"]["J"] > 0.5
+    assert figures["total"]["clips"] == 1
+    assert figures["total"]["passed"] == int(not item["missed"])
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(clips_table(figures["items"]))
+    shown = console.export_text()
+    assert "camel" in shown
+    assert "pass" in shown or item["missed"][0][:10] in shown
 
 
 def test_an_unknown_clip_is_named(tmp_path: Path) -> None:

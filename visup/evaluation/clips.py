@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from importlib import resources
@@ -72,13 +72,10 @@ def evaluate_clips(
     """
     wanted = _known(names)
     found: dict[str, dict[str, Any]] = {}
-    # Fresh processes: a fork would share the state of OpenCV's threads.
-    with ProcessPoolExecutor(workers or os.cpu_count(), get_context("spawn")) as pool:
-        waiting = {pool.submit(_score, name, cache): name for name in wanted}
-        for done in as_completed(waiting):
-            found[waiting[done]] = done.result()
-            if progress is not None:
-                progress(f"{len(found)} of {len(wanted)} clips")
+    for name, figures in _scored(wanted, cache, workers or os.cpu_count() or 1):
+        found[name] = figures
+        if progress is not None:
+            progress(f"{len(found)} of {len(wanted)} clips")
     items = {name: judged(found[name], bar_of(name)) for name in wanted}
     return {"total": _total(items), "items": items}
 
@@ -158,13 +155,31 @@ def _recipe(name: str) -> str:
     return digest.hexdigest() + "\n"
 
 
-def _score(name: str, cache: Path) -> dict[str, Any]:
-    """The figures of one clip; runs in a process of its own."""
+def _scored(
+    names: Sequence[str], cache: Path, workers: int
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Clips and their figures as they come."""
+    if min(workers, len(names)) == 1:
+        yield from ((name, _score(name, cache)) for name in names)
+        return
+    # Fresh processes: a fork would share the state of OpenCV's threads.
+    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
+        waiting = {pool.submit(_score, name, cache): name for name in names}
+        for done in as_completed(waiting):
+            yield waiting[done], done.result()
+
+
+def _alone() -> None:
+    """One thread for each process: the processes share the cores already."""
     import cv2
 
+    cv2.setNumThreads(1)
+
+
+def _score(name: str, cache: Path) -> dict[str, Any]:
+    """The figures of one clip."""
     from visup.evaluation.motion import evaluate_motion
 
-    cv2.setNumThreads(1)  # the processes share the cores already
     items: dict[str, dict[str, Any]] = evaluate_motion(rendered(name, cache))["items"]
     return items[name]
 
