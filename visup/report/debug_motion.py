@@ -261,8 +261,8 @@ def layer_rows(looked: Looked) -> list[tuple[str, Rgb]]:
         vx, vy = model.at(middle)[0] / last.constraints.span_s / scale
         name = "background" if i == 0 else "background, second"
         sure = "" if last.background.sure or i else ", predicted"
-        support = f", {_support(model.support)}" if model.support else ""
-        words = f"{name}{sure}: {vx:+.1f} {vy:+.1f} px/s{support}"
+        backed = f", {_support(model.support)}" if model.support else ""
+        words = f"{name}{sure}: {vx:+.1f} {vy:+.1f} px/s{backed}"
         rows.append((words, BACKGROUND[min(i, 1)]))
     support = {t.key: sum(m.support for m in t.motions) for t in looked.tracks}
     first = sorted(looked.tracks, key=lambda t: (t.id == 0, t.id or -support[t.key]))
