@@ -280,7 +280,9 @@ def _track_words(t: Track, support: float, now: float, scale: float) -> str:
     parts = f", {len(t.motions)} parts" if len(t.motions) > 1 else ""
     seen = "" if t.seen == now else f", not seen for {now - t.seen:.1f} s"
     sigma = rate.sigma / scale
-    return f"{name}: {vx:+.1f} {vy:+.1f} ± {sigma:.1f} px/s, {_support(support)}{parts}{seen}"
+    digits = 1 if sigma >= 0.1 else 2
+    speed = f"{vx:+.{digits}f} {vy:+.{digits}f} ± {sigma:.{digits}f} px/s"
+    return f"{name}: {speed}, {_support(support)}{parts}{seen}"
 
 
 def _support(weight: float) -> str:
