@@ -162,7 +162,7 @@ def test_the_same_frames_give_the_same_report() -> None:
 def test_straight_steps_are_counted_wherever_the_grid_lies(size: int, x: int, y: int) -> None:
     tiles = np.random.default_rng(size).integers(0, 256, (40, 60)).astype(np.uint8)
     board = np.kron(tiles, np.ones((size, size), np.uint8))[y : y + 160, x : x + 240]
-    turned = cv2.GaussianBlur(board, (0, 0), 1.2)
+    turned = np.asarray(cv2.GaussianBlur(board, (0, 0), 1.2), np.uint8)
     assert measure(board).steps > 0.01
     assert measure(turned).steps < 0.001
 

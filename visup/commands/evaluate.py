@@ -109,7 +109,7 @@ def health(
     from visup.evaluation.health import evaluate_health
 
     _checked(folder, json_file)
-    with _told("watching") as tell:
+    with told("watching") as tell:
         figures = evaluate_health(folder, faults=faults, seed=seed, limit=limit, progress=tell)
     settings = {"faults": faults, "seed": seed, "limit": limit}
     _show("health", folder, figures, HEALTH_KEYS, json_file, settings)
