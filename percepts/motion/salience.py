@@ -32,7 +32,9 @@ EXPLAINED = 0.35  # share of points that fit the background over the baseline th
 CLEAR = 0.25  # the same for a track that is told at first sight
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
 FOLLOW = 0.3  # weight of the newest frame in running means
+RESTS = 0.7  # share of points that fit the background when a track rests
 FEWEST = 4
+NEAR_GONE = 3.0  # pixels, for a track that is told at first sight: further than leaves swing
 RING_STEPS = 5  # cells around a track in which its surroundings are looked for
 FEWEST_AROUND = 8
 MOST_BORDER = 0.2  # share of the image border that an object may take up when it is first told
@@ -49,9 +51,34 @@ def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track
         winner: (count,) the label that has each superpixel; label k is track k - 1.
 
     Returns:
-        The tracks; those that are confirmed are left as they are.
+        The tracks.
     """
-    return tuple(t if t.id else _weighed(t, k, scene, winner) for k, t in enumerate(tracks, 1))
+    return tuple(
+        _watched(t, k, scene, winner) if t.id else _weighed(t, k, scene, winner)
+        for k, t in enumerate(tracks, 1)
+    )
+
+
+def rests(t: Track, scene: Scene) -> bool:
+    """Whether an object does not move against the background over the baselines of this frame.
+
+    Then motion tells nothing of where it ends: slow objects show over the longer baselines, and one
+    that has stopped stays as it was.
+    """
+    seen = [t.explained.get(_octave(m), 0.0) for m in scene.measured]
+    return bool(t.id) and min(seen) > RESTS
+
+
+def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
+    """Note how well the background explains an object, over each baseline."""
+    explained = dict(t.explained)
+    for m in scene.measured:
+        mine = winner[scene.cell_of(m.constraints.xy)] == k
+        if np.count_nonzero(mine) >= FEWEST:
+            share = float(np.mean(m.background.distances(m.constraints)[mine] < FITS))
+            before = explained.get(_octave(m), share)
+            explained[_octave(m)] = before + FOLLOW * (share - before)
+    return replace(t, explained=MappingProxyType(explained))
 
 
 def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
@@ -64,8 +91,8 @@ def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
         local = surroundings(m, around)
         if np.count_nonzero(mine) >= FEWEST:
             share = float(np.mean(_misfit(m, local)[mine] < FITS))
-            before = explained.get(m.constraints.lag, share)
-            explained[m.constraints.lag] = before + FOLLOW * (share - before)
+            before = explained.get(_octave(m), share)
+            explained[_octave(m)] = before + FOLLOW * (share - before)
         if step is None:
             step = _step(t, m, local, scene.seconds)
     assert step is not None
@@ -75,6 +102,11 @@ def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
         gone=(t.gone[0] + float(step[0]), t.gone[1] + float(step[1])),
         way=t.way + float(np.hypot(*step)),
     )
+
+
+def _octave(m: Measured) -> int:
+    """Number of a baseline: those of nearly one length, as a video begins, are one."""
+    return round(float(np.log2(m.constraints.lag)))
 
 
 def surroundings(m: Measured, around: NDArray[np.bool_]) -> Affine | None:
@@ -123,7 +155,7 @@ def is_salient(t: Track, scene: Scene, *, at_once: bool = False) -> bool:
     gone = float(np.hypot(*t.gone))
     explained = min(t.explained.values(), default=0.0)
     if at_once:
-        return explained < CLEAR and gone >= LEAST_GONE and not _runs_ahead(t, scene)
+        return explained < CLEAR and gone >= NEAR_GONE and not _runs_ahead(t, scene)
     least = LEAST_GONE if scene.time - t.born >= SWING_S else FAR_GONE
     return explained < EXPLAINED and gone >= max(least, STRAIGHT * t.way)
 

@@ -29,7 +29,7 @@ from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
 from visup.percepts.motion.looked import Looked
 from visup.percepts.motion.report import obey, report
-from visup.percepts.motion.salience import weigh
+from visup.percepts.motion.salience import rests, weigh
 from visup.percepts.motion.scene import (
     Measured,
     Scene,
@@ -109,7 +109,10 @@ class MotionSegmenter:
         near = reach_of(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
-        posterior = label(cells, scene.points, likelihood, has, prior, more, self.settings)
+        resting = np.array([rests(t, scene) for t in tracks], dtype=bool)
+        posterior = label(
+            cells, scene.points, likelihood, has, prior, more, resting, self.settings
+        )
         keys = tuple(t.key for t in tracks)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)

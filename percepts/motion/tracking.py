@@ -125,7 +125,7 @@ class Track:
         alike: Votes that it is one with another track, by key.
         gone: (x, y) of its displacement since birth against the background, pixels.
         way: Length of the way it took to get there, pixels.
-        explained: Share of its points that the background explains, by baseline in frames.
+        explained: Share of its points that the background explains, by octave of the baseline.
     """
 
     key: int
