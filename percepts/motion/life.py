@@ -27,6 +27,8 @@ MOST_PARTS = 3
 LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
 SURE = 200.0  # the same for one that has only just appeared
 LIMB = 0.5  # how large, as a share of its object, a part may be that is taken for a limb of it
+SURROUNDED = 0.75  # share of what is around a track that is one other, of which it is a part
+SLIVER = 3.5  # length over width of a strip that is no object
 CONTACT = 5.0  # affinity of two cells that are flat and of one tone
 
 
@@ -280,7 +282,9 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
             if apart > APART_S or not _may_join(a, b, members[:, i], members[:, j], scene):
                 continue
             votes = a.alike.get(b.key, 0.0)
-            if _grown_together(scene, members[:, i], members[:, j]):
+            if _grown_together(scene, members[:, i], members[:, j]) or _is_inside(
+                scene, members[:, j], members[:, i]
+            ):
                 votes += 1.0
             else:
                 votes += _vote(scene, a, members[:, i], members[:, j])
@@ -329,6 +333,15 @@ def _grown_together(scene: Scene, in_a: NDArray[np.bool_], in_b: NDArray[np.bool
     return contact.nnz > 0 and float(contact.max()) > CONTACT
 
 
+def _is_inside(scene: Scene, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> bool:
+    """Whether either of two tracks is all but surrounded by the other: then it is a part of it."""
+    for inner, outer in ((a, b), (b, a)):
+        ring = scene.cells.reach(inner[:, None], 1)[:, 0] & ~inner
+        if outer[ring].mean() > SURROUNDED:
+            return True
+    return False
+
+
 def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:
     """Whether these constraints tell that something moves against the background."""
     if np.count_nonzero(which) < 4:
@@ -371,10 +384,18 @@ def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
     return tuple(out)
 
 
-def _is_thin(t: Track, scene: Scene) -> bool:
-    """Whether no cell of a track lies inside it: a sliver beside an edge is seldom an object."""
-    rest = t.share <= 0.5
-    return bool(scene.cells.reach(rest[:, None], 1)[:, 0].all())
+def _is_sliver(t: Track, scene: Scene) -> bool:
+    """Whether a track is a thin strip, no cell of which lies inside it.
+
+    Where two backgrounds meet, and along a straight edge that tells of one component of motion
+    only, such strips turn up; objects so thin are given up for that.
+    """
+    mine = t.share > 0.5
+    if not mine.any() or scene.cells.reach(~mine[:, None], 1)[:, 0].sum() < len(mine):
+        return False
+    spread = np.cov(scene.cells.centre[mine].T, aweights=scene.cells.area[mine], ddof=0)
+    long, short = np.sqrt(np.maximum(np.linalg.eigvalsh(np.atleast_2d(spread))[::-1], 1.0))
+    return bool(long > SLIVER * short)
 
 
 def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) -> tuple[Tracks, int]:
@@ -400,8 +421,9 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
 
 def _is_sure(t: Track, scene: Scene, settings: MotionSettings) -> bool:
     """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
-    thin = 2.0 if _is_thin(t, scene) else 1.0
-    if t.frames >= 2 and t.evidence > thin * SURE and is_salient(t, scene, at_once=True):
+    if t.frames < 2 or t.evidence < LIKELY or _is_sliver(t, scene):
+        return False
+    if t.evidence > SURE and is_salient(t, scene, at_once=True):
         return True
     lasts = t.frames >= 3 and scene.time - t.born >= settings.confirm_s
-    return lasts and t.evidence > thin * LIKELY and is_salient(t, scene)
+    return lasts and is_salient(t, scene)

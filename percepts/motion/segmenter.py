@@ -110,9 +110,7 @@ class MotionSegmenter:
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
         resting = np.array([rests(t, scene) for t in tracks], dtype=bool)
-        posterior = label(
-            cells, scene.points, likelihood, has, prior, more, resting, self.settings
-        )
+        posterior = label(cells, scene.points, likelihood, has, prior, more, resting, self.settings)
         keys = tuple(t.key for t in tracks)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
