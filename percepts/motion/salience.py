@@ -83,7 +83,9 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
 
 def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
     explained = dict(t.explained)
-    ring = scene.cells.reach((winner == k)[:, None], RING_STEPS)[:, 0] & (winner == 0)
+    # Points of its own outline may lie in the cells right beside it.
+    beside = scene.cells.reach((winner == k)[:, None], 1)
+    ring = scene.cells.reach(beside, RING_STEPS - 1)[:, 0] & ~beside[:, 0] & (winner == 0)
     step: Doubles | None = None
     for m in scene.measured:
         at = scene.cell_of(m.constraints.xy)
