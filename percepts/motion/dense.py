@@ -245,7 +245,7 @@ def label(
     has: NDArray[np.bool_],
     prior: Floats,
     more: Floats,
-    resting: NDArray[np.bool_],
+    stay: NDArray[np.bool_],
     settings: MotionSettings,
 ) -> Floats:
     """The posterior of each superpixel from motion, appearance and what was there before.
@@ -257,7 +257,7 @@ def label(
         has: (N,) bool, whether a point was measured.
         prior: (count, K) float32 label shares expected.
         more: (count, K) float32 dense log likelihood.
-        resting: (K - 2,) bool, which tracks rest: motion tells nothing of those, they stay.
+        stay: (count,) bool, where an object rests: motion tells nothing there.
         settings: Weights.
 
     Returns:
@@ -270,7 +270,6 @@ def label(
     bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
     bias[_border(cells.labels)] *= 10
     bias *= np.where(prior[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
-    stay = prior[:, 1:-1][:, resting].sum(axis=1) > 0.5
     trust[stay], bias[stay] = STAY, 0.0
     weight[stay] *= 1 - STILL_TOLD
     return spread(cells, share, settings.evidence * weight, look, trust, bias)

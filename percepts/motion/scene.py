@@ -14,10 +14,11 @@ from visup.percepts.motion.image import Floats, WorkImage
 from visup.percepts.motion.layers import Affine, distances, fit_affine, log_likelihood
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels
-from visup.percepts.motion.tracking import Indices, Motion, Track
+from visup.percepts.motion.tracking import Indices, Motion, Rate, Track
 
 REACH_STEPS = 2
 ALIKE_PX_S = 12.0  # pixels per second within which a part moves like what is hidden
+UNLIKE_PX_S = 8.0  # pixels per second by which a part may differ between baselines
 PART_COST = 4.0  # squared distance that a further part of a track must save
 
 
@@ -133,12 +134,13 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
             other = fit_affine(c, weight, middle(c, np.flatnonzero(weight)), slack=0.3)
             fit = other if other.support > fit.support else fit
         # A part that is nearly hidden tells little of its motion: what was known is kept.
-        if fit.support >= max(5.0, clear * motion.support):
+        steady = i == 0 or _agrees(motion, rate_of(fit, c, now), t.centre)
+        if steady and fit.support >= max(5.0, clear * motion.support):
             support = max(fit.support, 0.99 * motion.support)
             motion = motion.with_rate(c.lag, rate_of(fit, c, now), support)
             if i > 0 and c.span_s > 0.3 and m.background.moves_as(fit, t.centre):
                 continue
-        elif i > 0 and c.lag > 1:
+        elif i > 0 and (c.lag > 1 or not steady):
             motion = replace(motion, support=0.8 * motion.support)
             if motion.support < 4:
                 continue
@@ -151,6 +153,21 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
         if fit.support >= 5:
             whole = rate_of(fit, c, now)
     return replace(t, motions=tuple(motions), whole=whole)
+
+
+def _agrees(motion: Motion, rate: Rate, where: tuple[float, float]) -> bool:
+    """Whether a part moves over one baseline about as it does over the others.
+
+    A few edges fit any motion for a moment; a part that follows them explains whatever it meets.
+    """
+    rest = [r for r in motion.rates.values() if r.span_s != rate.span_s]
+    fresh = [r for r in rest if rate.time - r.time < 0.5 + 0.25 * r.span_s]
+    if not fresh:
+        return True
+    best = min(fresh, key=lambda r: r.sigma)
+    speed = best.velocity(where)
+    gap = float(np.hypot(*(rate.velocity(where) - speed)))
+    return gap < 3 * (rate.sigma + best.sigma) + 0.5 * float(np.hypot(*speed)) + UNLIKE_PX_S
 
 
 def reach_of(scene: Scene, tracks: tuple[Track, ...], prior: Floats) -> NDArray[np.bool_]:

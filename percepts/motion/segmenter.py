@@ -109,8 +109,11 @@ class MotionSegmenter:
         near = reach_of(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
-        resting = np.array([rests(t, scene) for t in tracks], dtype=bool)
-        posterior = label(cells, scene.points, likelihood, has, prior, more, resting, self.settings)
+        stay = np.zeros(cells.count, dtype=bool)
+        for t in tracks:
+            if rests(t, scene):
+                stay |= t.share > 0.5
+        posterior = label(cells, scene.points, likelihood, has, prior, more, stay, self.settings)
         keys = tuple(t.key for t in tracks)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
