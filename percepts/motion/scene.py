@@ -19,6 +19,7 @@ from visup.percepts.motion.tracking import Indices, Motion, Rate, Track
 REACH_STEPS = 2
 ALIKE_PX_S = 12.0  # pixels per second within which a part moves like what is hidden
 UNLIKE_PX_S = 8.0  # pixels per second by which a part may differ between baselines
+SHORT_S = 0.1  # baselines up to which noise on a few edges passes for motion, seconds
 PART_COST = 4.0  # squared distance that a further part of a track must save
 
 
@@ -135,6 +136,8 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
             fit = other if other.support > fit.support else fit
         # A part that is nearly hidden tells little of its motion: what was known is kept.
         steady = i == 0 or _agrees(motion, rate_of(fit, c, now), t.centre)
+        if i > 0 and _never_lasts(motion, t.motions[0], now):
+            continue
         if steady and fit.support >= max(5.0, clear * motion.support):
             support = max(fit.support, 0.99 * motion.support)
             motion = motion.with_rate(c.lag, rate_of(fit, c, now), support)
@@ -153,6 +156,12 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
         if fit.support >= 5:
             whole = rate_of(fit, c, now)
     return replace(t, motions=tuple(motions), whole=whole)
+
+
+def _never_lasts(part: Motion, first: Motion, now: float) -> bool:
+    """Whether a part is seen from frame to frame only, while the first is seen over longer too."""
+    longer = [r for r in first.rates.values() if r.span_s > SHORT_S and now - r.time < r.span_s]
+    return bool(longer) and all(r.span_s < SHORT_S for r in part.rates.values())
 
 
 def _agrees(motion: Motion, rate: Rate, where: tuple[float, float]) -> bool:
