@@ -384,14 +384,20 @@ def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
     return tuple(out)
 
 
+def _is_thin(t: Track, scene: Scene) -> bool:
+    """Whether no cell of a track lies inside it: such a one must move more surely to be told."""
+    rest = t.share <= 0.5
+    return bool(scene.cells.reach(rest[:, None], 1)[:, 0].all())
+
+
 def _is_sliver(t: Track, scene: Scene) -> bool:
-    """Whether a track is a thin strip, no cell of which lies inside it.
+    """Whether a thin track is a long strip.
 
     Where two backgrounds meet, and along a straight edge that tells of one component of motion
     only, such strips turn up; objects so thin are given up for that.
     """
     mine = t.share > 0.5
-    if not mine.any() or scene.cells.reach(~mine[:, None], 1)[:, 0].sum() < len(mine):
+    if not mine.any():
         return False
     spread = np.cov(scene.cells.centre[mine].T, aweights=scene.cells.area[mine], ddof=0)
     long, short = np.sqrt(np.maximum(np.linalg.eigvalsh(np.atleast_2d(spread))[::-1], 1.0))
@@ -421,7 +427,10 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
 
 def _is_sure(t: Track, scene: Scene, settings: MotionSettings) -> bool:
     """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
-    if t.frames < 2 or t.evidence < LIKELY or _is_sliver(t, scene):
+    thin = _is_thin(t, scene)
+    if t.frames < 2 or t.evidence < (2 if thin else 1) * LIKELY:
+        return False
+    if thin and _is_sliver(t, scene):
         return False
     if t.evidence > SURE and is_salient(t, scene, at_once=True):
         return True
