@@ -103,10 +103,10 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     seeds[ys, xs] = np.arange(1, len(ys) + 1)
     labels = cv2.watershed(image.tone, seeds)
     # Lines between the cells go to the later of the cells beside them.
-    ridge = np.maximum(labels, 0).astype(np.uint16)
-    grown = cv2.dilate(ridge, np.ones((3, 3), np.uint8))
-    np.copyto(ridge, grown, where=ridge == 0)
-    filled = np.maximum(np.subtract(ridge, 1, dtype=np.int32), 0)
+    short = (labels + 1).astype(np.uint16)  # on a line 0, what was not reached 1
+    grown = cv2.dilate(short, np.ones((3, 3), np.uint8))
+    np.copyto(short, grown, where=short < 2)
+    filled = np.maximum(np.subtract(short, 2, dtype=np.int32), 0)
     count = len(ys)
     pixels = _pixels(filled, count)
     area = np.maximum(np.diff(pixels.indptr), 1).astype(np.float32)
@@ -148,9 +148,12 @@ def _links(
     pairs = []
     # Two cells are one number, short if that will do: short numbers are sorted sooner.
     kind = np.int32 if count < 46_000 else np.int64
-    for a, b in ((labels[:, :-1], labels[:, 1:]), (labels[:-1], labels[1:])):
-        differ = a != b
-        one, other = a[differ].astype(kind), b[differ].astype(kind)
+    width, flat = labels.shape[1], labels.ravel()
+    for step in (1, width):
+        at = np.flatnonzero(flat[:-step] != flat[step:])
+        if step == 1:
+            at = at[at % width != width - 1]  # the next row is no neighbour of the end of one
+        one, other = flat[at].astype(kind), flat[at + step].astype(kind)
         pairs.append(np.minimum(one, other) * kind(count) + np.maximum(one, other))
     # Neighbours in the order of their numbers; how often they touch is the length of the border.
     pair, pixels = np.unique(np.concatenate(pairs), return_counts=True)
