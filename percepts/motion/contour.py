@@ -12,6 +12,8 @@ from visup.percepts.motion.image import Floats
 
 HOLE = 0.08  # share of a region's area up to which a hole in it is filled
 
+MARGIN = 3  # working pixels around a region that its smoothing looks at
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
@@ -34,31 +36,48 @@ class Outline:
     cut: bool
 
 
-def outline(share: Floats, size: tuple[int, int], least: float) -> Outline | None:
+def outline(
+    share: Floats,
+    corner: tuple[int, int],
+    shape: tuple[int, int],
+    size: tuple[int, int],
+    least: float,
+) -> Outline | None:
     """The outline of a region.
 
     Args:
-        share: (h, w) float32 probability, working pixels.
+        share: (h, w) float32 probability in a part of the working image, `MARGIN` wider than the
+            region where the image goes on.
+        corner: (x, y) of that part, working pixels.
+        shape: (height, width) of the working image.
         size: (width, height) of the frame.
         least: Least area, frame pixels.
 
     Returns:
         The outline, or None when too little is left.
     """
-    width, height = size
-    x, y, w, h = cv2.boundingRect((share > 0.5).astype(np.uint8))
-    if w == 0:
+    scale = size[0] / shape[1], size[1] / shape[0]
+    # Cleaned while it is small, then only the part around the region is enlarged.
+    mask = clean(share > 0.5, least / (scale[0] * scale[1]))
+    if mask is None:
         return None
-    # Only the part around the region is enlarged, with a margin for the smoothing.
-    scale = width / share.shape[1], height / share.shape[0]
-    left, top = max(x - 3, 0), max(y - 3, 0)
-    right, bottom = min(x + w + 3, share.shape[1]), min(y + h + 3, share.shape[0])
-    smooth = cv2.GaussianBlur(share[top:bottom, left:right], (3, 3), 0.8)
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
+    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
+    part = np.s_[top : y + h + MARGIN, left : x + w + MARGIN]
+    soft = _soft(share[part], mask[part])
+    left, top = corner[0] + left, corner[1] + top
+    bottom, right = top + soft.shape[0], left + soft.shape[1]
+    smooth = cv2.GaussianBlur(soft, (3, 3), 0.8)
     x0, y0 = round(left * scale[0]), round(top * scale[1])
     x1, y1 = round(right * scale[0]), round(bottom * scale[1])
-    part = cv2.resize(smooth, (x1 - x0, y1 - y0), interpolation=cv2.INTER_LINEAR) > 0.5
-    mask = clean(part, least)
-    return None if mask is None else describe(mask, (x0, y0), size)
+    full = cv2.resize(smooth, (x1 - x0, y1 - y0), interpolation=cv2.INTER_LINEAR) > 127
+    return describe(full, (x0, y0), size) if full.any() else None
+
+
+def _soft(share: Floats, mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Shares in 255ths, on the side of a half on which the mask has them."""
+    lifted = np.where(mask, np.where(share > 0.5, share, 1), np.minimum(share, 0.498))
+    return np.asarray(lifted * np.float32(255) + np.float32(0.5), dtype=np.uint8)
 
 
 def clean(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:

@@ -30,6 +30,8 @@ REACH = 2.0  # pixels on either side of a point: an edge may belong to either of
 CLIP = 5.0
 STAY = 4.0  # weight of what was there before where an object rests
 STILL_TOLD = 0.9  # share of the evidence that is left out there
+DOUBT = 0.01  # weight of evidence for anything but background from which a cell is in doubt
+DOUBT_STEPS = 4  # how far it is felt: beyond, what is seen is background
 LEAST = 0.03  # no label is ever quite impossible before there is evidence
 
 
@@ -99,21 +101,33 @@ def spread(
     Returns:
         (count, K) float32 posterior; rows sum to 1.
     """
+    # Far from all that may not be background, nothing else can come out: the rest is solved for,
+    # with those cells as its border.
+    doubt = (share[:, 1:].sum(axis=1) * weight + prior[:, 1:].sum(axis=1) * persistence) > DOUBT
+    inside = np.flatnonzero(cells.reach(doubt[:, None], DOUBT_STEPS)[:, 0])
+    out = np.zeros(share.shape)
+    out[:, 0] = 1.0
+    if not len(inside):
+        return out.astype(np.float32)
     right = share * weight[:, None] + prior * persistence[:, None]
     right[:, 0] += bias
-    degree = np.asarray(cells.link.sum(axis=1)).ravel()
-    diagonal = degree + weight + persistence + bias
-    system = sparse.diags(diagonal).astype(np.float64) - cells.link
-    out = splu(
+    link = cells.link[inside]
+    right = right[inside].astype(np.float64)
+    near = link[:, inside]
+    degree = np.asarray(link.sum(axis=1)).ravel().astype(np.float64)
+    right[:, 0] += degree - np.asarray(near.sum(axis=1)).ravel()
+    system = sparse.diags(degree + (weight + persistence + bias)[inside]) - near
+    found = splu(
         system.tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         relax=1,  # cells have so few neighbours that there is nothing to gather in dense blocks
         panel_size=1,
         options={"SymmetricMode": True},
-    ).solve(right.astype(np.float64))
-    out = np.maximum(out, 0)
-    return np.asarray(out / out.sum(axis=1, keepdims=True), dtype=np.float32)
+    ).solve(right)
+    found = np.maximum(found, 0)
+    out[inside] = found / found.sum(axis=1, keepdims=True)
+    return np.asarray(out, dtype=np.float32)
 
 
 def compare(
@@ -130,7 +144,7 @@ def compare(
         old: The older image.
         models: Displacements from old to new; at least one.
         box: (x, y, width, height) of the part to compare.
-        precision: (h, w) float32 inverse variance of grey values, of the whole image.
+        precision: (height, width) float32 inverse variance of grey values there.
 
     Returns:
         (height, width) float32, from -4.5 to 0.
@@ -144,17 +158,19 @@ def compare(
         off = np.asarray(each) if off is None else np.minimum(off, each, out=off)
     assert off is not None, "a layer has a motion"
     np.multiply(off, off, out=off)
-    np.multiply(off, precision[part], out=off)
+    np.multiply(off, precision, out=off)
     np.minimum(off, 9.0, out=off)
     return np.multiply(off, np.float32(-0.5), out=off)
 
 
-def precision_of(image: WorkImage, noise: float) -> Floats:
-    """Inverse variance to expect of a warped image's grey values, (h, w) float32.
+def precision_of(image: WorkImage, noise: float, box: tuple[int, int, int, int]) -> Floats:
+    """Inverse variance to expect of a warped image's grey values in a box, (h, w) float32.
 
     Where the image is steep, a small error of the motion makes a large one of the grey value.
     """
-    slope2 = image.gx * image.gx + image.gy * image.gy
+    x, y, w, h = box
+    gx, gy = image.gx[y : y + h, x : x + w], image.gy[y : y + h, x : x + w]
+    slope2 = gx * gx + gy * gy
     return np.asarray(1 / ((1.5 * noise) ** 2 + 0.35**2 * slope2), dtype=np.float32)
 
 
@@ -194,8 +210,8 @@ def warped(
     any_near = np.asarray(near.any(axis=1))
     if not any_near.any():
         return out
-    precision = precision_of(scene.image, noise)
     box = cells.box(any_near)
+    precision = precision_of(scene.image, noise, box)
     zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, precision), box)
     out[any_near, 0] = zero[any_near]
     out[any_near, 1:] = -4.5
@@ -203,9 +219,10 @@ def warped(
         mine = np.flatnonzero(near[:, k - 1])
         if len(mine):
             models = t.predicted(c.lag, c.span_s)
-            box = cells.box(near[:, k - 1])
-            fit = compare(scene.image, old, models, box, precision)
-            out[mine, k] = _cell_mean(cells, fit, box)[mine]
+            x, y, w, h = own = cells.box(near[:, k - 1])
+            there = np.s_[y - box[1] : y - box[1] + h, x - box[0] : x - box[0] + w]
+            fit = compare(scene.image, old, models, own, precision[there])
+            out[mine, k] = _cell_mean(cells, fit, own)[mine]
             hid = mine[_was_hidden(scene, mine, models[0], k)]
             out[hid, 0] = np.maximum(out[hid, 0], out[hid, k])
     out[any_near, -1] = out[any_near, :-1].max(axis=1)

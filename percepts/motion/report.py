@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Directive, Region
-from visup.percepts.motion.contour import Outline, outline
+from visup.percepts.motion.contour import MARGIN, Outline, outline
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.life import least_area
 from visup.percepts.motion.scene import Scene
@@ -68,11 +68,18 @@ def report(
     out = []
     for t in tracks:
         if t.id > 0 and t.seen == scene.time:
-            shape = outline(t.share[scene.cells.labels], size, least)
+            shape = _shape(t, scene, size, least)
             if shape is not None and not _ignored(shape, directives):
                 out.append(_region(t, shape, scale))
     out = _best(out, directives)
     return tuple(sorted(out, key=lambda r: r.id))
+
+
+def _shape(t: Track, scene: Scene, size: tuple[int, int], least: float) -> Outline | None:
+    x, y, w, h = scene.cells.box(t.share > 0.5)
+    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
+    labels = scene.cells.labels[top : y + h + MARGIN, left : x + w + MARGIN]
+    return outline(t.share[labels], (left, top), scene.image.shape, size, least) if w else None
 
 
 def _best(regions: list[Region], directives: Sequence[Directive]) -> list[Region]:

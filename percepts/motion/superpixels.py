@@ -35,6 +35,8 @@ class Superpixels:
             their common border and the likeness of their tones.
         pixels: (count, h * w) sparse float32, 1 where a pixel is in a cell, in scan order: sums
             over cells are products with it.
+        corners: (count, 4) int32 (left, top, right, bottom) of each cell, the latter two beyond
+            it; of a cell without pixels, right and bottom are 0, left and top the image's size.
     """
 
     labels: NDArray[np.int32]
@@ -44,6 +46,7 @@ class Superpixels:
     tone: Floats
     link: sparse.csr_matrix
     pixels: sparse.csr_matrix
+    corners: NDArray[np.int32]
 
     def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
@@ -63,6 +66,27 @@ class Superpixels:
             return np.asarray(total / self.area, dtype=np.float32)
         return np.asarray(self.pixels @ values.ravel() / self.area)
 
+    def shifted(self, old: Superpixels, members: NDArray[np.bool_], by: tuple[int, int]) -> Floats:
+        """Share of each cell that some cells of another image cover when moved by whole pixels.
+
+        Args:
+            old: The cells of the other image.
+            members: (old count,) bool, which of those.
+            by: (x, y) pixels.
+
+        Returns:
+            (count,) float32.
+        """
+        x, y, w, h = old.box(members)
+        height, width = self.labels.shape
+        left, top = max(x + by[0], 0), max(y + by[1], 0)
+        right, bottom = min(x + by[0] + w, width), min(y + by[1] + h, height)
+        if left >= right or top >= bottom:
+            return np.zeros(self.count, dtype=np.float32)
+        there = np.s_[top - by[1] : bottom - by[1], left - by[0] : right - by[0]]
+        covered = self.labels[top:bottom, left:right][members[old.labels[there]]]
+        return np.asarray(np.bincount(covered, minlength=self.count) / self.area, dtype=np.float32)
+
     def paint(self, members: NDArray[np.bool_]) -> Floats:
         """A map that is 1 in some cells and 0 elsewhere, (h, w) float32."""
         out = np.zeros(self.labels.shape, dtype=np.float32)
@@ -73,16 +97,12 @@ class Superpixels:
 
     def box(self, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
         """(x, y, width, height) of the smallest box around some cells; empty when there are none."""
-        rows = np.flatnonzero(members & (np.diff(self.pixels.indptr) > 0))
-        if not len(rows):
+        some = self.corners[members]
+        if not len(some):
             return 0, 0, 0, 0
-        first, end = self.pixels.indptr[rows], self.pixels.indptr[rows + 1]
-        width = self.labels.shape[1]
-        top = int(self.pixels.indices[first].min()) // width
-        bottom = int(self.pixels.indices[end - 1].max()) // width + 1
-        inside = members[self.labels[top:bottom]].view(np.uint8)
-        x, _, w, _ = cv2.boundingRect(inside)
-        return x, top, w, bottom - top
+        x, y = some[:, :2].min(axis=0).tolist()
+        right, bottom = some[:, 2:].max(axis=0).tolist()
+        return (x, y, right - x, bottom - y) if right > x else (0, 0, 0, 0)
 
 
 def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
@@ -119,7 +139,8 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     centre = np.stack([mean(np.tile(along[0], height)), mean(np.repeat(along[1], width))], axis=1)
     calm = np.exp(-0.5 * (mean(busy) / CALM) ** 2).astype(np.float32)
     link = _links(filled, count, tone, calm, contrast, cell)
-    return Superpixels(filled, count, area, centre, tone, link, pixels)
+    corners = _corners(pixels, height, width)
+    return Superpixels(filled, count, area, centre, tone, link, pixels, corners)
 
 
 def _seeds(busy: Floats, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -140,6 +161,18 @@ def _pixels(labels: NDArray[np.int32], count: int) -> sparse.csr_matrix:
     members = sparse.coo_matrix((ones, places), shape=(count, labels.size))
     members.has_canonical_format = True  # no pixel is in two cells: nothing to sum
     return members.tocsr()
+
+
+def _corners(pixels: sparse.csr_matrix, height: int, width: int) -> NDArray[np.int32]:
+    rows = np.flatnonzero(np.diff(pixels.indptr))
+    first, last = pixels.indptr[rows], pixels.indptr[rows + 1] - 1
+    out = np.tile(np.array([width, height, 0, 0], dtype=np.int32), (pixels.shape[0], 1))
+    out[rows, 1] = pixels.indices[first] // width
+    out[rows, 3] = pixels.indices[last] // width + 1
+    x = np.tile(np.arange(width, dtype=np.int16), height)[pixels.indices]
+    out[rows, 0] = np.minimum.reduceat(x, first)
+    out[rows, 2] = np.maximum.reduceat(x, first).astype(np.int32) + 1
+    return out
 
 
 def _links(
@@ -166,20 +199,24 @@ def _links(
     return sparse.coo_matrix(both, shape=(count, count)).tocsr()
 
 
-def overlap(old: Superpixels, new: Superpixels, from_where: NDArray[np.int32]) -> sparse.csr_matrix:
+def overlap(
+    old: Superpixels, new: Superpixels, cell: NDArray[np.int32], source: NDArray[np.int32]
+) -> sparse.csr_matrix:
     """Which old cells the pixels of each new cell come from.
 
     Args:
         old: Cells of the old image.
         new: Cells of the new image.
-        from_where: (h, w) int32 old cell of each pixel of the new image, -1 for none.
+        cell: (M,) int32 new cell of each of some pixels.
+        source: (M,) int32 old cell that it comes from, -1 for none.
 
     Returns:
-        (new count, old count) sparse float32 shares, entries not summed; rows sum to 1, or less.
+        (new count, old count) sparse float32 shares; rows sum to 1, or less. Entries are not summed.
     """
-    source = from_where.ravel()[new.pixels.indices]
-    # Each pixel is an entry of its own: products cost less than finding those that are alike.
-    share = np.repeat(1 / new.area, np.diff(new.pixels.indptr))
-    share *= source >= 0
-    entries = share, np.maximum(source, 0), new.pixels.indptr
-    return sparse.csr_matrix(entries, shape=(new.count, old.count))
+    number = np.bincount(cell, minlength=new.count)
+    share = (1 / np.maximum(number, 1)).astype(np.float32)[cell] * (source >= 0)
+    entries = share, (cell, np.maximum(source, 0))
+    step = sparse.coo_matrix(entries, shape=(new.count, old.count))
+    # Each pixel stays an entry of its own: products cost less than adding up those that are alike.
+    step.has_canonical_format = True
+    return step.tocsr()

@@ -212,16 +212,19 @@ def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -
     Returns:
         (new count, old count) sparse shares; rows sum to 1, or less where the image came into view.
     """
-    from_x, from_y = cv2.split(grid + flow)
-    from_where = cv2.remap(
-        old.labels.astype(np.float32),
-        from_x,
-        from_y,
-        cv2.INTER_NEAREST,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=-1,
+    height, width = new.labels.shape
+    # Every second pixel each way tells enough; no cell is so small that its middle is not taken.
+    cell = np.concatenate([new.labels[::2, ::2].ravel(), np.arange(new.count, dtype=np.int32)])
+    mx, my = np.rint(new.centre).astype(np.int32).T
+    back = grid[::2, ::2] + flow[::2, ::2]
+    middle = grid[my, mx] + flow[my, mx]
+    x, y = (
+        np.rint(np.concatenate([back[..., i].ravel(), middle[:, i]])).astype(np.int32)
+        for i in (0, 1)
     )
-    return overlap(old, new, from_where.astype(np.int32))
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    source = old.labels.ravel()[np.where(inside, y * width + x, 0)]
+    return overlap(old, new, cell, np.where(inside, source, -1))
 
 
 def carry(
@@ -254,16 +257,17 @@ def carry(
     last = track.path[-1] if track.path else (track.born, 0.0, 0.0)
     here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
     path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
-    own = old.paint(track.share > 0.5)
-    if track.hidden is not None:
-        own = np.maximum(own, track.hidden)
-    own = shift(own, int(whole[0]), int(whole[1]))
+    by = int(whole[0]), int(whole[1])
+    if track.hidden is None:
+        own = new.shifted(old, track.share > 0.5, by)
+    else:
+        own = new.mean(shift(np.maximum(old.paint(track.share > 0.5), track.hidden), *by))
     return replace(
         track,
         share=share,
         recent=np.maximum(recent, share),
-        hidden=None if track.hidden is None else shift(track.hidden, int(whole[0]), int(whole[1])),
-        own=new.mean(own),
+        hidden=None if track.hidden is None else shift(track.hidden, *by),
+        own=own,
         path=(*(path or (last,)), here),
         drift=(float(rest[0]), float(rest[1])),
     )
