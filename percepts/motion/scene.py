@@ -141,7 +141,7 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
         if steady and fit.support >= max(5.0, clear * motion.support):
             support = max(fit.support, 0.99 * motion.support)
             motion = motion.with_rate(c.lag, rate_of(fit, c, now), support)
-            if i > 0 and c.span_s > 0.3 and m.background.moves_as(fit, t.centre):
+            if i > 0 and c.span_s > 0.3 and m.background.moves_as(fit, _middle_of(c, weight)):
                 continue
         elif i > 0 and (c.lag > 1 or not steady):
             motion = replace(motion, support=0.8 * motion.support)
@@ -156,6 +156,12 @@ def _fit(t: Track, m: Measured, mine: NDArray[np.bool_], now: float) -> Track:
         if fit.support >= 5:
             whole = rate_of(fit, c, now)
     return replace(t, motions=tuple(motions), whole=whole)
+
+
+def _middle_of(c: Constraints, weight: Floats) -> tuple[float, float]:
+    """Where a part lies: a motion fitted there says little of other places."""
+    x, y = c.xy[weight > 0].mean(axis=0)
+    return float(x), float(y)
 
 
 def _never_lasts(part: Motion, first: Motion, now: float) -> bool:
