@@ -19,8 +19,6 @@ from visup.percepts.motion.image import Floats, WorkImage
 
 Ints = NDArray[np.int64]
 WINDOW = 11
-STEPS = 10
-SETTLED = 0.03  # pixels: a search that moves by less is done, a quarter of what is known at best
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
 
@@ -170,9 +168,7 @@ def track(
         return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_nothing())
     start = points.xy.reshape(-1, 1, 2).copy()
     begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
-    # Dense flow has found the way over one frame, coarse images would only find it again.
-    levels = 0 if lag == 1 else 2
-    there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), levels)
+    there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 2)
     # The way back is nearly known: it needs no coarse images. It begins as far beside as the guess
     # was off, for a search that begins where it should end proves little; over a long baseline,
     # where guesses are poor, no more than that can be asked.
@@ -209,7 +205,6 @@ def _follow(
         begin,
         winSize=(WINDOW, WINDOW),
         maxLevel=levels,
-        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, STEPS, SETTLED),
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         minEigThreshold=1e-5,
     )

@@ -30,8 +30,8 @@ REACH = 2.0  # pixels on either side of a point: an edge may belong to either of
 CLIP = 5.0
 STAY = 4.0  # weight of what was there before where an object rests
 STILL_TOLD = 0.9  # share of the evidence that is left out there
-DOUBT = 0.01  # weight of evidence for anything but background from which a cell is in doubt
-DOUBT_STEPS = 4  # how far it is felt: beyond, what is seen is background
+DOUBT = 0.03  # weight of evidence for anything but background from which a cell is in doubt
+DOUBT_STEPS = 3  # how far it is felt: beyond, what is seen is background
 LEAST = 0.03  # no label is ever quite impossible before there is evidence
 
 
@@ -109,16 +109,12 @@ def spread(
     out[:, 0] = 1.0
     if not len(inside):
         return out.astype(np.float32)
-    right = share * weight[:, None] + prior * persistence[:, None]
-    right[:, 0] += bias
-    link = cells.link[inside]
-    right = right[inside].astype(np.float64)
-    near = link[:, inside]
-    degree = np.asarray(link.sum(axis=1)).ravel().astype(np.float64)
-    right[:, 0] += degree - np.asarray(near.sum(axis=1)).ravel()
-    system = sparse.diags(degree + (weight + persistence + bias)[inside]) - near
+    right = (share * weight[:, None] + prior * persistence[:, None])[inside].astype(np.float64)
+    own = (weight + persistence + bias)[inside].astype(np.float64)
+    system, beyond = _system(cells.link, inside, own)
+    right[:, 0] += bias[inside] + beyond
     found = splu(
-        system.tocsc(),
+        system,
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         relax=1,  # cells have so few neighbours that there is nothing to gather in dense blocks
@@ -128,6 +124,42 @@ def spread(
     found = np.maximum(found, 0)
     out[inside] = found / found.sum(axis=1, keepdims=True)
     return np.asarray(out, dtype=np.float32)
+
+
+def _system(
+    link: sparse.csr_matrix, inside: NDArray[np.int64], own: NDArray[np.float64]
+) -> tuple[sparse.csc_matrix, NDArray[np.float64]]:
+    """The weighted Laplacian of some cells, and (M,) the affinity of each to cells left out.
+
+    Args:
+        link: (count, count) affinity of neighbours, symmetric.
+        inside: (M,) numbers of the cells, ascending.
+        own: (M,) what else is on the diagonal.
+
+    Returns:
+        (M, M) float64, symmetric; and (M,) float64.
+    """
+    m = len(inside)
+    number = np.full(link.shape[0], -1, dtype=np.int32)
+    number[inside] = np.arange(m, dtype=np.int32)
+    one, other = (
+        number[np.repeat(np.arange(link.shape[0]), np.diff(link.indptr))],
+        number[link.indices],
+    )
+    mine = one >= 0
+    one, other, value = one[mine], other[mine], link.data[mine].astype(np.float64)
+    degree = np.bincount(one, weights=value, minlength=m)
+    within = other >= 0
+    one, other, value = one[within], other[within], value[within]
+    ends = np.cumsum(np.bincount(one, minlength=m) + 1)
+    # The diagonal comes last in each column: nothing asks for another order.
+    place = np.arange(len(one)) + one
+    data, rows = np.empty(len(one) + m), np.empty(len(one) + m, dtype=np.int32)
+    data[place], rows[place] = -value, other
+    data[ends - 1], rows[ends - 1] = degree + own, np.arange(m)
+    columns = np.concatenate([[0], ends]).astype(np.int32)
+    beyond = np.asarray(degree - np.bincount(one, weights=value, minlength=m))
+    return sparse.csc_matrix((data, rows, columns), shape=(m, m)), beyond
 
 
 def compare(

@@ -6,7 +6,7 @@ so a silhouette found on cells is as sharp as the image.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -47,6 +47,7 @@ class Superpixels:
     link: sparse.csr_matrix
     pixels: sparse.csr_matrix
     corners: NDArray[np.int32]
+    _known: list[tuple[Floats, Floats]] = field(default_factory=list, repr=False)
 
     def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
@@ -57,7 +58,19 @@ class Superpixels:
         return np.asarray(near)
 
     def mean(self, values: Floats) -> Floats:
-        """Mean of an (h, w) map in each cell, (count,) float32."""
+        """Mean of an (h, w) map in each cell, (count,) float32; that of a map asked again is kept.
+
+        Several steps of a frame ask for the same few maps, of what is hidden.
+        """
+        for known, found in self._known:
+            if known is values:
+                return found
+        found = self._mean(values)
+        found.flags.writeable = False
+        self._known.append((values, found))
+        return found
+
+    def _mean(self, values: Floats) -> Floats:
         x, y, w, h = cv2.boundingRect((values != 0).view(np.uint8))
         if w * h < 0.2 * values.size:  # little of it is not zero
             part = np.s_[y : y + h, x : x + w]
@@ -199,24 +212,20 @@ def _links(
     return sparse.coo_matrix(both, shape=(count, count)).tocsr()
 
 
-def overlap(
-    old: Superpixels, new: Superpixels, cell: NDArray[np.int32], source: NDArray[np.int32]
-) -> sparse.csr_matrix:
+def overlap(old: Superpixels, new: Superpixels, from_where: NDArray[np.int32]) -> sparse.csr_matrix:
     """Which old cells the pixels of each new cell come from.
 
     Args:
         old: Cells of the old image.
         new: Cells of the new image.
-        cell: (M,) int32 new cell of each of some pixels.
-        source: (M,) int32 old cell that it comes from, -1 for none.
+        from_where: (h, w) int32 old cell of each pixel of the new image, -1 for none.
 
     Returns:
-        (new count, old count) sparse float32 shares; rows sum to 1, or less. Entries are not summed.
+        (new count, old count) sparse float32 shares, entries not summed; rows sum to 1, or less.
     """
-    number = np.bincount(cell, minlength=new.count)
-    share = (1 / np.maximum(number, 1)).astype(np.float32)[cell] * (source >= 0)
-    entries = share, (cell, np.maximum(source, 0))
-    step = sparse.coo_matrix(entries, shape=(new.count, old.count))
-    # Each pixel stays an entry of its own: products cost less than adding up those that are alike.
-    step.has_canonical_format = True
-    return step.tocsr()
+    source = from_where.ravel()[new.pixels.indices]
+    # Each pixel is an entry of its own: products cost less than finding those that are alike.
+    share = np.repeat(1 / new.area, np.diff(new.pixels.indptr))
+    share *= source >= 0
+    entries = share, np.maximum(source, 0), new.pixels.indptr
+    return sparse.csr_matrix(entries, shape=(new.count, old.count))

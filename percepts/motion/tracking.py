@@ -212,19 +212,16 @@ def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -
     Returns:
         (new count, old count) sparse shares; rows sum to 1, or less where the image came into view.
     """
-    height, width = new.labels.shape
-    # Every second pixel each way tells enough; no cell is so small that its middle is not taken.
-    cell = np.concatenate([new.labels[::2, ::2].ravel(), np.arange(new.count, dtype=np.int32)])
-    mx, my = np.rint(new.centre).astype(np.int32).T
-    back = grid[::2, ::2] + flow[::2, ::2]
-    middle = grid[my, mx] + flow[my, mx]
-    x, y = (
-        np.rint(np.concatenate([back[..., i].ravel(), middle[:, i]])).astype(np.int32)
-        for i in (0, 1)
+    from_x, from_y = cv2.split(grid + flow)
+    from_where = cv2.remap(
+        old.labels.astype(np.float32),
+        from_x,
+        from_y,
+        cv2.INTER_NEAREST,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=-1,
     )
-    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-    source = old.labels.ravel()[np.where(inside, y * width + x, 0)]
-    return overlap(old, new, cell, np.where(inside, source, -1))
+    return overlap(old, new, from_where.astype(np.int32))
 
 
 def carry(
