@@ -1,0 +1,497 @@
+"""Objects before a background that rests, each followed by its silhouette.
+
+Where the camera rests, what differs from the picture of the rest falls into blobs. One blob may
+show several objects and one object several blobs: each object keeps a template of its silhouette
+and tones from when it stood alone, which says what part of a common blob is its own, and where it
+is while others hide it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from visup.percepts.motion.image import Floats
+
+Mask = NDArray[np.bool_]
+Labels = NDArray[np.int32]
+Box = tuple[int, int, int, int]
+CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
+VISIBLE = 0.2  # share of its template below which an object is hidden
+FRAGMENT = 0.2  # gap between fragments of one object, as a share of its length
+SEARCH = 3  # pixels around the prediction in which a template is sought
+FOLLOW = 0.35  # weight of a newly measured velocity
+APART = 2  # frames apart from others after which an object is one of its own
+LIMB = 0.5  # how large, as a share of its object, a part may be that is taken for a limb
+LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
+LEAST_SHARE = 0.25  # the same as a share of its size
+STRAIGHT = 0.6  # net way as a share of the way
+PASSED = 0.6  # lengths that an object goes in pieces before they are taken for several objects
+PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an object
+TAKEN = 0.3  # how far a pixel that another object shows still speaks for one behind it
+GROWN = 1.3  # how much more than its template is seen of an object that has come into view
+GHOST = 0.6  # edges in the image, as a share of those at rest, below which nothing is there
+TONES = 6  # bins of each channel in a histogram
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Silhouette:
+    """One object.
+
+    Attributes:
+        key: Number in order of birth.
+        id: Public number, 0 until told.
+        born: Seconds.
+        seen: Seconds when last visible.
+        frames: In how many frames it was visible.
+        corner: (x, y) of the template, pixels.
+        velocity: (vx, vy), pixels per second.
+        shape: (h, w) bool, template: its silhouette when it last stood alone.
+        tone: (h, w, 3) float32, what was seen there.
+        histogram: (TONES ** 3,) float32 of its tones, sums to 1.
+        start: (4,) sides of its box at birth: left, top, right, bottom.
+        way: (4,) how far each side went since, to and fro, pixels.
+        alone: In how many frames it was seen apart from others.
+        now: Its visible pixels as (box, mask within it); None when hidden.
+        crowded: Whether it shares a blob with others.
+        cut: Whether the border of the image cuts it.
+        parted: How far it went since it was last seen in one piece, pixels.
+    """
+
+    key: int
+    id: int
+    born: float
+    seen: float
+    frames: int
+    corner: tuple[float, float]
+    velocity: tuple[float, float]
+    shape: Mask
+    tone: Floats
+    histogram: Floats
+    start: Floats
+    way: Floats
+    alone: int
+    now: tuple[Box, Mask] | None
+    crowded: bool = False
+    cut: bool = False
+    parted: float = 0.0
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """(x, y) of the middle of the template."""
+        h, w = self.shape.shape
+        return self.corner[0] + w / 2, self.corner[1] + h / 2
+
+    @property
+    def sides(self) -> Floats:
+        """(4,) sides of the template's box: left, top, right, bottom."""
+        h, w = self.shape.shape
+        x, y = self.corner
+        return np.array([x, y, x + w, y + h], dtype=np.float32)
+
+    def gone(self) -> Floats:
+        """(4,) distance of each side from where it was at birth, pixels."""
+        return np.asarray(np.abs(self.sides - self.start), dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What one frame shows.
+
+    Attributes:
+        image: (h, w, 3) float32.
+        labels: (h, w) int32, number of the blob at each pixel, 0 for none.
+        count: How many blobs.
+        time: Seconds.
+        seconds: Since the frame before.
+    """
+
+    image: Floats
+    labels: Labels
+    count: int
+    time: float
+    seconds: float
+
+
+Silhouettes = tuple[Silhouette, ...]
+
+
+def view_of(image: Floats, change: Mask, least: float, time: float, seconds: float) -> View:
+    """Blobs of change that are no specks, with small gaps closed and holes filled."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 5))
+    closed = cv2.morphologyEx(change.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = cv2.drawContours(np.zeros_like(closed), outlines, -1, 1, cv2.FILLED)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
+    keep = stats[:, cv2.CC_STAT_AREA] >= least
+    keep[0] = False
+    number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
+    return View(image, number[labels], int(keep.sum()), time, seconds)
+
+
+def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]:
+    """Bring objects to the next frame, and add those that are new.
+
+    Args:
+        known: Those of the frame before.
+        view: The frame.
+        born: How many were born before.
+
+    Returns:
+        All objects, hidden ones too; how many were born.
+    """
+    ahead = [_moved(s, view.seconds) for s in known]
+    claims = _claims(ahead, view)
+    out: list[Silhouette] = []
+    taken = np.zeros(view.count + 1, dtype=bool)
+    rivals = [_rivals(b, claims, ahead) for b in range(view.count + 1)]
+    claims = [[b for b in c if i in rivals[b]] for i, c in enumerate(claims)]
+    parts: list[list[Mask]] = [[] for _ in ahead]
+    for b in range(1, view.count + 1):
+        for i, mask in _shared(b, [(i, ahead[i]) for i in rivals[b]], view):
+            parts[i].append(mask)
+            taken[b] = True
+    left = []
+    for i, s in enumerate(ahead):
+        alone = all(len(rivals[b]) == 1 for b in claims[i])
+        whole, others = _whole(s, parts[i], alone)
+        left += others
+        pieces = alone and sum(_is_much(p, max(parts[i], key=np.count_nonzero)) for p in parts[i]) > 1 and not others
+        out.append(_seen(s, known[i], whole, alone, view, pieces=pieces))
+    fresh = [view.labels == b for b in range(1, view.count + 1) if not taken[b]] + left
+    for mask in fresh:
+        born += 1
+        out.append(_born(mask, view, born))
+    return tuple(out), born
+
+
+def _moved(s: Silhouette, seconds: float) -> Silhouette:
+    x, y = s.corner
+    return replace(s, corner=(x + s.velocity[0] * seconds, y + s.velocity[1] * seconds))
+
+
+def _window(s: Silhouette, shape: tuple[int, int], dx: int = 0, dy: int = 0) -> tuple[Box, Box]:
+    """Where the template lies in the image and which part of it, both as (x0, y0, x1, y1)."""
+    x, y = round(s.corner[0]) + dx, round(s.corner[1]) + dy
+    h, w = s.shape.shape
+    x0, y0, x1, y1 = max(x, 0), max(y, 0), min(x + w, shape[1]), min(y + h, shape[0])
+    x1, y1 = max(x1, x0), max(y1, y0)
+    return (x0, y0, x1, y1), (x0 - x, y0 - y, x1 - x, y1 - y)
+
+
+def _cut(a: NDArray, box: Box) -> NDArray:  # type: ignore[type-arg]
+    return a[box[1] : box[3], box[0] : box[2]]
+
+
+def _claims(ahead: Sequence[Silhouette], view: View) -> list[list[int]]:
+    """The blobs that each object claims by where it is expected; else the nearest free one."""
+    areas = np.bincount(view.labels.ravel(), minlength=view.count + 1)
+    claims: list[list[int]] = []
+    for s in ahead:
+        at, own = _window(s, view.labels.shape)
+        common = np.bincount(
+            _cut(view.labels, at)[_cut(s.shape, own)], minlength=view.count + 1
+        )
+        least = CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
+        claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
+    _reach_out(ahead, view, claims, areas)
+    return claims
+
+
+def _rivals(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[Silhouette]) -> list[int]:
+    """Those who share a blob: what was never seen apart is no object of its own."""
+    all_ = [i for i, c in enumerate(claims) if blob in c]
+    known = [i for i in all_ if ahead[i].alone >= APART]
+    return known or all_[:1]
+
+
+def _reach_out(
+    ahead: Sequence[Silhouette], view: View, claims: list[list[int]], areas: NDArray[np.int64]
+) -> None:
+    """Let objects that claim nothing have the free blobs nearby, all in all at the least cost."""
+    free = sorted(set(range(1, view.count + 1)) - {b for c in claims for b in c})
+    lost = [i for i, c in enumerate(claims) if not c]
+    if not free or not lost:
+        return
+    cost = np.full((len(lost), len(free)), 1e3)
+    looks = [_look(view.labels == b, view) for b in free]
+    for row, i in enumerate(lost):
+        s = ahead[i]
+        size = float(np.hypot(*s.shape.shape))
+        waited = view.time - s.seen
+        allowed = 0.6 * size + 0.5 * float(np.hypot(*s.velocity)) * waited + 0.2 * size * min(waited, 3)
+        for col, (b, (centre, histogram)) in enumerate(zip(free, looks, strict=True)):
+            far = np.hypot(centre[0] - s.centre[0], centre[1] - s.centre[1]) / allowed
+            unlike = 1 - float(np.sqrt(histogram * s.histogram).sum())
+            ratio = areas[b] / max(np.count_nonzero(s.shape), 1)
+            if far < 1 and unlike < 0.45 and 0.3 < ratio < 3:
+                cost[row, col] = far + 2 * unlike
+    for row, col in zip(*linear_sum_assignment(cost), strict=True):
+        if cost[row, col] < 1e3:
+            claims[lost[row]].append(free[col])
+
+
+def _look(mask: Mask, view: View) -> tuple[tuple[float, float], Floats]:
+    ys, xs = np.nonzero(mask)
+    centre = ((float(xs.min()) + float(xs.max()) + 1) / 2, (float(ys.min()) + float(ys.max()) + 1) / 2)
+    return centre, histogram_of(view.image[ys, xs])
+
+
+def histogram_of(tones: Floats) -> Floats:
+    """(TONES ** 3,) float32 histogram of (N, 3) tones, 0 to 255, that sums to 1."""
+    bins = np.clip(tones * (TONES / 256.0), 0, TONES - 1).astype(np.int64)
+    number = (bins[:, 0] * TONES + bins[:, 1]) * TONES + bins[:, 2]
+    count = np.bincount(number, minlength=TONES**3).astype(np.float32)
+    return np.asarray(count / max(1.0, float(count.sum())), dtype=np.float32)
+
+
+def _shared(
+    blob: int, rivals: Sequence[tuple[int, Silhouette]], view: View
+) -> list[tuple[int, Mask]]:
+    """What part of a blob each of its claimants has, as (claimant, mask of the image)."""
+    whole = view.labels == blob
+    if len(rivals) < 2:
+        return [(i, whole) for i, _ in rivals]
+    ys, xs = np.nonzero(whole)
+    tones = view.image[ys, xs]
+    costs = [np.empty(0, np.float32)] * len(rivals)
+    for n, dx, dy in _arranged([s for _, s in rivals], whole, view):
+        costs[n] = _cost(rivals[n][1], dx, dy, xs, ys, tones)
+    winner = np.argmin(costs, axis=0)
+    out = []
+    for n, (i, _) in enumerate(rivals):
+        mask = np.zeros_like(whole)
+        mask[ys[winner == n], xs[winner == n]] = True
+        out.append((i, mask))
+    return out
+
+
+def _arranged(
+    rivals: Sequence[Silhouette], blob: Mask, view: View
+) -> list[tuple[int, int, int]]:
+    """Number and shift of each object in a blob; the best seen first, the others beside it."""
+    free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
+    while left:
+        fits = [(_sought(rivals[n], free, view), n) for n in left]
+        (_, dx, dy), n = min(fits)
+        left.remove(n)
+        out.append((n, dx, dy))
+        where, own = _window(rivals[n], blob.shape, dx, dy)
+        _cut(free, where)[_cut(rivals[n].shape, own)] *= TAKEN
+    return out
+
+
+def _sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
+    """The cost and shift from its prediction at which a template fits a blob (h, w) best."""
+    best, at = np.inf, (0, 0)
+    reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
+            where, own = _window(s, blob.shape, dx, dy)
+            shape = _cut(s.shape, own)
+            if not shape.any():
+                continue
+            gap = np.abs(_cut(view.image, where) - _cut(s.tone, own)).mean(axis=2)
+            gap = 60.0 - (60.0 - np.minimum(gap, 60.0)) * _cut(blob, where)
+            cost = float(gap[shape].mean()) + 0.5 * float(np.hypot(dx, dy))
+            if cost < best:
+                best, at = cost, (dx, dy)
+    return best, *at
+
+
+def _cost(
+    s: Silhouette, dx: int, dy: int, xs: NDArray[np.int64], ys: NDArray[np.int64], tones: Floats
+) -> Floats:
+    """How little each of N pixels looks like a part of an object, (N,) float32."""
+    pad = 30
+    outer = cv2.copyMakeBorder(
+        (~s.shape).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1
+    )
+    far = cv2.distanceTransform(outer, cv2.DIST_L2, 3)
+    x = np.clip(xs - round(s.corner[0]) - dx + pad, 0, far.shape[1] - 1)
+    y = np.clip(ys - round(s.corner[1]) - dy + pad, 0, far.shape[0] - 1)
+    away = far[y, x]
+    h, w = s.shape.shape
+    tone = s.tone[np.clip(y - pad, 0, h - 1), np.clip(x - pad, 0, w - 1)]
+    gap = np.minimum(np.abs(tones - tone).mean(axis=1), 60.0)
+    return np.asarray(np.where(away > 0, 60.0 + 5 * away, gap), dtype=np.float32)
+
+
+def _whole(s: Silhouette, parts: Sequence[Mask], alone: bool) -> tuple[Mask | None, list[Mask]]:
+    """The parts of an object as one mask, and those too far from the largest to be its own."""
+    if not parts:
+        return None, []
+    order = sorted(parts, key=lambda m: -int(np.count_nonzero(m)))
+    whole, others = order[0], []
+    reach = max(3, round(FRAGMENT * max(s.shape.shape)))
+    # What rests before an object parts it for as long as it takes to pass, and no longer.
+    two = s.parted > PASSED * max(s.shape.shape)
+    for part in order[1:]:
+        if two and _is_much(part, whole):
+            others.append(part)
+            continue
+        near = cv2.dilate(whole.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+        if not alone or (near.astype(bool) & part).any():
+            whole = whole | part
+        else:
+            others.append(part)
+    return whole, others
+
+
+def _is_much(part: Mask, whole: Mask) -> bool:
+    return int(np.count_nonzero(part)) > PIECE * int(np.count_nonzero(whole))
+
+
+def _crop(mask: Mask) -> tuple[Box, Mask]:
+    ys, xs = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
+    box = (int(xs[0]), int(ys[0]), int(xs[-1]) + 1, int(ys[-1]) + 1)
+    return box, _cut(mask, box)
+
+
+def _at_border(box: Box, view: View) -> bool:
+    h, w = view.labels.shape
+    return min(box[0], box[1]) <= 0 or box[2] >= w or box[3] >= h
+
+
+def _born(mask: Mask, view: View, key: int) -> Silhouette:
+    box, shape = _crop(mask)
+    tone = _cut(view.image, box)
+    histogram = histogram_of(tone[shape])
+    corner = (float(box[0]), float(box[1]))
+    now = (box, shape)
+    t = view.time
+    start = np.array(box, dtype=np.float32)
+    return Silhouette(
+        key,
+        0,
+        t,
+        t,
+        1,
+        corner,
+        (0.0, 0.0),
+        shape,
+        tone,
+        histogram,
+        start,
+        0 * start,
+        1,
+        now,
+        cut=_at_border(box, view),
+    )
+
+
+def _seen(
+    s: Silhouette,
+    before: Silhouette,
+    mask: Mask | None,
+    alone: bool,
+    view: View,
+    *,
+    pieces: bool,
+) -> Silhouette:
+    """An object after what is seen of it in a frame."""
+    full = np.count_nonzero(s.shape)
+    if mask is None or np.count_nonzero(mask) < VISIBLE * full:
+        return replace(s, now=None, crowded=not alone)
+    box, shape = _crop(mask)
+    elapsed = max(view.time - before.seen, view.seconds, 1e-3)
+    if not alone and np.count_nonzero(mask) < GROWN * full:
+        # Of what is partly hidden only the shift of its template tells where it is.
+        _, dx, dy = _sought(s, mask.astype(np.float32), view)
+        corner = (s.corner[0] + dx, s.corner[1] + dy)
+        gain = 0.3 * FOLLOW
+        velocity = tuple(v + gain * d / view.seconds for v, d in zip(s.velocity, (dx, dy), strict=True))
+        moved = replace(s, corner=corner, velocity=velocity)
+    else:
+        corner = (float(box[0]), float(box[1]))
+        old = before.centre
+        new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+        gain = max(FOLLOW, 1 / (s.frames + 0.0))
+        velocity = tuple(
+            v + gain * ((n - o) / elapsed - v) for v, n, o in zip(s.velocity, new, old, strict=True)
+        )
+        tone = _cut(view.image, box)
+        histogram = 0.8 * s.histogram + 0.2 * histogram_of(tone[shape])
+        moved = replace(
+            s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram
+        )
+    step = float(np.abs(moved.sides - before.sides).mean())
+    return replace(
+        moved,
+        seen=view.time,
+        frames=s.frames + 1,
+        way=s.way + np.abs(moved.sides - before.sides),
+        alone=s.alone + int(alone),
+        now=(box, shape),
+        crowded=not alone,
+        cut=_at_border(box, view),
+        parted=before.parted + step if pieces else 0.0,
+    )
+
+
+def is_salient(s: Silhouette) -> bool:
+    """Whether a side of an object's box has left its place and kept a course while it did."""
+    gone = s.gone()
+    least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
+    return s.frames >= 3 and bool(np.any((gone > least) & (gone > STRAIGHT * s.way)))
+
+
+def joined(known: Silhouettes, time: float) -> Silhouettes:
+    """Give small parts that were born beside an object, and go with it, to that object."""
+    out = list(known)
+    for s in known:
+        if s.id or s.now is None:
+            continue
+        for i, host in enumerate(out):
+            if host.key >= s.key or host.now is None or s.cut or host.cut or not _goes_with(s, host):
+                continue
+            out[i] = _with_part(host, s)
+            out = [o for o in out if o.key != s.key]
+            break
+    return tuple(out)
+
+
+def _goes_with(s: Silhouette, host: Silhouette) -> bool:
+    if np.count_nonzero(s.shape) > LIMB * np.count_nonzero(host.shape) or s.frames < 3:
+        return False
+    a, b = s.sides, host.sides
+    gap = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
+    off = np.hypot(*np.subtract(s.velocity, host.velocity))
+    speed = float(np.hypot(*host.velocity))
+    return bool(gap <= max(3, FRAGMENT * max(host.shape.shape)) and off < 0.5 * speed + 3.0)
+
+
+def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
+    assert host.now is not None and s.now is not None
+    (a, shape), (b, part) = host.now, s.now
+    box = (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3]))
+    mask = np.zeros((box[3] - box[1], box[2] - box[0]), dtype=bool)
+    tone = np.zeros((*mask.shape, 3), dtype=np.float32)
+    for (x0, y0, x1, y1), m, t in ((a, shape, host.tone), (b, part, s.tone)):
+        where = (slice(y0 - box[1], y1 - box[1]), slice(x0 - box[0], x1 - box[0]))
+        mask[where] |= m
+        if t.shape[:2] == m.shape:
+            tone[where] = t
+    corner = (float(box[0]), float(box[1]))
+    return replace(host, now=(box, mask), shape=mask, tone=tone, corner=corner)
+
+
+def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
+    """Whether an outline has its edges in the picture of the rest: it shows where something left.
+
+    Args:
+        s: The object.
+        now: (h, w) float32 strength of edges in the image.
+        rest: The same in the picture of the rest.
+    """
+    if s.now is None or s.crowded:
+        return False
+    box, shape = s.now
+    inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
+    rim = shape & (inner == 0)
+    return float(_cut(now, box)[rim].mean()) < GHOST * float(_cut(rest, box)[rim].mean())
