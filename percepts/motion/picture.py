@@ -23,7 +23,7 @@ FAR = 3.0  # standard deviations at which a pixel surely shows something else
 NEAR = 2.2  # the same for one beside a sure one
 SETTLE_S = 8.0  # time constant of what is learnt, seconds
 RESTLESS_S = 4.0  # the same of the variance
-SHADE = (0.4, 0.97)  # brightness in a shadow, as a share of that at rest
+SHADE = (0.6, 0.97)  # brightness in a shadow, as a share of that at rest
 HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
 LIT = 1.12  # brightness in reflected light
 
