@@ -9,7 +9,7 @@ after Horprasert, Harwood, Davis, A statistical approach for robust background s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -25,6 +25,7 @@ SETTLE_S = 8.0  # time constant of what is learnt, seconds
 RESTLESS_S = 4.0  # the same of the variance
 SHADE = (0.6, 0.97)  # brightness in a shadow, as a share of that at rest
 HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
+EVEN = 0.03  # change of exposure that is none
 LIT = 1.12  # brightness in reflected light
 
 
@@ -78,7 +79,7 @@ def changed(picture: Picture, image: Floats) -> Mask:
     near = cv2.medianBlur(near, 5)
     _, labels = cv2.connectedComponents(near, connectivity=8)
     sure = np.zeros(labels.max() + 1, bool)
-    sure[np.unique(labels[(off > (FAR*1.5)**2) & (near > 0)])] = True
+    sure[np.unique(labels[(off > (FAR * 1.5) ** 2) & (near > 0)])] = True
     sure[0] = False
     return sure[labels]
 
@@ -132,3 +133,14 @@ def edges(image: Floats) -> Floats:
     return np.asarray(
         np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)), np.float32
     )
+
+
+def exposed(picture: Picture, image: Floats) -> Picture:
+    """The picture as it would look at the exposure of an image, after the median change of tone."""
+    step = 4
+    rest, now = picture.mean[::step, ::step], image[::step, ::step]
+    ratio = np.median((now + 1.0) / (rest + 1.0), axis=(0, 1))
+    if np.abs(ratio - 1).max() < EVEN:
+        return picture
+    gain = np.clip(ratio, 0.3, 3.0).astype(np.float32)
+    return replace(picture, mean=picture.mean * gain, other=picture.other * gain)

@@ -48,7 +48,6 @@ def report(
     tracks: Sequence[Track],
     scene: Scene,
     size: tuple[int, int],
-    directives: Sequence[Directive],
     settings: MotionSettings,
 ) -> tuple[Region, ...]:
     """Regions of the confirmed tracks that are in view.
@@ -57,7 +56,6 @@ def report(
         tracks: All tracks.
         scene: The frame.
         size: (width, height) of the frame.
-        directives: 'expect_regions' keeps the surest, 'ignore' leaves out what lies in its box.
         settings: Gives the least area.
 
     Returns:
@@ -69,9 +67,8 @@ def report(
     for t in tracks:
         if t.id > 0 and t.seen == scene.time:
             shape = _shape(t, scene, size, least)
-            if shape is not None and not _ignored(shape, directives):
+            if shape is not None:
                 out.append(_region(t, shape, scale))
-    out = _best(out, directives)
     return tuple(sorted(out, key=lambda r: r.id))
 
 
@@ -80,6 +77,20 @@ def _shape(t: Track, scene: Scene, size: tuple[int, int], least: float) -> Outli
     left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
     labels = scene.cells.labels[top : y + h + MARGIN, left : x + w + MARGIN]
     return outline(t.share[labels], (left, top), scene.image.shape, size, least) if w else None
+
+
+def chosen(regions: Sequence[Region], directives: Sequence[Directive]) -> tuple[Region, ...]:
+    """Regions that cogitation wants to be told of.
+
+    Args:
+        regions: All that were found.
+        directives: 'expect_regions' keeps the surest, 'ignore' leaves out what lies in its box.
+
+    Returns:
+        Regions by id.
+    """
+    left = _best([r for r in regions if not _ignored(r, directives)], directives)
+    return tuple(sorted(left, key=lambda r: r.id))
 
 
 def _best(regions: list[Region], directives: Sequence[Directive]) -> list[Region]:
@@ -91,9 +102,9 @@ def _best(regions: list[Region], directives: Sequence[Directive]) -> list[Region
     return surest[: max(wanted)]
 
 
-def _ignored(shape: Outline, directives: Sequence[Directive]) -> bool:
+def _ignored(region: Region, directives: Sequence[Directive]) -> bool:
     boxes = [_box(d.data) for d in directives if d.kind == "ignore"]
-    centre = np.asarray([shape.centroid])
+    centre = np.asarray([region.centroid])
     return any(bool(_inside(centre, box)[0]) for box in boxes if box is not None)
 
 

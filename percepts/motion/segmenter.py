@@ -28,7 +28,8 @@ from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
 from visup.percepts.motion.looked import Looked
-from visup.percepts.motion.report import obey, report
+from visup.percepts.motion.report import chosen, obey, report
+from visup.percepts.motion.resting import RestingView
 from visup.percepts.motion.salience import rests, weigh
 from visup.percepts.motion.scene import (
     Measured,
@@ -74,6 +75,7 @@ class MotionSegmenter:
         self._ground = bare_ground((1, 1))
         self._camera: dict[int, Rate] = {}
         self._fixed_until: float | None = None
+        self._resting = RestingView()
         self._count = self._born = self._ids = 0
 
     def step(self, frame: Frame, directives: Sequence[Directive] = ()) -> tuple[Region, ...]:
@@ -127,7 +129,9 @@ class MotionSegmenter:
         )
         self._tracks = tracks
         self.looked = Looked(scene, tracks, keys, posterior)
-        return report(tracks, scene, self._size, directives, self.settings)
+        seen = report(tracks, scene, self._size, self.settings)
+        seen, self._ids = self._resting.step(frame, scene, seen, self._ids, self.settings)
+        return chosen(seen, directives)
 
     def _look(
         self, image: WorkImage, before: Superpixels, coming: Future[Superpixels]

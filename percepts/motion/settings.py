@@ -25,6 +25,8 @@ class MotionSettings:
         confirm_s: How long a new region must be seen before it is reported, seconds.
         memory_s: How long a hidden region is remembered, seconds.
         max_regions: Most regions that are followed at once.
+        least_blob: Least area of a silhouette where the camera rests, share of the image.
+        missed_s: How long such a silhouette is missed before it is given up, seconds.
     """
 
     work_size: int = 512
@@ -40,6 +42,8 @@ class MotionSettings:
     confirm_s: float = 0.4
     memory_s: float = 12.0
     max_regions: int = 32
+    least_blob: float = 0.0003
+    missed_s: float = 3.0
 
     def __post_init__(self) -> None:
         if self.work_size < 64:

@@ -161,7 +161,11 @@ def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]
         alone = all(len(rivals[b]) == 1 for b in claims[i])
         whole, others = _whole(s, parts[i], alone)
         left += others
-        pieces = alone and sum(_is_much(p, max(parts[i], key=np.count_nonzero)) for p in parts[i]) > 1 and not others
+        pieces = (
+            alone
+            and sum(_is_much(p, max(parts[i], key=np.count_nonzero)) for p in parts[i]) > 1
+            and not others
+        )
         out.append(_seen(s, known[i], whole, alone, view, pieces=pieces))
     fresh = [view.labels == b for b in range(1, view.count + 1) if not taken[b]] + left
     for mask in fresh:
@@ -194,9 +198,7 @@ def _claims(ahead: Sequence[Silhouette], view: View) -> list[list[int]]:
     claims: list[list[int]] = []
     for s in ahead:
         at, own = _window(s, view.labels.shape)
-        common = np.bincount(
-            _cut(view.labels, at)[_cut(s.shape, own)], minlength=view.count + 1
-        )
+        common = np.bincount(_cut(view.labels, at)[_cut(s.shape, own)], minlength=view.count + 1)
         least = CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
         claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
     _reach_out(ahead, view, claims, areas)
@@ -224,7 +226,9 @@ def _reach_out(
         s = ahead[i]
         size = float(np.hypot(*s.shape.shape))
         waited = view.time - s.seen
-        allowed = 0.6 * size + 0.5 * float(np.hypot(*s.velocity)) * waited + 0.2 * size * min(waited, 3)
+        allowed = (
+            0.6 * size + 0.5 * float(np.hypot(*s.velocity)) * waited + 0.2 * size * min(waited, 3)
+        )
         for col, (b, (centre, histogram)) in enumerate(zip(free, looks, strict=True)):
             far = np.hypot(centre[0] - s.centre[0], centre[1] - s.centre[1]) / allowed
             unlike = 1 - float(np.sqrt(histogram * s.histogram).sum())
@@ -238,7 +242,10 @@ def _reach_out(
 
 def _look(mask: Mask, view: View) -> tuple[tuple[float, float], Floats]:
     ys, xs = np.nonzero(mask)
-    centre = ((float(xs.min()) + float(xs.max()) + 1) / 2, (float(ys.min()) + float(ys.max()) + 1) / 2)
+    centre = (
+        (float(xs.min()) + float(xs.max()) + 1) / 2,
+        (float(ys.min()) + float(ys.max()) + 1) / 2,
+    )
     return centre, histogram_of(view.image[ys, xs])
 
 
@@ -271,9 +278,7 @@ def _shared(
     return out
 
 
-def _arranged(
-    rivals: Sequence[Silhouette], blob: Mask, view: View
-) -> list[tuple[int, int, int]]:
+def _arranged(rivals: Sequence[Silhouette], blob: Mask, view: View) -> list[tuple[int, int, int]]:
     """Number and shift of each object in a blob; the best seen first, the others beside it."""
     free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
     while left:
@@ -405,7 +410,9 @@ def _seen(
         _, dx, dy = _sought(s, mask.astype(np.float32), view)
         corner = (s.corner[0] + dx, s.corner[1] + dy)
         gain = 0.3 * FOLLOW
-        velocity = tuple(v + gain * d / view.seconds for v, d in zip(s.velocity, (dx, dy), strict=True))
+        velocity = tuple(
+            v + gain * d / view.seconds for v, d in zip(s.velocity, (dx, dy), strict=True)
+        )
         moved = replace(s, corner=corner, velocity=velocity)
     else:
         corner = (float(box[0]), float(box[1]))
@@ -441,14 +448,20 @@ def is_salient(s: Silhouette) -> bool:
     return s.frames >= 3 and bool(np.any((gone > least) & (gone > STRAIGHT * s.way)))
 
 
-def joined(known: Silhouettes, time: float) -> Silhouettes:
+def joined(known: Silhouettes) -> Silhouettes:
     """Give small parts that were born beside an object, and go with it, to that object."""
     out = list(known)
     for s in known:
         if s.id or s.now is None:
             continue
         for i, host in enumerate(out):
-            if host.key >= s.key or host.now is None or s.cut or host.cut or not _goes_with(s, host):
+            if (
+                host.key >= s.key
+                or host.now is None
+                or s.cut
+                or host.cut
+                or not _goes_with(s, host)
+            ):
                 continue
             out[i] = _with_part(host, s)
             out = [o for o in out if o.key != s.key]
