@@ -22,9 +22,10 @@ NOISE = 4.0  # least standard deviation that is assumed, grey levels
 FAR = 3.0  # standard deviations at which a pixel surely shows something else
 NEAR = 2.2  # the same for one beside a sure one
 SETTLE_S = 8.0  # time constant of what is learnt, seconds
-RESTLESS_S = 4.0  # the same of the variance
+RESTLESS_S = 8.0  # the same of the variance
 SHADE = (0.6, 0.97)  # brightness in a shadow, as a share of that at rest
 HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
+RARE = 10.0  # squared distance beyond which a pixel tells no more of how restless it is
 EVEN = 0.03  # change of exposure that is none
 LIT = 1.12  # brightness in reflected light
 
@@ -105,10 +106,11 @@ def learnt(
     weight = np.where(fits, weight, 0).astype(np.float32)
     mean = picture.mean + weight[..., None] * (image - picture.mean)
     spread = np.float32(1 - np.exp(-seconds / RESTLESS_S))
-    variance = picture.variance + np.where(fits, spread, 0) * (
-        off * picture.variance - picture.variance
-    )
-    variance = np.clip(variance, NOISE**2, (6 * NOISE) ** 2)
+    # Leaves and water go far and come back; one object that passes weighs little.
+    wide = picture.variance + np.where(moving, 0, spread) * (
+        np.minimum(off, RARE) - 1
+    ) * picture.variance
+    variance = np.clip(wide, NOISE**2, (8 * NOISE) ** 2)
     seen = np.minimum(picture.seen_s + fits * np.float32(seconds), 60.0)
     gap = image - picture.other
     alike = np.einsum("ijk,ijk->ij", gap, gap) < 3 * (FAR * NOISE) ** 2

@@ -46,9 +46,12 @@ SPREAD = 0.5  # share of the view in which points must be seen to rest
 RESTS = 0.85  # share of those parts that rest when the camera does
 MOVES = 0.6  # the same below which the camera moves
 REST_S = 1.0  # how long the camera must rest before the picture is believed, seconds
+LONGEST_S = 4.0  # most seconds of rest that make up for times when too little is seen
 FLOODED = 0.6  # share of the image that no change of what is seen in it explains
 KNOWN = 0.4  # share of a region that differs from the picture when the picture knows it
 COMMON = 0.5  # share of the smaller that two outlines of one object have in common
+WHOLE = 0.6  # intersection over union at which an object is seen whole in the picture
+MANY_CELLS = 15  # superpixels of a region whose outline the layers know well
 YOUNG_S = 0.3  # how long what was never told is missed, seconds
 SIZE = 768  # longer side of the picture, pixels
 
@@ -92,11 +95,12 @@ class RestingView:
         self._forget()
         self._shown: set[int] = set()
         self._alias: dict[int, int] = {}
+        self._old: set[int] = set()
 
     def _forget(self) -> None:
         self._picture: Picture | None = None
         self._known: Silhouettes = ()
-        self._time = self._since = 0.0
+        self._time = self._since = self._rested_s = 0.0
         self._born = 0
 
     def step(
@@ -119,9 +123,7 @@ class RestingView:
         Returns:
             Regions by id: those of the layers unless the camera rests; the last public id given.
         """
-        rests = camera_rests(scene)
-        if rests is False or (rests is None and self._picture is None):
-            self._forget()
+        if not self._is_at_rest(camera_rests(scene), scene.seconds):
             return self._only(regions), ids
         image = _prepared(frame)
         if self._picture is None:
@@ -131,12 +133,22 @@ class RestingView:
         view = self._seen(image, frame.time, settings)
         if view is None:
             return self._only(regions), ids
-        if frame.time - self._since < REST_S:
+        if min(frame.time - self._since, self._rested_s) < REST_S:
             return self._only(regions), ids
-        return self._reported(frame, view, regions, ids)
+        least = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
+        return self._reported(frame, view, regions, ids, least)
+
+    def _is_at_rest(self, rests: bool | None, seconds: float) -> bool:
+        """Whether the camera rests, as far as is known; else all is forgotten."""
+        step = seconds if rests else -seconds
+        self._rested_s = min(max(self._rested_s + step, 0.0), LONGEST_S)
+        if rests is False or self._rested_s <= 0:
+            self._forget()
+        return self._rested_s > 0
 
     def _only(self, regions: Sequence[Region]) -> tuple[Region, ...]:
         self._shown |= {r.id for r in regions}
+        self._old |= {r.id for r in regions}
         taken: set[int] = set()
         out = []
         for r in regions:
@@ -173,45 +185,65 @@ class RestingView:
         return view
 
     def _reported(
-        self, frame: Frame, view: View, regions: Sequence[Region], ids: int
+        self, frame: Frame, view: View, regions: Sequence[Region], ids: int, least: float
     ) -> tuple[tuple[Region, ...], int]:
         """Give ids to silhouettes that are salient, and settle with the regions of the layers."""
         scale = frame.size[0] / view.labels.shape[1], frame.size[1] / view.labels.shape[0]
-        known, out = [], []
+        seen = {
+            s.key: region_of(s, scale, frame.size, view.seconds)
+            for s in self._known
+            if s.now is not None
+        }
+        older = self._older(regions, list(seen.values()), least)
+        out: list[Region] = []
+        known: list[Silhouette] = []
+        taken = {s.id for s in self._known} | {self._alias.get(r.id, r.id) for r in older}
         for s in self._known:
-            if not s.id and s.now is not None and is_salient(s):
-                ids, number = self._number(s, scale, frame.size, regions, ids)
+            own = seen.get(s.key)
+            free = own is not None and not any(
+                common(own, r) > COMMON * own.area for r in older
+            )
+            if own is not None and free and not s.id and is_salient(s):
+                ids, number = self._number(own, regions, ids, taken)
                 s = replace(s, id=number)
+                taken.add(number)
             known.append(s)
-            if s.id and s.now is not None:
-                out.append(region_of(s, scale, frame.size, view.seconds))
+            if own is not None and free and s.id:
+                out.append(replace(own, id=s.id))
         self._known = tuple(known)
         change = cv2.resize(
             (view.labels > 0).view(np.uint8), frame.size, interpolation=cv2.INTER_NEAREST
         )
         for r in regions:
             x, y, w, h = r.bbox
-            if change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
+            if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
                 self._same(r, out)
                 continue
             out = [s for s in out if common(s, r) < COMMON * s.area]
             number = self._alias.get(r.id, r.id)
-            taken = {s.id for s in out}
-            out.append(replace(r, id=r.id if number in taken else number))
-        self._shown |= {r.id for r in out}
+            shown = {s.id for s in out}
+            out.append(replace(r, id=r.id if number in shown else number))
         return tuple(sorted(out, key=lambda r: r.id)), ids
 
+    def _older(
+        self, regions: Sequence[Region], seen: Sequence[Region], least: float
+    ) -> list[Region]:
+        """Regions that were told before the picture was believed, and are not seen whole in it yet."""
+        out = []
+        for r in regions:
+            if r.id in self._old and r.area >= least:
+                both = [common(s, r) for s in seen]
+                whole = [b / (s.area + r.area - b) for s, b in zip(seen, both, strict=True)]
+                if max(whole, default=0.0) > WHOLE:
+                    self._old.discard(r.id)
+                else:
+                    out.append(r)
+        return out
+
     def _number(
-        self,
-        s: Silhouette,
-        scale: tuple[float, float],
-        size: tuple[int, int],
-        regions: Sequence[Region],
-        ids: int,
+        self, own: Region, regions: Sequence[Region], ids: int, taken: set[int]
     ) -> tuple[int, int]:
         """The last id given, and that of a new silhouette: the one under which it was told before."""
-        own = region_of(s, scale, size, 1.0)
-        taken = {k.id for k in self._known}
         for r in regions:
             number = self._alias.get(r.id, r.id)
             much = COMMON * min(r.area, own.area)
