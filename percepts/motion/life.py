@@ -404,7 +404,9 @@ def _is_sliver(t: Track, scene: Scene) -> bool:
     return bool(long > SLIVER * short)
 
 
-def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) -> tuple[Tracks, int]:
+def confirm(
+    tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings, sought: Sequence[bool]
+) -> tuple[Tracks, int]:
     """Give public ids to tracks that have lasted and surely move.
 
     Args:
@@ -412,27 +414,29 @@ def confirm(tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings) ->
         scene: The frame.
         ids: The last public id given.
         settings: Says how long is lasting.
+        sought: Which tracks lie where cogitation asked to look: half as much will do for those.
 
     Returns:
         The tracks and the last public id given.
     """
     out = []
-    for t in tracks:
-        if not t.id and t.seen == scene.time and _is_sure(t, scene, settings):
+    for t, wanted in zip(tracks, sought, strict=True):
+        need = 0.5 if wanted else 1.0
+        if not t.id and t.seen == scene.time and _is_sure(t, scene, settings, need):
             ids += 1
             t = replace(t, id=ids)
         out.append(t)
     return tuple(out), ids
 
 
-def _is_sure(t: Track, scene: Scene, settings: MotionSettings) -> bool:
+def _is_sure(t: Track, scene: Scene, settings: MotionSettings, need: float) -> bool:
     """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
     thin = _is_thin(t, scene)
-    if t.frames < 2 or t.evidence < (2 if thin else 1) * LIKELY:
+    if t.frames < 2 or t.evidence < need * (2 if thin else 1) * LIKELY:
         return False
     if thin and _is_sliver(t, scene):
         return False
-    if t.evidence > SURE and is_salient(t, scene, at_once=True):
+    if t.evidence > need * SURE and is_salient(t, scene, at_once=True, need=need):
         return True
-    lasts = t.frames >= 3 and scene.time - t.born >= settings.confirm_s
-    return lasts and is_salient(t, scene)
+    lasts = t.frames >= 3 and scene.time - t.born >= need * settings.confirm_s
+    return lasts and is_salient(t, scene, need=need)

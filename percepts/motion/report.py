@@ -16,11 +16,8 @@ from visup.percepts.motion.scene import Scene
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Track
 
-LOOK = 2.0  # log likelihood by which motion is believed more readily where asked to look
-
-
 def obey(directives: Sequence[Directive], scene: Scene, likelihood: Floats) -> Floats:
-    """Shift evidence where cogitation asks: 'look_at' favours motion, 'ignore' forbids it.
+    """Forbid motion where cogitation asks to ignore it.
 
     Args:
         directives: Their boxes are in frame pixels.
@@ -31,17 +28,38 @@ def obey(directives: Sequence[Directive], scene: Scene, likelihood: Floats) -> F
         (N, K) float32.
     """
     out = likelihood
-    for directive in directives:
-        box = _box(directive.data)
-        if box is None or directive.kind not in ("look_at", "ignore"):
-            continue
+    for box in _boxes(directives, "ignore"):
         inside = _inside(scene.points.xy / scene.image.scale, box)
         out = out.copy()
-        if directive.kind == "look_at":
-            out[inside, 0] -= LOOK
-        else:
-            out[inside, 1:] = out[inside].min() - 10
+        out[inside, 1:] = out[inside].min(initial=0) - 10
     return out
+
+
+def sought(
+    directives: Sequence[Directive], tracks: Sequence[Track], scene: Scene
+) -> tuple[bool, ...]:
+    """Which tracks lie where cogitation asks to look.
+
+    Args:
+        directives: Those of kind 'look_at' count; their boxes are in frame pixels.
+        tracks: All tracks.
+        scene: The frame.
+
+    Returns:
+        For each track whether its centre lies in such a box.
+    """
+    boxes = _boxes(directives, "look_at")
+    centres = np.array([t.centre for t in tracks]).reshape(-1, 2) / scene.image.scale
+    inside = [_inside(centres, box) for box in boxes]
+    return tuple(np.any(inside, axis=0).tolist()) if boxes else (False,) * len(tracks)
+
+
+Box = tuple[float, float, float, float]
+
+
+def _boxes(directives: Sequence[Directive], kind: str) -> list[Box]:
+    boxes = [_box(d.data) for d in directives if d.kind == kind]
+    return [box for box in boxes if box is not None]
 
 
 def report(

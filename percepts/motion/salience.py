@@ -137,7 +137,7 @@ def _misfit(m: Measured, local: Affine | None) -> NDArray[np.float32]:
     return out
 
 
-def is_salient(t: Track, scene: Scene, *, at_once: bool = False) -> bool:
+def is_salient(t: Track, scene: Scene, *, at_once: bool = False, need: float = 1.0) -> bool:
     """Whether a track has left its place, on a course, over some baseline clearly.
 
     What takes up much of the image border is not surrounded by a ground, it is one: a near wall,
@@ -148,6 +148,7 @@ def is_salient(t: Track, scene: Scene, *, at_once: bool = False) -> bool:
         scene: The frame.
         at_once: Whether it is to be told at first sight: then its motion must be clearer, and must
             not be one that a thing at rest near a moving camera may show.
+        need: How far it must have gone, and how little be explained, as a share of the usual.
 
     Returns:
         Whether it surely moves by itself.
@@ -157,9 +158,9 @@ def is_salient(t: Track, scene: Scene, *, at_once: bool = False) -> bool:
     gone = float(np.hypot(*t.gone))
     explained = min(t.explained.values(), default=0.0)
     if at_once:
-        return explained < CLEAR and gone >= NEAR_GONE and not _runs_ahead(t, scene)
-    least = LEAST_GONE if scene.time - t.born >= SWING_S else FAR_GONE
-    return explained < EXPLAINED and gone >= max(least, STRAIGHT * t.way)
+        return explained < CLEAR / need and gone >= need * NEAR_GONE and not _runs_ahead(t, scene)
+    least = LEAST_GONE if scene.time - t.born >= need * SWING_S else FAR_GONE
+    return explained < EXPLAINED / need and gone >= max(need * least, STRAIGHT * t.way)
 
 
 def border_share(share: Floats, cells: Superpixels) -> float:

@@ -28,7 +28,7 @@ from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
 from visup.percepts.motion.looked import Looked
-from visup.percepts.motion.report import chosen, obey, report
+from visup.percepts.motion.report import chosen, obey, report, sought
 from visup.percepts.motion.resting import RestingView
 from visup.percepts.motion.salience import rests, weigh
 from visup.percepts.motion.scene import (
@@ -124,9 +124,9 @@ class MotionSegmenter:
         self._born = max([self._born, *(t.key for t in tracks)])
         tracks = release(tracks, scene, winner)
         tracks = merge(tracks, scene, winner, self.settings)
-        tracks, self._ids = confirm(
-            bury(tracks, scene, self.settings), scene, self._ids, self.settings
-        )
+        tracks = bury(tracks, scene, self.settings)
+        wanted = sought(directives, tracks, scene)
+        tracks, self._ids = confirm(tracks, scene, self._ids, self.settings, wanted)
         self._tracks = tracks
         self.looked = Looked(scene, tracks, keys, posterior)
         seen = report(tracks, scene, self._size, self.settings)

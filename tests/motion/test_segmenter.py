@@ -179,3 +179,31 @@ def test_settings_out_of_range_are_refused() -> None:
         MotionSettings(cell=1)
     with pytest.raises(SettingsError, match="work_size"):
         MotionSettings(work_size=3)
+
+
+def test_where_cogitation_asks_to_look_an_object_is_told_sooner() -> None:
+    disc = (lambda n: (100 + 0.12 * n, 80.0), 24.0, SKIN)
+    shots = list(clip(SKY, lambda n: (0, 0), [disc], 80))
+    there = Directive("look_at", "a test", {"bbox": (60, 40, 100, 80)})
+    elsewhere = Directive("look_at", "a test", {"bbox": (0, 0, 40, 40)})
+
+    def first(directive: Directive) -> int:
+        return next(n for n, regions in enumerate(run(shots, (directive,))) if regions)
+
+    assert first(there) < first(elsewhere)
+
+
+def test_what_is_ignored_leaves_the_other_object_as_it_is() -> None:
+    discs = [
+        (lambda n: (50 + 1.5 * n, 40.0), 20.0, SKIN),
+        (lambda n: (190 - 1.5 * n, 115.0), 20.0, OTHER),
+    ]
+    shots = list(clip(WIDE, lambda n: (20, 30), discs, 35))
+    below = Directive("ignore", "a test", {"bbox": (0, 88, SIZE[1], SIZE[0] - 88)})
+
+    def above(directives: tuple[Directive, ...]) -> float:
+        seen = run(shots, directives)[20:]
+        return float(np.mean([best(r, s.masks[0])[0] for r, s in zip(seen, shots[20:], strict=True)]))
+
+    assert above((below,)) > above(()) - 0.02
+    assert max(len(r) for r in run(shots, (below,))) == 1
