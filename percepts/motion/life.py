@@ -14,7 +14,7 @@ from visup.percepts.motion.dense import CLIP
 from visup.percepts.motion.discovery import discover, middle, rate_of, same_motion, slack_of
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, distances, fit_affine
-from visup.percepts.motion.salience import LITTLE_BORDER, border_share, is_salient
+from visup.percepts.motion.salience import LITTLE_BORDER, border_share, is_salient, is_swallowing
 from visup.percepts.motion.scene import Measured, Scene, moves_like
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Indices, Motion, Track, remember
@@ -379,6 +379,7 @@ def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
             keep = gone <= 0.2 and t.evidence > -20
         else:
             keep = gone <= (settings.memory_s if t.hidden is not None else 0.5)
+            keep = keep and not is_swallowing(t, scene)
         if keep:
             out.append(t)
     return tuple(out)

@@ -107,9 +107,10 @@ def learnt(
     mean = picture.mean + weight[..., None] * (image - picture.mean)
     spread = np.float32(1 - np.exp(-seconds / RESTLESS_S))
     # Leaves and water go far and come back; one object that passes weighs little.
-    wide = picture.variance + np.where(moving, 0, spread) * (
-        np.minimum(off, RARE) - 1
-    ) * picture.variance
+    wide = (
+        picture.variance
+        + np.where(moving, 0, spread) * (np.minimum(off, RARE) - 1) * picture.variance
+    )
     variance = np.clip(wide, NOISE**2, (8 * NOISE) ** 2)
     seen = np.minimum(picture.seen_s + fits * np.float32(seconds), 60.0)
     gap = image - picture.other

@@ -16,6 +16,7 @@ from visup.percepts.motion.scene import Scene
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Track
 
+
 def obey(directives: Sequence[Directive], scene: Scene, likelihood: Floats) -> Floats:
     """Forbid motion where cogitation asks to ignore it.
 

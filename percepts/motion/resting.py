@@ -200,9 +200,7 @@ class RestingView:
         taken = {s.id for s in self._known} | {self._alias.get(r.id, r.id) for r in older}
         for s in self._known:
             own = seen.get(s.key)
-            free = own is not None and not any(
-                common(own, r) > COMMON * own.area for r in older
-            )
+            free = own is not None and not any(common(own, r) > COMMON * own.area for r in older)
             if own is not None and free and not s.id and is_salient(s):
                 ids, number = self._number(own, regions, ids, taken)
                 s = replace(s, id=number)

@@ -33,6 +33,7 @@ CLEAR = 0.25  # the same for a track that is told at first sight
 FITS = 9.0  # squared Mahalanobis distance within which the background explains a point
 FOLLOW = 0.3  # weight of the newest frame in running means
 RESTS = 0.7  # share of points that fit the background when a track rests
+GROWN = 2.0  # how much larger than when it last moved an object that rests may not be
 FEWEST = 4
 NEAR_GONE = 3.0  # pixels, for a track that is told at first sight: further than leaves swing
 RING_STEPS = 5  # cells around a track in which its surroundings are looked for
@@ -69,6 +70,20 @@ def rests(t: Track, scene: Scene) -> bool:
     return bool(t.id) and min(seen) > RESTS
 
 
+def is_swallowing(t: Track, scene: Scene) -> bool:
+    """Whether an object has grown over the background until that explains all of it.
+
+    What has stopped is explained as well, but has not grown since it moved.
+    """
+    area = float(scene.cells.area[t.share > 0.5].sum())
+    return rests_over_all(t) and area > GROWN * max(t.moving_area, 1.0)
+
+
+def rests_over_all(t: Track) -> bool:
+    """Whether an object moves over no baseline against the background."""
+    return bool(t.id) and min(t.explained.values(), default=0.0) > RESTS
+
+
 def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
     """Note how well the background explains an object, over each baseline."""
     explained = dict(t.explained)
@@ -78,7 +93,10 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
             share = float(np.mean(m.background.distances(m.constraints)[mine] < FITS))
             before = explained.get(_octave(m), share)
             explained[_octave(m)] = before + FOLLOW * (share - before)
-    return replace(t, explained=MappingProxyType(explained))
+    area = t.moving_area
+    if min(explained.values(), default=1.0) < EXPLAINED:
+        area = float(scene.cells.area[winner == k].sum())
+    return replace(t, explained=MappingProxyType(explained), moving_area=area)
 
 
 def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:

@@ -126,6 +126,7 @@ class Track:
         gone: (x, y) of its displacement since birth against the background, pixels.
         way: Length of the way it took to get there, pixels.
         explained: Share of its points that the background explains, by octave of the baseline.
+        moving_area: Its area when the background last did not explain it, working pixels.
     """
 
     key: int
@@ -150,6 +151,7 @@ class Track:
     gone: tuple[float, float] = (0.0, 0.0)
     way: float = 0.0
     explained: Mapping[int, float] = field(default_factory=_nothing)
+    moving_area: float = 0.0
 
     def predicted(self, lag: int, span_s: float) -> tuple[Affine, ...]:
         """The displacement of each part over a baseline.
