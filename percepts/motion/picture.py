@@ -76,13 +76,12 @@ def changed(picture: Picture, image: Floats) -> Mask:
     """Which pixels show something else than what rests, (h, w) bool."""
     off = cv2.GaussianBlur(np.minimum(offset(picture, image), 100.0), (3, 3), 0.8)
     off = np.where(shaded(picture, image), 0, off)
-    near = (off > NEAR**2).astype(np.uint8)
-    near = cv2.medianBlur(near, 5)
+    near = cv2.medianBlur((off > NEAR**2).astype(np.uint8), 5)
     _, labels = cv2.connectedComponents(near, connectivity=8)
     sure = np.zeros(labels.max() + 1, bool)
     sure[np.unique(labels[(off > (FAR * 1.5) ** 2) & (near > 0)])] = True
     sure[0] = False
-    return sure[labels]
+    return np.asarray(sure[labels], dtype=bool)
 
 
 def learnt(

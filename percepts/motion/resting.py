@@ -89,7 +89,11 @@ def _still_share(scene: Scene, number: int) -> float | None:
 
 
 class RestingView:
-    """Silhouettes before the picture of what rests; one per video."""
+    """Silhouettes before the picture of what rests; one per video.
+
+    Attributes:
+        active: Whether the camera rests, and has done so for long enough.
+    """
 
     def __init__(self) -> None:
         self._forget()
@@ -102,6 +106,7 @@ class RestingView:
         self._known: Silhouettes = ()
         self._time = self._since = self._rested_s = 0.0
         self._born = 0
+        self.active = False
 
     def step(
         self,
@@ -133,7 +138,8 @@ class RestingView:
         view = self._seen(image, frame.time, settings)
         if view is None:
             return self._only(regions), ids
-        if min(frame.time - self._since, self._rested_s) < REST_S:
+        self.active = min(frame.time - self._since, self._rested_s) >= REST_S
+        if not self.active:
             return self._only(regions), ids
         least = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
         return self._reported(frame, view, regions, ids, least)

@@ -78,6 +78,11 @@ class MotionSegmenter:
         self._resting = RestingView()
         self._count = self._born = self._ids = 0
 
+    @property
+    def resting(self) -> bool:
+        """Whether the camera is seen to rest, and what moves is told before the picture of that."""
+        return self._resting.active
+
     def step(self, frame: Frame, directives: Sequence[Directive] = ()) -> tuple[Region, ...]:
         """Segment one frame.
 

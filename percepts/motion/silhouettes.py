@@ -27,7 +27,7 @@ FRAGMENT = 0.2  # gap between fragments of one object, as a share of its length
 SEARCH = 3  # pixels around the prediction in which a template is sought
 FOLLOW = 0.35  # weight of a newly measured velocity
 APART = 2  # frames apart from others after which an object is one of its own
-LIMB = 0.5  # how large, as a share of its object, a part may be that is taken for a limb
+LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
 LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
 LEAST_SHARE = 0.25  # the same as a share of its size
 STRAIGHT = 0.6  # net way as a share of the way
@@ -59,7 +59,7 @@ class Silhouette:
         alone: In how many frames it was seen apart from others.
         now: Its visible pixels as (box, mask within it); None when hidden.
         crowded: Whether it shares a blob with others.
-        cut: Whether the border of the image cuts it.
+        cut: Whether the border of the image cuts it, or did: then it is no limb of another.
         parted: How far it went since it was last seen in one piece, pixels.
     """
 
@@ -410,8 +410,9 @@ def _seen(
         _, dx, dy = _sought(s, mask.astype(np.float32), view)
         corner = (s.corner[0] + dx, s.corner[1] + dy)
         gain = 0.3 * FOLLOW
-        velocity = tuple(
-            v + gain * d / view.seconds for v, d in zip(s.velocity, (dx, dy), strict=True)
+        velocity = (
+            s.velocity[0] + gain * dx / view.seconds,
+            s.velocity[1] + gain * dy / view.seconds,
         )
         moved = replace(s, corner=corner, velocity=velocity)
     else:
@@ -419,8 +420,9 @@ def _seen(
         old = before.centre
         new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
         gain = max(FOLLOW, 1 / (s.frames + 0.0))
-        velocity = tuple(
-            v + gain * ((n - o) / elapsed - v) for v, n, o in zip(s.velocity, new, old, strict=True)
+        velocity = (
+            s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
+            s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
         )
         tone = _cut(view.image, box)
         histogram = 0.8 * s.histogram + 0.2 * histogram_of(tone[shape])
@@ -436,7 +438,7 @@ def _seen(
         alone=s.alone + int(alone),
         now=(box, shape),
         crowded=not alone,
-        cut=_at_border(box, view),
+        cut=s.cut or _at_border(box, view),
         parted=before.parted + step if pieces else 0.0,
     )
 
@@ -452,16 +454,10 @@ def joined(known: Silhouettes) -> Silhouettes:
     """Give small parts that were born beside an object, and go with it, to that object."""
     out = list(known)
     for s in known:
-        if s.id or s.now is None:
+        if s.now is None:
             continue
         for i, host in enumerate(out):
-            if (
-                host.key >= s.key
-                or host.now is None
-                or s.cut
-                or host.cut
-                or not _goes_with(s, host)
-            ):
+            if host.key >= s.key or host.now is None or s.cut or not _goes_with(s, host):
                 continue
             out[i] = _with_part(host, s)
             out = [o for o in out if o.key != s.key]
@@ -480,7 +476,8 @@ def _goes_with(s: Silhouette, host: Silhouette) -> bool:
 
 
 def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
-    assert host.now is not None and s.now is not None
+    assert host.now is not None
+    assert s.now is not None
     (a, shape), (b, part) = host.now, s.now
     box = (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3]))
     mask = np.zeros((box[3] - box[1], box[2] - box[0]), dtype=bool)
@@ -491,7 +488,7 @@ def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
         if t.shape[:2] == m.shape:
             tone[where] = t
     corner = (float(box[0]), float(box[1]))
-    return replace(host, now=(box, mask), shape=mask, tone=tone, corner=corner)
+    return replace(host, id=host.id or s.id, now=(box, mask), shape=mask, tone=tone, corner=corner)
 
 
 def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
