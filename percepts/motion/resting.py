@@ -51,7 +51,7 @@ FLOODED = 0.6  # share of the image that no change of what is seen in it explain
 KNOWN = 0.4  # share of a region that differs from the picture when the picture knows it
 COMMON = 0.5  # share of the smaller that two outlines of one object have in common
 WHOLE = 0.6  # intersection over union at which an object is seen whole in the picture
-MANY_CELLS = 15  # superpixels of a region whose outline the layers know well
+MANY_CELLS = 22  # superpixels of a region whose outline the layers know well
 YOUNG_S = 0.3  # how long what was never told is missed, seconds
 SIZE = 768  # longer side of the picture, pixels
 
