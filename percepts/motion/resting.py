@@ -28,17 +28,8 @@ from visup.percepts.motion.picture import (
 )
 from visup.percepts.motion.scene import Scene
 from visup.percepts.motion.settings import MotionSettings
-from visup.percepts.motion.silhouettes import (
-    Mask,
-    Silhouette,
-    Silhouettes,
-    View,
-    follow,
-    is_ghost,
-    is_salient,
-    joined,
-    view_of,
-)
+from visup.percepts.motion.silhouette import Mask, Silhouette, Silhouettes, View, view_of
+from visup.percepts.motion.silhouettes import follow, is_ghost, is_salient, joined
 
 TELLS = 16.0  # information, 1 / pixels squared, of a point that would show a motion
 FITS = 9.0  # squared distance within which a point rests

@@ -9,7 +9,7 @@ is while others hide it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -17,10 +17,18 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from visup.percepts.motion.image import Floats
+from visup.percepts.motion.silhouette import (
+    Mask,
+    Silhouette,
+    Silhouettes,
+    View,
+    at_border,
+    cropped,
+    cut,
+    histogram_of,
+    window_of,
+)
 
-Mask = NDArray[np.bool_]
-Labels = NDArray[np.int32]
-Box = tuple[int, int, int, int]
 CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
 VISIBLE = 0.2  # share of its template below which an object is hidden
 FRAGMENT = 0.2  # gap between fragments of one object, as a share of its length
@@ -36,102 +44,6 @@ PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an 
 TAKEN = 0.3  # how far a pixel that another object shows still speaks for one behind it
 GROWN = 1.3  # how much more than its template is seen of an object that has come into view
 GHOST = 0.6  # edges in the image, as a share of those at rest, below which nothing is there
-TONES = 6  # bins of each channel in a histogram
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Silhouette:
-    """One object.
-
-    Attributes:
-        key: Number in order of birth.
-        id: Public number, 0 until told.
-        born: Seconds.
-        seen: Seconds when last visible.
-        frames: In how many frames it was visible.
-        corner: (x, y) of the template, pixels.
-        velocity: (vx, vy), pixels per second.
-        shape: (h, w) bool, template: its silhouette when it last stood alone.
-        tone: (h, w, 3) float32, what was seen there.
-        histogram: (TONES ** 3,) float32 of its tones, sums to 1.
-        start: (4,) sides of its box at birth: left, top, right, bottom.
-        way: (4,) how far each side went since, to and fro, pixels.
-        alone: In how many frames it was seen apart from others.
-        now: Its visible pixels as (box, mask within it); None when hidden.
-        crowded: Whether it shares a blob with others.
-        cut: Whether the border of the image cuts it, or did: then it is no limb of another.
-        parted: How far it went since it was last seen in one piece, pixels.
-    """
-
-    key: int
-    id: int
-    born: float
-    seen: float
-    frames: int
-    corner: tuple[float, float]
-    velocity: tuple[float, float]
-    shape: Mask
-    tone: Floats
-    histogram: Floats
-    start: Floats
-    way: Floats
-    alone: int
-    now: tuple[Box, Mask] | None
-    crowded: bool = False
-    cut: bool = False
-    parted: float = 0.0
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """(x, y) of the middle of the template."""
-        h, w = self.shape.shape
-        return self.corner[0] + w / 2, self.corner[1] + h / 2
-
-    @property
-    def sides(self) -> Floats:
-        """(4,) sides of the template's box: left, top, right, bottom."""
-        h, w = self.shape.shape
-        x, y = self.corner
-        return np.array([x, y, x + w, y + h], dtype=np.float32)
-
-    def gone(self) -> Floats:
-        """(4,) distance of each side from where it was at birth, pixels."""
-        return np.asarray(np.abs(self.sides - self.start), dtype=np.float32)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """What one frame shows.
-
-    Attributes:
-        image: (h, w, 3) float32.
-        labels: (h, w) int32, number of the blob at each pixel, 0 for none.
-        count: How many blobs.
-        time: Seconds.
-        seconds: Since the frame before.
-    """
-
-    image: Floats
-    labels: Labels
-    count: int
-    time: float
-    seconds: float
-
-
-Silhouettes = tuple[Silhouette, ...]
-
-
-def view_of(image: Floats, change: Mask, least: float, time: float, seconds: float) -> View:
-    """Blobs of change that are no specks, with small gaps closed and holes filled."""
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 5))
-    closed = cv2.morphologyEx(change.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
-    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    filled = cv2.drawContours(np.zeros_like(closed), outlines, -1, 1, cv2.FILLED)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
-    keep = stats[:, cv2.CC_STAT_AREA] >= least
-    keep[0] = False
-    number = np.where(keep, np.cumsum(keep), 0).astype(np.int32)
-    return View(image, number[labels], int(keep.sum()), time, seconds)
 
 
 def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]:
@@ -179,26 +91,13 @@ def _moved(s: Silhouette, seconds: float) -> Silhouette:
     return replace(s, corner=(x + s.velocity[0] * seconds, y + s.velocity[1] * seconds))
 
 
-def _window(s: Silhouette, shape: tuple[int, int], dx: int = 0, dy: int = 0) -> tuple[Box, Box]:
-    """Where the template lies in the image and which part of it, both as (x0, y0, x1, y1)."""
-    x, y = round(s.corner[0]) + dx, round(s.corner[1]) + dy
-    h, w = s.shape.shape
-    x0, y0, x1, y1 = max(x, 0), max(y, 0), min(x + w, shape[1]), min(y + h, shape[0])
-    x1, y1 = max(x1, x0), max(y1, y0)
-    return (x0, y0, x1, y1), (x0 - x, y0 - y, x1 - x, y1 - y)
-
-
-def _cut(a: NDArray, box: Box) -> NDArray:  # type: ignore[type-arg]
-    return a[box[1] : box[3], box[0] : box[2]]
-
-
 def _claims(ahead: Sequence[Silhouette], view: View) -> list[list[int]]:
     """The blobs that each object claims by where it is expected; else the nearest free one."""
     areas = np.bincount(view.labels.ravel(), minlength=view.count + 1)
     claims: list[list[int]] = []
     for s in ahead:
-        at, own = _window(s, view.labels.shape)
-        common = np.bincount(_cut(view.labels, at)[_cut(s.shape, own)], minlength=view.count + 1)
+        at, own = window_of(s, view.labels.shape)
+        common = np.bincount(cut(view.labels, at)[cut(s.shape, own)], minlength=view.count + 1)
         least = CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
         claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
     _reach_out(ahead, view, claims, areas)
@@ -249,14 +148,6 @@ def _look(mask: Mask, view: View) -> tuple[tuple[float, float], Floats]:
     return centre, histogram_of(view.image[ys, xs])
 
 
-def histogram_of(tones: Floats) -> Floats:
-    """(TONES ** 3,) float32 histogram of (N, 3) tones, 0 to 255, that sums to 1."""
-    bins = np.clip(tones * (TONES / 256.0), 0, TONES - 1).astype(np.int64)
-    number = (bins[:, 0] * TONES + bins[:, 1]) * TONES + bins[:, 2]
-    count = np.bincount(number, minlength=TONES**3).astype(np.float32)
-    return np.asarray(count / max(1.0, float(count.sum())), dtype=np.float32)
-
-
 def _shared(
     blob: int, rivals: Sequence[tuple[int, Silhouette]], view: View
 ) -> list[tuple[int, Mask]]:
@@ -286,8 +177,8 @@ def _arranged(rivals: Sequence[Silhouette], blob: Mask, view: View) -> list[tupl
         (_, dx, dy), n = min(fits)
         left.remove(n)
         out.append((n, dx, dy))
-        where, own = _window(rivals[n], blob.shape, dx, dy)
-        _cut(free, where)[_cut(rivals[n].shape, own)] *= TAKEN
+        where, own = window_of(rivals[n], blob.shape, dx, dy)
+        cut(free, where)[cut(rivals[n].shape, own)] *= TAKEN
     return out
 
 
@@ -297,12 +188,12 @@ def _sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
     reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
-            where, own = _window(s, blob.shape, dx, dy)
-            shape = _cut(s.shape, own)
+            where, own = window_of(s, blob.shape, dx, dy)
+            shape = cut(s.shape, own)
             if not shape.any():
                 continue
-            gap = np.abs(_cut(view.image, where) - _cut(s.tone, own)).mean(axis=2)
-            gap = 60.0 - (60.0 - np.minimum(gap, 60.0)) * _cut(blob, where)
+            gap = np.abs(cut(view.image, where) - cut(s.tone, own)).mean(axis=2)
+            gap = 60.0 - (60.0 - np.minimum(gap, 60.0)) * cut(blob, where)
             cost = float(gap[shape].mean()) + 0.5 * float(np.hypot(dx, dy))
             if cost < best:
                 best, at = cost, (dx, dy)
@@ -352,20 +243,9 @@ def _is_much(part: Mask, whole: Mask) -> bool:
     return int(np.count_nonzero(part)) > PIECE * int(np.count_nonzero(whole))
 
 
-def _crop(mask: Mask) -> tuple[Box, Mask]:
-    ys, xs = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
-    box = (int(xs[0]), int(ys[0]), int(xs[-1]) + 1, int(ys[-1]) + 1)
-    return box, _cut(mask, box)
-
-
-def _at_border(box: Box, view: View) -> bool:
-    h, w = view.labels.shape
-    return min(box[0], box[1]) <= 0 or box[2] >= w or box[3] >= h
-
-
 def _born(mask: Mask, view: View, key: int) -> Silhouette:
-    box, shape = _crop(mask)
-    tone = _cut(view.image, box)
+    box, shape = cropped(mask)
+    tone = cut(view.image, box)
     histogram = histogram_of(tone[shape])
     corner = (float(box[0]), float(box[1]))
     now = (box, shape)
@@ -386,7 +266,7 @@ def _born(mask: Mask, view: View, key: int) -> Silhouette:
         0 * start,
         1,
         now,
-        cut=_at_border(box, view),
+        cut=at_border(box, view),
     )
 
 
@@ -403,7 +283,7 @@ def _seen(
     full = np.count_nonzero(s.shape)
     if mask is None or np.count_nonzero(mask) < VISIBLE * full:
         return replace(s, now=None, crowded=not alone)
-    box, shape = _crop(mask)
+    box, shape = cropped(mask)
     elapsed = max(view.time - before.seen, view.seconds, 1e-3)
     if not alone and np.count_nonzero(mask) < GROWN * full:
         # Of what is partly hidden only the shift of its template tells where it is.
@@ -424,7 +304,7 @@ def _seen(
             s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
             s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
         )
-        tone = _cut(view.image, box)
+        tone = cut(view.image, box)
         histogram = 0.8 * s.histogram + 0.2 * histogram_of(tone[shape])
         moved = replace(
             s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram
@@ -438,7 +318,7 @@ def _seen(
         alone=s.alone + int(alone),
         now=(box, shape),
         crowded=not alone,
-        cut=s.cut or _at_border(box, view),
+        cut=s.cut or at_border(box, view),
         parted=before.parted + step if pieces else 0.0,
     )
 
@@ -504,4 +384,4 @@ def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
     box, shape = s.now
     inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
     rim = shape & (inner == 0)
-    return float(_cut(now, box)[rim].mean()) < GHOST * float(_cut(rest, box)[rim].mean())
+    return float(cut(now, box)[rim].mean()) < GHOST * float(cut(rest, box)[rim].mean())

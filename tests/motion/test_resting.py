@@ -10,13 +10,8 @@ from visup.agent import Frame
 from visup.percepts.motion.picture import changed, exposed, first_picture, learnt, shaded
 from visup.percepts.motion.resting import common
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.silhouettes import (
-    Silhouettes,
-    follow,
-    histogram_of,
-    is_salient,
-    view_of,
-)
+from visup.percepts.motion.silhouette import Silhouettes, histogram_of, view_of
+from visup.percepts.motion.silhouettes import follow, is_salient
 
 GROUND = np.repeat(texture(1, SIZE)[..., None], 3, axis=2).astype(np.float32)
 NOWHERE = np.zeros(SIZE, dtype=bool)

@@ -203,7 +203,9 @@ def test_what_is_ignored_leaves_the_other_object_as_it_is() -> None:
 
     def above(directives: tuple[Directive, ...]) -> float:
         seen = run(shots, directives)[20:]
-        return float(np.mean([best(r, s.masks[0])[0] for r, s in zip(seen, shots[20:], strict=True)]))
+        return float(
+            np.mean([best(r, s.masks[0])[0] for r, s in zip(seen, shots[20:], strict=True)])
+        )
 
     assert above((below,)) > above(()) - 0.02
     assert max(len(r) for r in run(shots, (below,))) == 1
