@@ -8,7 +8,7 @@ not know: what was there, and slow, when the picture was made.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import cv2
@@ -42,7 +42,8 @@ FLOODED = 0.6  # share of the image that no change of what is seen in it explain
 KNOWN = 0.4  # share of a region that differs from the picture when the picture knows it
 COMMON = 0.5  # share of the smaller that two outlines of one object have in common
 WHOLE = 0.6  # intersection over union at which an object is seen whole in the picture
-MANY_CELLS = 22  # superpixels of a region whose outline the layers know well
+MANY_CELLS = 20  # superpixels of a region whose outline the layers know well
+MAIN = 0.4  # share of a region that a silhouette must fill to take its id: limbs do not
 YOUNG_S = 0.3  # how long what was never told is missed, seconds
 SIZE = 768  # longer side of the picture, pixels
 
@@ -119,21 +120,21 @@ class RestingView:
         Returns:
             Regions by id: those of the layers unless the camera rests; the last public id given.
         """
+        many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
         if not self._is_at_rest(camera_rests(scene), scene.seconds):
-            return self._only(regions), ids
+            return self._only(regions, many), ids
         image = _prepared(frame)
         if self._picture is None:
             self._picture = first_picture(image)
             self._time = self._since = frame.time
-            return self._only(regions), ids
+            return self._only(regions, many), ids
         view = self._seen(image, frame.time, settings)
         if view is None:
-            return self._only(regions), ids
+            return self._only(regions, many), ids
         self.active = min(frame.time - self._since, self._rested_s) >= REST_S
         if not self.active:
-            return self._only(regions), ids
-        least = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
-        return self._reported(frame, view, regions, ids, least)
+            return self._only(regions, many), ids
+        return self._reported(frame, view, regions, ids)
 
     def _is_at_rest(self, rests: bool | None, seconds: float) -> bool:
         """Whether the camera rests, as far as is known; else all is forgotten."""
@@ -143,9 +144,9 @@ class RestingView:
             self._forget()
         return self._rested_s > 0
 
-    def _only(self, regions: Sequence[Region]) -> tuple[Region, ...]:
+    def _only(self, regions: Sequence[Region], many: float) -> tuple[Region, ...]:
         self._shown |= {r.id for r in regions}
-        self._old |= {r.id for r in regions}
+        self._old |= {r.id for r in regions if r.area >= many}
         taken: set[int] = set()
         out = []
         for r in regions:
@@ -182,7 +183,7 @@ class RestingView:
         return view
 
     def _reported(
-        self, frame: Frame, view: View, regions: Sequence[Region], ids: int, least: float
+        self, frame: Frame, view: View, regions: Sequence[Region], ids: int
     ) -> tuple[tuple[Region, ...], int]:
         """Give ids to silhouettes that are salient, and settle with the regions of the layers."""
         scale = frame.size[0] / view.labels.shape[1], frame.size[1] / view.labels.shape[0]
@@ -191,11 +192,14 @@ class RestingView:
             for s in self._known
             if s.now is not None
         }
-        older = self._older(regions, list(seen.values()), least)
+        older, heirs = self._older(regions, seen)
         out: list[Region] = []
         known: list[Silhouette] = []
         taken = {s.id for s in self._known} | {self._alias.get(r.id, r.id) for r in older}
         for s in self._known:
+            if s.key in heirs and heirs[s.key] not in taken:
+                s = replace(s, id=heirs[s.key])
+                taken.add(s.id)
             own = seen.get(s.key)
             free = own is not None and not any(common(own, r) > COMMON * own.area for r in older)
             if own is not None and free and not s.id and is_salient(s):
@@ -221,19 +225,25 @@ class RestingView:
         return tuple(sorted(out, key=lambda r: r.id)), ids
 
     def _older(
-        self, regions: Sequence[Region], seen: Sequence[Region], least: float
-    ) -> list[Region]:
-        """Regions that were told before the picture was believed, and are not seen whole in it yet."""
-        out = []
+        self, regions: Sequence[Region], seen: Mapping[int, Region]
+    ) -> tuple[list[Region], dict[int, int]]:
+        """Regions told before the picture was believed, and not seen whole in it yet.
+
+        Also the ids that pass to silhouettes, by key, which now show such a region whole.
+        """
+        out, heirs = [], {}
         for r in regions:
-            if r.id in self._old and r.area >= least:
-                both = [common(s, r) for s in seen]
-                whole = [b / (s.area + r.area - b) for s, b in zip(seen, both, strict=True)]
-                if max(whole, default=0.0) > WHOLE:
-                    self._old.discard(r.id)
-                else:
-                    out.append(r)
-        return out
+            if r.id not in self._old:
+                continue
+            both = {key: common(s, r) for key, s in seen.items()}
+            whole = {key: b / (seen[key].area + r.area - b) for key, b in both.items()}
+            best = max(whole, key=lambda key: whole[key], default=None)
+            if best is None or whole[best] <= WHOLE:
+                out.append(r)
+                continue
+            self._old.discard(r.id)
+            heirs[best] = self._alias.get(r.id, r.id)
+        return out, heirs
 
     def _number(
         self, own: Region, regions: Sequence[Region], ids: int, taken: set[int]
@@ -241,7 +251,7 @@ class RestingView:
         """The last id given, and that of a new silhouette: the one under which it was told before."""
         for r in regions:
             number = self._alias.get(r.id, r.id)
-            much = COMMON * min(r.area, own.area)
+            much = MAIN * r.area
             if number in self._shown and number not in taken and common(own, r) > much:
                 return ids, number
         return ids + 1, ids + 1
