@@ -44,6 +44,7 @@ COMMON = 0.5  # share of the smaller that two outlines of one object have in com
 WHOLE = 0.6  # intersection over union at which an object is seen whole in the picture
 MANY_CELLS = 20  # superpixels of a region whose outline the layers know well
 MAIN = 0.4  # share of a region that a silhouette must fill to take its id: limbs do not
+LEAST_TOLD = 0.0005  # share of the image that an object must fill when it is first told
 YOUNG_S = 0.3  # how long what was never told is missed, seconds
 SIZE = 768  # longer side of the picture, pixels
 
@@ -193,6 +194,7 @@ class RestingView:
             if s.now is not None
         }
         older, heirs = self._older(regions, seen)
+        whole_view = frame.size[0] * frame.size[1]
         out: list[Region] = []
         known: list[Silhouette] = []
         taken = {s.id for s in self._known} | {self._alias.get(r.id, r.id) for r in older}
@@ -202,7 +204,8 @@ class RestingView:
                 taken.add(s.id)
             own = seen.get(s.key)
             free = own is not None and not any(common(own, r) > COMMON * own.area for r in older)
-            if own is not None and free and not s.id and is_salient(s):
+            large = own is not None and own.area >= LEAST_TOLD * whole_view
+            if own is not None and large and free and not s.id and is_salient(s):
                 ids, number = self._number(own, regions, ids, taken)
                 s = replace(s, id=number)
                 taken.add(number)

@@ -198,7 +198,7 @@ def test_what_is_ignored_leaves_the_other_object_as_it_is() -> None:
         (lambda n: (50 + 1.5 * n, 40.0), 20.0, SKIN),
         (lambda n: (190 - 1.5 * n, 115.0), 20.0, OTHER),
     ]
-    shots = list(clip(WIDE, lambda n: (20, 30), discs, 35))
+    shots = list(clip(WIDE, lambda n: (20 + 0.8 * n, 30), discs, 35))
     below = Directive("ignore", "a test", {"bbox": (0, 88, SIZE[1], SIZE[0] - 88)})
 
     def above(directives: tuple[Directive, ...]) -> float:
