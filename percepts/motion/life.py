@@ -85,6 +85,8 @@ def _territory(
     tracks: Sequence[Track], where: NDArray[np.bool_], motion: Motion, scene: Scene
 ) -> int | None:
     """The track that is hidden in most of these cells, or else was of late in most of them."""
+    if not where.any():
+        return None
     for i, t in enumerate(tracks):
         if (
             t.id
