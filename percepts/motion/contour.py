@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent import Region
 from visup.percepts.motion.image import Floats
 
 HOLE = 0.08  # share of a region's area up to which a hole in it is filled
@@ -34,6 +35,33 @@ class Outline:
     centroid: tuple[float, float]
     area: float
     cut: bool
+
+    def region(
+        self, number: int, velocity: tuple[float, float], sigma: float, confidence: float
+    ) -> Region:
+        """The region that has this outline.
+
+        Args:
+            number: Its public id.
+            velocity: (vx, vy), frame pixels per second.
+            sigma: Standard deviation of the velocity, the same unit.
+            confidence: 0 to 1.
+
+        Returns:
+            The region.
+        """
+        return Region(
+            id=number,
+            bbox=self.bbox,
+            mask=self.mask,
+            contour=self.contour,
+            centroid=self.centroid,
+            area=self.area,
+            velocity=velocity,
+            velocity_sigma=sigma,
+            cut=self.cut,
+            confidence=confidence,
+        )
 
 
 def outline(

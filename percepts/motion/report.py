@@ -144,15 +144,6 @@ def _region(t: Track, shape: Outline, scale: float) -> Region:
     rate = t.best_rate()
     centre = (shape.centroid[0] * scale, shape.centroid[1] * scale)
     speed = rate.velocity(centre) / scale if rate is not None else np.zeros(2)
-    return Region(
-        id=t.id,
-        bbox=shape.bbox,
-        mask=shape.mask,
-        contour=shape.contour,
-        centroid=shape.centroid,
-        area=shape.area,
-        velocity=(float(speed[0]), float(speed[1])),
-        velocity_sigma=rate.sigma / scale if rate is not None else float("inf"),
-        cut=shape.cut,
-        confidence=float(1 - np.exp(-max(t.evidence, 0.0) / 100.0)),
-    )
+    sigma = rate.sigma / scale if rate is not None else float("inf")
+    sure = float(1 - np.exp(-max(t.evidence, 0.0) / 100.0))
+    return shape.region(t.id, (float(speed[0]), float(speed[1])), sigma, sure)

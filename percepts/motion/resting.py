@@ -319,16 +319,7 @@ def region_of(
         mask.astype(np.uint8), (right - left, bottom - top), interpolation=cv2.INTER_NEAREST
     )
     shape = describe(large.astype(bool), (left, top), size)
-    return Region(
-        id=s.id,
-        bbox=shape.bbox,
-        mask=shape.mask,
-        contour=shape.contour,
-        centroid=shape.centroid,
-        area=shape.area,
-        velocity=(s.velocity[0] * scale[0], s.velocity[1] * scale[1]),
-        # A box is known to about a pixel, and its last few steps are averaged.
-        velocity_sigma=0.5 * scale[0] / seconds,
-        cut=shape.cut,
-        confidence=float(1 - np.exp(-s.frames / 5.0)),
-    )
+    velocity = (s.velocity[0] * scale[0], s.velocity[1] * scale[1])
+    # A box is known to about a pixel, and its last few steps are averaged.
+    sigma = 0.5 * scale[0] / seconds
+    return shape.region(s.id, velocity, sigma, float(1 - np.exp(-s.frames / 5.0)))

@@ -153,7 +153,7 @@ def test_boxes_by_hand() -> None:
 
 
 def test_mot_scores_on_toy_tracks() -> None:
-    pytest.importorskip("motmetrics")
+    pytest.importorskip("motmetrics", reason="MOT scores need the extra 'eval'")
     true = {n: {1: (n, 0.0, 10.0, 10.0), 2: (n, 50.0, 10.0, 10.0)} for n in range(10)}
     perfect = mot_scores(true, true)
     assert perfect == {"mota": 1.0, "idf1": 1.0, "id_switches": 0}
