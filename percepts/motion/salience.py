@@ -76,12 +76,8 @@ def is_swallowing(t: Track, scene: Scene) -> bool:
     What has stopped is explained as well, but has not grown since it moved.
     """
     area = float(scene.cells.area[t.share > 0.5].sum())
-    return rests_over_all(t) and area > GROWN * max(t.moving_area, 1.0)
-
-
-def rests_over_all(t: Track) -> bool:
-    """Whether an object moves over no baseline against the background."""
-    return bool(t.id) and min(t.explained.values(), default=0.0) > RESTS
+    rests_always = bool(t.id) and min(t.explained.values(), default=0.0) > RESTS
+    return rests_always and area > GROWN * max(t.moving_area, 1.0)
 
 
 def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
@@ -90,9 +86,7 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
     for m in scene.measured:
         mine = winner[scene.cell_of(m.constraints.xy)] == k
         if np.count_nonzero(mine) >= FEWEST:
-            share = float(np.mean(m.background.distances(m.constraints)[mine] < FITS))
-            before = explained.get(_octave(m), share)
-            explained[_octave(m)] = before + FOLLOW * (share - before)
+            _note(explained, m, m.background.distances(m.constraints)[mine])
     area = t.moving_area
     if min(explained.values(), default=1.0) < EXPLAINED:
         area = float(scene.cells.area[winner == k].sum())
@@ -110,9 +104,7 @@ def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
         mine, around = winner[at] == k, ring[at]
         local = surroundings(m, around)
         if np.count_nonzero(mine) >= FEWEST:
-            share = float(np.mean(_misfit(m, local)[mine] < FITS))
-            before = explained.get(_octave(m), share)
-            explained[_octave(m)] = before + FOLLOW * (share - before)
+            _note(explained, m, _misfit(m, local)[mine])
         if step is None:
             step = _step(t, m, local, scene.seconds)
     assert step is not None
@@ -122,6 +114,13 @@ def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
         gone=(t.gone[0] + float(step[0]), t.gone[1] + float(step[1])),
         way=t.way + float(np.hypot(*step)),
     )
+
+
+def _note(explained: dict[int, float], m: Measured, misfit: NDArray[np.float32]) -> None:
+    """Bring the running share of points that are explained over a baseline up to date."""
+    share = float(np.mean(misfit < FITS))
+    before = explained.get(_octave(m), share)
+    explained[_octave(m)] = before + FOLLOW * (share - before)
 
 
 def _octave(m: Measured) -> int:
