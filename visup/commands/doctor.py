@@ -19,7 +19,11 @@ CORE = (
     "typer",
     "prompt_toolkit",
 )
-EXTRAS = {"report": ("plotly",), "render": ("trimesh", "embreex"), "eval": ("motmetrics",)}
+EXTRAS = {
+    "report": ("plotly",),
+    "render": ("trimesh", "embreex"),
+    "eval": ("motmetrics", "mahotas", "pyefd"),
+}
 
 
 @dataclass(frozen=True, slots=True)

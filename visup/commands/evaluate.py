@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from visup.commands.clips import clips
+from visup.commands.views import views
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True)
 app.command("clips")(clips)
+app.command("views")(views)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]
@@ -61,7 +63,7 @@ def motion(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
     """Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time."""
     from visup.evaluation.motion import evaluate_motion
 
-    _checked(folder, json_file)
+    checked(folder, json_file)
     with told("seeing") as tell:
         figures = evaluate_motion(folder, limit=limit, progress=tell)
     _show("motion", folder, figures, MOTION_KEYS, json_file, {"limit": limit})
@@ -72,7 +74,7 @@ def shapes(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
     """Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time."""
     from visup.evaluation.shapes import evaluate_shapes
 
-    _checked(folder, json_file)
+    checked(folder, json_file)
     with told("comparing") as tell:
         figures = evaluate_shapes(folder, limit=limit, progress=tell)
     _show("shapes", folder, figures, SHAPE_KEYS, json_file, {"limit": limit})
@@ -88,7 +90,7 @@ def missions(
     """Whole missions: identity, events, stages, alerts, verdicts, speed."""
     from visup.evaluation.missions import evaluate_missions
 
-    _checked(folder, json_file)
+    checked(folder, json_file)
     with told("supervising") as tell:
         figures = evaluate_missions(folder, models=models, limit=limit, progress=tell)
     settings = {"limit": limit, "models": str(models) if models else None}
@@ -108,15 +110,20 @@ def health(
     """Camera faults put into sound video: found within 1 s, rightly named, false reports."""
     from visup.evaluation.health import evaluate_health
 
-    _checked(folder, json_file)
+    checked(folder, json_file)
     with told("watching") as tell:
         figures = evaluate_health(folder, faults=faults, seed=seed, limit=limit, progress=tell)
     settings = {"faults": faults, "seed": seed, "limit": limit}
     _show("health", folder, figures, HEALTH_KEYS, json_file, settings)
 
 
-def _checked(folder: Path, json_file: Path | None) -> None:
-    """Refuse what cannot work before an evaluation of minutes begins."""
+def checked(folder: Path, json_file: Path | None) -> None:
+    """Refuse what cannot work before an evaluation of minutes begins.
+
+    Raises:
+        SettingsError: The folder does not exist.
+        OutputError: The folder of the file for the figures does not exist.
+    """
     from visup.agent.errors import SettingsError
 
     if not folder.is_dir():

@@ -11,6 +11,7 @@ from pathlib import Path
 EVALUATIONS = (
     ("shapes", "shapes/kimia99"),
     ("shapes", "shapes/mpeg7-half"),
+    ("views", "models"),
     ("motion", "missions"),
     ("motion", "video/davis"),
     ("motion", "video/static"),

@@ -1,0 +1,137 @@
+"""Symmetries of a mesh: from which other directions it looks exactly alike.
+
+A view direction can be told only up to the symmetries of the object. In parallel projection the silhouette
+from behind is besides the mirror image of the one from before, so that a mesh with a plane of symmetry
+looks from -Sd (S the reflection) exactly as it does from d, although no rotation takes one to the other.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+POINTS = 20_000
+"""Points of the surface that moved points are compared with."""
+
+MOVED = 300
+"""Points of the surface that are moved."""
+
+TOLERANCE = 0.008
+"""Mean distance, as a share of the mesh's radius, below which a moved surface is the same."""
+
+FOLDS = (2, 3, 4, 5, 6, 8)
+"""Rotational symmetries that are looked for."""
+
+_STEP_DEG = 5.0
+_ODD_DEG = (37.0, 73.0, 101.0)
+
+
+def silhouette_symmetries(mesh: Any, seed: int = 0) -> NDArray[np.float64]:
+    """Rotations of the view direction that leave a mesh's silhouette as it is.
+
+    Looked for are rotations by a half, a third, ... an eighth turn about the mesh's own and its principal
+    axes, bodies of revolution about these, and reflections in planes through them; other symmetries
+    (of a polyhedron, say) are not found, which makes an error of direction read too large, never too
+    small.
+
+    Args:
+        mesh: A ``trimesh.Trimesh``.
+        seed: Of the points that are drawn from its surface.
+
+    Returns:
+        (S, 3, 3) float64 proper rotations of direction vectors, mesh frame; the identity is first.
+    """
+    points = _surface(mesh, seed)
+    looks = _Looks(points)
+    axes = np.vstack([np.eye(3), np.linalg.eigh(points.T @ points)[1].T])
+    moves = [m for axis in axes for m in _symmetries_of(axis, axes, looks)]
+    # Point reflection mirrors the silhouette: with a reflection it gives a proper rotation.
+    return np.stack([np.eye(3), *(m if np.linalg.det(m) > 0 else -m for m in moves)])
+
+
+def angle_to(
+    direction: NDArray[np.float64], true: NDArray[np.float64], symmetries: NDArray[np.float64]
+) -> float:
+    """Angle between a direction and the nearest of those that look like the true one, degrees.
+
+    Args:
+        direction: (3,) unit vector.
+        true: (3,) unit vector.
+        symmetries: (S, 3, 3), see `silhouette_symmetries`.
+    """
+    alike = symmetries @ true
+    return float(np.degrees(np.arccos(np.clip((alike @ direction).max(), -1.0, 1.0))))
+
+
+def _surface(mesh: Any, seed: int) -> NDArray[np.float64]:
+    """Points evenly drawn from the surface, centred, of unit radius; (POINTS, 3)."""
+    triangles = np.asarray(mesh.triangles, dtype=np.float64)
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    rng = np.random.default_rng(seed)
+    chosen = triangles[rng.choice(len(triangles), POINTS, p=area / area.sum())]
+    u, v = np.sqrt(rng.random((POINTS, 1))), rng.random((POINTS, 1))
+    spots = (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]
+    spots = spots - spots.mean(axis=0)
+    return np.asarray(spots / np.linalg.norm(spots, axis=1).max())
+
+
+class _Looks:
+    """Whether a surface looks the same after a move."""
+
+    def __init__(self, points: NDArray[np.float64]) -> None:
+        self._tree = cKDTree(points)
+        self._few = points[:: POINTS // MOVED]
+        # Drawn points lie apart by themselves: what even a perfect symmetry cannot go below.
+        self._grain = float(self._tree.query(self._few, k=2)[0][:, 1].mean())
+
+    def change(self, move: NDArray[np.float64]) -> float:
+        """Mean distance of the moved surface from itself."""
+        distance, _ = self._tree.query(self._few @ move.T)
+        return float(distance.mean()) - self._grain
+
+    def same(self, move: NDArray[np.float64]) -> bool:
+        return self.change(move) < TOLERANCE
+
+
+def _symmetries_of(
+    axis: NDArray[np.float64], axes: NDArray[np.float64], looks: _Looks
+) -> list[NDArray[np.float64]]:
+    """Turns about an axis, and reflections in planes that hold it or stand upright on it."""
+    round_about = all(looks.same(_turn(axis, d)) for d in _ODD_DEG)
+    upright = [_mirror(axis)] if looks.same(_mirror(axis)) else []
+    mirrors = [_mirror(n) for n in _normals(axis, axes)]
+    if round_about:
+        turns = [_turn(axis, d) for d in np.arange(_STEP_DEG, 360.0, _STEP_DEG)]
+        return [*turns, *upright, *mirrors]
+    turns = [m for m in _fold_turns(axis) if looks.same(m)]
+    changes = np.array([looks.change(m) for m in mirrors])
+    # Planes beside a plane of symmetry are nearly as good: only the best among neighbours is one.
+    least = (changes <= np.roll(changes, 1)) & (changes <= np.roll(changes, -1))
+    return [*turns, *upright, *(mirrors[k] for k in np.flatnonzero(least & (changes < TOLERANCE)))]
+
+
+def _fold_turns(axis: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    degrees = {360.0 * k / fold for fold in FOLDS for k in range(1, fold)}
+    return [_turn(axis, d) for d in sorted(degrees)]
+
+
+def _turn(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    return np.asarray(Rotation.from_rotvec(axis * np.radians(degrees)).as_matrix())
+
+
+def _mirror(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.eye(3) - 2 * np.outer(normal, normal))
+
+
+def _normals(axis: NDArray[np.float64], axes: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Normals of planes through an axis, a step of 5 degrees apart, one of them a further axis."""
+    others = axes - np.outer(axes @ axis, axis)
+    side = others[int(np.argmax(np.linalg.norm(others, axis=1)))]
+    side = side / np.linalg.norm(side)
+    turns = np.radians(np.arange(0.0, 180.0, _STEP_DEG))
+    return [np.asarray(Rotation.from_rotvec(axis * t).apply(side)) for t in turns]
