@@ -19,8 +19,8 @@ from visup.agent.errors import DatabaseError, SettingsError
 from visup.percepts.shape.cluster import medoids, similarity_matrix
 from visup.percepts.shape.compare import shape_of
 from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.records import NewView
 from visup.percepts.shape.silhouette import binary_picture, looks_cut, normalise
-from visup.percepts.shape.storage import NewView
 from visup.percepts.shape.views import load_mesh, render_views, sphere_directions
 
 VIEWS = 32

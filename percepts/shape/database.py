@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.catalogue import Shapes, Views
 from visup.percepts.shape.compare import (
     GRAPH_SHARE,
     Likeness,
@@ -21,20 +22,14 @@ from visup.percepts.shape.compare import (
     outline_similarities,
     shape_of,
 )
-from visup.percepts.shape.index import ViewIndex
+from visup.percepts.shape.index import Summaries, ViewIndex
 from visup.percepts.shape.match import Match, MatchWeights, in_plane_rotation, match_nodes
+from visup.percepts.shape.records import NewView, View
 from visup.percepts.shape.shock_graph import ShockGraph
 from visup.percepts.shape.silhouette import Silhouette, normalise
-from visup.percepts.shape.storage import (
-    NewView,
-    View,
-    read_shapes,
-    read_views,
-    write_more,
-    write_new,
-)
+from visup.percepts.shape.storage import write_more, write_new
 
-CANDIDATES = 64
+CANDIDATES = 32
 """Views whose outlines are compared when no budget asks for fewer."""
 
 PART_SHARE = 0.55
@@ -95,14 +90,14 @@ class Ranking:
 
 
 class ModelDatabase:
-    """Views of models, read from one file; arrays are read when the first query comes.
+    """Views of models, read from one file; each shape is read when it is first looked at.
 
     Args:
         path: The file.
         views: What stands in it.
     """
 
-    def __init__(self, path: Path, views: tuple[View, ...]) -> None:
+    def __init__(self, path: Path, views: Views) -> None:
         self.path = path
         self.views = views
 
@@ -113,7 +108,7 @@ class ModelDatabase:
         Raises:
             DatabaseError: Missing, truncated, foreign or of another version.
         """
-        return cls(Path(path), read_views(Path(path)))
+        return cls(Path(path), Views.read(Path(path)))
 
     @classmethod
     def create(cls, path: Path | str, views: Iterable[NewView] = ()) -> ModelDatabase:
@@ -127,24 +122,21 @@ class ModelDatabase:
 
     def names(self) -> tuple[str, ...]:
         """Names of the models, in the order of the file."""
-        return tuple(dict.fromkeys(v.name for v in self.views))
+        return self.views.names
 
     @cached_property
-    def shapes(self) -> tuple[Shape, ...]:
-        """Shapes of all views, in the order of `views`; read when first asked for."""
-        return read_shapes(self.path, self.views)
-
-    @cached_property
-    def _places(self) -> dict[int, int]:
-        return {view.id: k for k, view in enumerate(self.views)}
+    def shapes(self) -> Shapes:
+        """Shapes of all views, in the order of `views`; each is read when it is asked for."""
+        return Shapes(self.path, self.views)
 
     @cached_property
     def _index(self) -> ViewIndex:
-        return ViewIndex([s.graph for s in self.shapes])
+        rows = self.views.records
+        return ViewIndex(self.shapes, summaries=Summaries(rows["root"], rows["sketch"]))
 
     @cached_property
     def _part_index(self) -> ViewIndex:
-        return ViewIndex([s.graph for s in self.shapes], _PART_WEIGHTS)
+        return ViewIndex(self.shapes, _PART_WEIGHTS)
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
         """Add views, to names new or known; the database as it is then. See `build.py`.
@@ -187,7 +179,7 @@ class ModelDatabase:
         query = as_shape(shape, cut)
         if query is None or not self.views:
             return Ranking((), 0)
-        among = self._named(restrict)
+        among = self.views.named(restrict)
         most = candidates_wanted(len(self.views), budget)
         wanted = _Wanted(top, per_name, threshold)
         found = self._whole_or_part(query, among, most, frozenset(try_first), wanted)
@@ -204,16 +196,11 @@ class ModelDatabase:
     ) -> Ranking:
         if not query.cut:
             return self._whole(query, among, most, first, wanted)
-        cut_views = np.array([v.cut for v in self.views])[among]
+        cut_views = self.views.cut[among]
         alike = self._whole(query, among[cut_views], most, first, wanted)
         parts = self._parts(query, among[~cut_views], wanted)
         matches = wanted.best([*alike.matches, *parts.matches])
         return Ranking(tuple(matches), alike.compared + parts.compared)
-
-    def _named(self, names: Collection[str] | None) -> NDArray[np.intp]:
-        """Numbers of the views of these models, rising; of all when None."""
-        views = [k for k, v in enumerate(self.views) if names is None or v.name in names]
-        return np.array(views, dtype=np.intp)
 
     def _whole(
         self,
@@ -224,8 +211,8 @@ class ModelDatabase:
         wanted: _Wanted,
     ) -> Ranking:
         """Candidates by index, their outlines at once, then graphs until no other can do better."""
-        favoured = np.intersect1d(self._named(first), among) if first else None
-        likely = self._index.candidates(query.graph, among, most, favoured)
+        favoured = np.intersect1d(self.views.named(first), among) if first else None
+        likely = self._index.candidates(query, among, most, favoured)
         outlines, mirrored = outline_similarities(query, [self.shapes[k] for k in likely.numbers])
         ceilings = GRAPH_SHARE * likely.bounds + (1 - GRAPH_SHARE) * outlines
         found: list[ViewMatch] = []
@@ -267,7 +254,7 @@ class ModelDatabase:
         return Ranking(tuple(wanted.best(found)), len(compared))
 
     def _with_rotation(self, query: Shape, found: ViewMatch) -> ViewMatch:
-        own = self.shapes[self._places[found.view.id]].graph
+        own = self.shapes[found.view.id - 1].graph
         likeness = found.likeness
         turn = in_plane_rotation(own, query.graph, likeness.match, mirrored=likeness.mirrored)
         return replace(found, rotation=turn)

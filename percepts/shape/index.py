@@ -1,25 +1,46 @@
 """The index: which views of the database are worth a full comparison.
 
-All nodes of all views lie in one matrix of node features, the topological signatures among them
-(Shokoufandeh et al. 2005). The roots alone, one vector for each view, leave the likeliest views; of
-these, one product with all of a query's nodes gives a bound: every node takes its best partner,
-whoever else wants it and whatever hangs below. The matching of `match.py` can only do worse, so that
-views can be matched best bound first until no bound left can change the result.
+Three sieves, each finer and dearer than the one before:
+
+1. *Roots.* A view's root carries its topological signature vector (Shokoufandeh et al. 2005), how much
+   of the shape lies how far from its middle, and its greatest radius; its outline's spectrum stands
+   beside it. One product of the query's vector with all views' leaves the nearest `NEAREST`.
+2. *Sketches.* Of these, the outlines are compared at a few points at all rotations, and the roots
+   again: that leaves as many as are to be compared in full.
+3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every
+   node takes its best partner, whoever else wants it and whatever hangs below. The matching of
+   `match.py` can only do worse, so that views can be matched best bound first until no bound left
+   can change the result.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.match import WEIGHTS, MatchWeights, embed, node_similarities
+from visup.percepts.shape.records import Records, graph_arrays, node_records
 from visup.percepts.shape.shock_graph import ShockGraph
+from visup.percepts.shape.sketch import SPECTRUM, sketch, sketch_distances, spectra
 
-ROOTS = 400
-"""Views whose nodes are looked at."""
+NEAREST = 600
+"""Views whose sketches are compared."""
+
+KEPT = 4096
+"""Views whose nodes' features are kept in memory at most."""
+
+# What makes squared distances of roots, squared ones of spectra, and distances of sketches comparable:
+# medians over pairs of 39 meshes' views.
+_ROOT_SCALE = 3.75
+_SPECTRUM_SCALE = 0.106
+_SKETCH_SCALE = 0.467
+_ROOT_SHARE = 0.65
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,67 +58,124 @@ class Candidates:
     similar: list[NDArray[np.float32]]
 
 
-class ViewIndex:
-    """Node features of many views, kept together.
+@dataclass(frozen=True, slots=True, eq=False)
+class Summaries:
+    """What the first two sieves need to know of views.
 
-    Args:
-        graphs: The views' shock graphs.
-        weights: How much each node feature counts.
+    Attributes:
+        roots: (V,) records of `records.NODE`.
+        sketches: (V, POINTS, HEIGHTS) int8.
     """
 
-    def __init__(self, graphs: Sequence[ShockGraph], weights: MatchWeights = WEIGHTS) -> None:
+    roots: Records
+    sketches: NDArray[np.int8]
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape]) -> Summaries:
+        """Those of shapes in memory, at least one."""
+        roots = np.concatenate([node_records(s.graph)[:1] for s in shapes])
+        return cls(roots, np.stack([sketch(s.heights) for s in shapes]))
+
+
+class ViewIndex:
+    """What is compared of many views before any is compared in full.
+
+    Args:
+        shapes: The views' shapes; only those of candidates are looked at when `summaries` are given.
+        weights: How much each node feature counts.
+        summaries: Of the same views; from the shapes when None.
+    """
+
+    def __init__(
+        self,
+        shapes: Sequence[Shape],
+        weights: MatchWeights = WEIGHTS,
+        summaries: Summaries | None = None,
+    ) -> None:
         self.weights = weights
-        sizes = np.array([len(g) for g in graphs], dtype=np.intp)
-        self._starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
-        empty = np.empty((0, 1), np.float32)
-        self._features = np.vstack([embed(g, weights) for g in graphs]) if graphs else empty
-        self._roots = np.ascontiguousarray(self._features[self._starts[:-1]])
-        self._shares = np.concatenate([g.weights for g in graphs]) if graphs else empty[:, 0]
+        self._shapes = shapes
+        self._given = summaries
+        self._features: OrderedDict[int, NDArray[np.float32]] = OrderedDict()
 
     def __len__(self) -> int:
-        return len(self._starts) - 1
+        return len(self._shapes)
 
-    def likeliest(self, query: ShockGraph, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-        """The views whose roots (their shapes as a whole) are nearest to the query's.
+    @cached_property
+    def _summaries(self) -> Summaries:
+        return self._given or Summaries.of(self._shapes)
+
+    @cached_property
+    def _roots(self) -> NDArray[np.float32]:
+        """(V, D) vectors of the first sieve: the roots' features, then the outlines' spectra."""
+        parts = [
+            _vectors(self._summaries, slice(k, k + 4096), self.weights)
+            for k in range(0, len(self), 4096)
+        ]
+        return np.concatenate(parts)
+
+    @cached_property
+    def _squares(self) -> NDArray[np.float32]:
+        return np.asarray(np.einsum("ij,ij->i", self._roots, self._roots))
+
+    def likeliest(
+        self, query: Shape, among: NDArray[np.intp] | None, most: int
+    ) -> NDArray[np.intp]:
+        """The views that a shape is likeliest to look like, by roots and sketches.
 
         Args:
-            query: A shock graph.
-            among: Numbers of views, rising.
+            query: A shape.
+            among: Numbers of views, rising; all views when None.
             most: How many are wanted.
 
         Returns:
             At most so many of the numbers, rising.
         """
-        if len(among) <= most:
-            return among
-        root = embed(query, self.weights)[:1]
-        similar = node_similarities(root, self._roots[among])[0]
-        nearest = np.argsort(-similar, kind="stable")[:most]
-        return np.sort(among[nearest])
+        size = len(self) if among is None else len(among)
+        if size <= most:
+            return np.arange(size) if among is None else among
+        own = _vectors(Summaries.of([query]), slice(None), self.weights)[0]
+        apart = self._apart(own, among)
+        if size > (nearest := max(NEAREST, most)):
+            kept = np.argpartition(apart, nearest - 1)[:nearest]
+            kept.sort()
+            among, apart = (kept if among is None else among[kept]), apart[kept]
+        among = np.arange(size) if among is None else among
+        # The spectrum has done its part: the sketches tell the same better.
+        features = len(own) - SPECTRUM
+        squares = ((self._roots[among, :features] - own[:features]) ** 2).sum(axis=1)
+        outlines = sketch_distances(sketch(query.heights), self._summaries.sketches[among])
+        apart = outlines / _SKETCH_SCALE + _ROOT_SHARE * np.sqrt(squares)
+        return np.sort(among[np.argsort(apart, kind="stable")[:most]])
+
+    def _apart(
+        self, own: NDArray[np.float32], among: NDArray[np.intp] | None
+    ) -> NDArray[np.float32]:
+        """Squared distances from views' vectors, but for the query's own square."""
+        if among is None or len(among) == len(self):
+            return self._squares - 2 * (self._roots @ own)
+        return np.asarray(self._squares[among] - 2 * (self._roots[among] @ own))
 
     def candidates(
         self,
-        query: ShockGraph,
-        among: NDArray[np.intp],
+        query: Shape,
+        among: NDArray[np.intp] | None,
         most: int,
         favoured: NDArray[np.intp] | None = None,
     ) -> Candidates:
         """The views that are worth a full comparison.
 
         Args:
-            query: A shock graph.
-            among: Numbers of views, rising.
+            query: A shape.
+            among: Numbers of views, rising; all views when None.
             most: How many are wanted.
-            favoured: Numbers of views of which as many come along, whatever their bounds.
+            favoured: Numbers of views of which as many come along, whatever the others are like.
         """
-        likely = self.likeliest(query, among, ROOTS)
-        extra = among[:0] if favoured is None else self.likeliest(query, favoured, most)
-        likely = np.union1d(likely, extra).astype(np.intp)
-        bounds, similar = self.bounds(query, likely)
-        chosen = np.zeros(len(likely), dtype=bool)
-        chosen[np.argsort(-bounds, kind="stable")[:most]] = True
-        kept = np.flatnonzero(chosen | np.isin(likely, extra))
-        return Candidates(likely[kept], bounds[kept], [similar[k] for k in kept])
+        numbers = self.likeliest(query, among, most)
+        if favoured is not None and len(favoured):
+            extra = self.likeliest(query, favoured, most)
+            numbers = np.union1d(numbers, extra).astype(np.intp)
+        bounds, similar = self.bounds(query.graph, numbers)
+        return Candidates(numbers, bounds, similar)
 
     def bounds(
         self, query: ShockGraph, among: NDArray[np.intp], *, part: bool = False
@@ -115,20 +193,44 @@ class ViewIndex:
         """
         if not len(among):
             return np.empty(0), []
-        rows, starts = self._rows(among)
-        similar = node_similarities(embed(query, self.weights), self._features[rows])
+        features = [self._nodes(int(k)) for k in among]
+        sizes = np.array([len(f) for f in features])
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
+        shares = np.concatenate([self._shapes[int(k)].graph.weights for k in among])
+        similar = node_similarities(embed(query, self.weights), np.concatenate(features))
         roots = similar[0, starts].astype(np.float64)
         inner = similar[1:].copy()
         inner[:, starts] = 0.0
         forth = query.weights[1:] @ np.maximum.reduceat(inner, starts, axis=1)
-        back = np.add.reduceat(inner.max(axis=0) * self._shares[rows], starts)
+        back = np.add.reduceat(inner.max(axis=0) * shares, starts)
         nodes = forth if part else 0.5 * (forth + back)
         bounds = self.weights.root * roots + (1 - self.weights.root) * nodes
-        return bounds, np.split(similar, starts[1:], axis=1)
+        ends = np.append(starts[1:], len(shares)).tolist()
+        return bounds, [similar[:, a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
 
-    def _rows(self, views: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Numbers of the views' nodes, and where each view starts among them."""
-        sizes = self._starts[views + 1] - self._starts[views]
-        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
-        rows = np.repeat(self._starts[views] - starts, sizes) + np.arange(sizes.sum())
-        return rows, starts
+    def _nodes(self, view: int) -> NDArray[np.float32]:
+        """Features of a view's nodes, kept for the next time."""
+        kept = self._features.get(view)
+        if kept is None:
+            kept = embed(self._shapes[view].graph, self.weights)
+            self._features[view] = kept
+            if len(self._features) > KEPT:
+                self._features.popitem(last=False)
+        return kept
+
+
+def _vectors(summaries: Summaries, part: slice, weights: MatchWeights) -> NDArray[np.float32]:
+    """Vectors of the first sieve for some of the views: roots' features, then spectra, both scaled."""
+    features = embed(_roots_as_nodes(summaries.roots[part]), weights)
+    waves = spectra(summaries.sketches[part]) / np.float32(_SPECTRUM_SCALE**0.5)
+    return np.hstack([features / np.float32(_ROOT_SCALE**0.5), waves])
+
+
+def _roots_as_nodes(roots: Records) -> ShockGraph:
+    """Roots of many views as the nodes of one graph: features of nodes do not depend on edges."""
+    return ShockGraph(
+        edges=np.empty((0, 2), dtype=np.int16),
+        below=np.empty((0, 0), dtype=bool),
+        key=b"",
+        **graph_arrays(roots),
+    )

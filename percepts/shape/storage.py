@@ -1,7 +1,10 @@
-"""The database file: what stands in it, how it is written whole, and what is refused on reading.
+"""The database file: how it is written whole, and what is refused on reading.
 
-One SQLite file, so that opening it reads a few pages only. Arrays are raw little-endian bytes with their
-type and shape beside them, checked against what each field must be before anything is allocated.
+One SQLite file. What is needed of every view (its model, direction, root and sketch) stands in a few
+blocks, so that opening a hundred thousand views reads some megabytes; each shape stands in a row of its
+own and is read when it is asked for. All bytes have a check sum: what is read is what was written.
+
+Read next: `catalogue.py`, which is what the rest of the code sees of a file.
 """
 
 from __future__ import annotations
@@ -10,101 +13,68 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+import zlib
+from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from visup.agent.errors import DatabaseError
-from visup.percepts.shape.compare import Shape
-from visup.percepts.shape.shock_graph import (
-    CONTEXT,
-    MOST_NODES,
-    PROFILE,
-    ShockGraph,
-    frozen_graph,
+from visup.percepts.shape.records import (
+    ALSO,
+    LAYOUT,
+    VIEW,
+    NewView,
+    NotAsExpectedError,
+    Records,
+    ShapeBytes,
+    check_nodes,
+    encode,
+    node_records,
+    records,
 )
-from visup.percepts.shape.signature import LENGTH
+from visup.percepts.shape.sketch import sketch
 
 APPLICATION_ID = 0x76697375
 """'visu' in ASCII, in the header of every database file."""
 
-VERSION = 1
+VERSION = 2
 """Version of the tables; a newer file is refused, since its meaning is not known."""
 
-MOST_POINTS = 640
-"""Points of a stored outline."""
+BLOCK = 1024
+"""Views of a block at most."""
 
-_TABLES = """
-CREATE TABLE views (
-    id INTEGER PRIMARY KEY, name TEXT NOT NULL, number INTEGER NOT NULL,
-    dx REAL, dy REAL, dz REAL, area REAL, cut INTEGER NOT NULL, UNIQUE (name, number));
-CREATE TABLE arrays (
-    view INTEGER NOT NULL REFERENCES views, field TEXT NOT NULL,
-    dtype TEXT NOT NULL, rows INTEGER NOT NULL, columns INTEGER NOT NULL, data BLOB NOT NULL,
-    PRIMARY KEY (view, field));
-"""
+MOST_NAME = 200
+"""Characters of a model's name at most."""
 
-_N = MOST_NODES + 1
-# Half precision where it is far finer than a silhouette is known: an outline of unit area to 0.0005.
-_FIELDS: dict[str, tuple[str, int, int]] = {
-    # field: (dtype on disk, most rows, columns; 0 columns for a vector)
-    "contour": ("<f2", MOST_POINTS, 2),
-    "kinds": ("|i1", _N, 0),
-    "edges": ("<i2", 2 * _N, 2),
-    "weights": ("<f4", _N, 0),
-    "lengths": ("<f4", _N, 0),
-    "profiles": ("<f2", _N, PROFILE),
-    "contexts": ("<f2", _N, CONTEXT),
-    "positions": ("<f4", _N, 2),
-    "directions": ("<f2", _N, 2),
-    "signatures": ("<f4", _N, LENGTH),
-}
-_GRAPH_FIELDS = tuple(f for f in _FIELDS if f != "contour")
+_TABLES = (
+    "CREATE TABLE layout (part TEXT PRIMARY KEY, meaning TEXT NOT NULL)",
+    "CREATE TABLE models (code INTEGER PRIMARY KEY, name TEXT NOT NULL, crc INTEGER NOT NULL)",
+    "CREATE TABLE blocks (number INTEGER PRIMARY KEY, views BLOB NOT NULL, also BLOB NOT NULL, "
+    "crc INTEGER NOT NULL)",
+    "CREATE TABLE shapes (view INTEGER PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
+    "contour BLOB NOT NULL, crc INTEGER NOT NULL)",
+)
+_MOST_BYTES = 1 << 24
 _BUILD_HINT = "build it anew with 'visup models build'"
 
 
-@dataclass(frozen=True, slots=True)
-class View:
-    """One silhouette of a model.
-
-    Attributes:
-        id: Number within the database, from 1.
-        name: Name of the model.
-        number: Number of the view within the model, from 0.
-        direction: Unit vector from the object to the viewer in the model's frame (roll: the model's +z
-            is up in the picture, +y when looking along z), or None when it is not known.
-        area: Area of the silhouette in model units squared, or None when the size is not known.
-        cut: Whether the picture's border cuts the silhouette.
-    """
-
-    id: int
-    name: str
-    number: int
-    direction: tuple[float, float, float] | None
-    area: float | None
-    cut: bool
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class NewView:
-    """A view to be stored; fields as in `View`, with its shape.
+class Contents:
+    """All that stands in a file but the shapes.
 
     Attributes:
-        name: Name of the model.
-        direction: Unit vector from the object to the viewer, or None.
-        area: Model units squared, or None.
-        shape: What it looks like.
+        names: Names of the models, in the order of the file.
+        views: (V,) records of `VIEW`.
+        also: (A,) records of `ALSO`, rising by view (from 0).
     """
 
-    name: str
-    direction: tuple[float, float, float] | None
-    area: float | None
-    shape: Shape
+    names: tuple[str, ...]
+    views: Records
+    also: Records
 
 
 def write_new(path: Path, views: Iterable[NewView]) -> None:
@@ -114,10 +84,13 @@ def write_new(path: Path, views: Iterable[NewView]) -> None:
         DatabaseError: The file cannot be written; nothing is left behind.
     """
     with _replacing(path) as temporary, closing(sqlite3.connect(temporary)) as file:
+        file.execute("PRAGMA page_size = 8192")
         file.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         file.execute(f"PRAGMA user_version = {VERSION}")
-        file.executescript(_TABLES)
-        _insert(file, views)
+        for table in _TABLES:
+            file.execute(table)
+        file.executemany("INSERT INTO layout VALUES (?, ?)", LAYOUT.items())
+        _insert(file, Contents((), np.empty(0, VIEW), np.empty(0, ALSO)), views)
 
 
 def write_more(path: Path, views: Iterable[NewView]) -> None:
@@ -126,12 +99,11 @@ def write_more(path: Path, views: Iterable[NewView]) -> None:
     Raises:
         DatabaseError: The file is no database of this version, or cannot be written.
     """
-    with closing(open_checked(path)):
-        pass
+    before = read_contents(path)
     with _replacing(path) as temporary:
         shutil.copyfile(path, temporary)
         with closing(sqlite3.connect(temporary)) as file:
-            _insert(file, views)
+            _insert(file, before, views)
 
 
 @contextmanager
@@ -157,34 +129,66 @@ def _replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _insert(file: sqlite3.Connection, views: Iterable[NewView]) -> None:
+def _insert(file: sqlite3.Connection, before: Contents, views: Iterable[NewView]) -> None:
+    """Append views in blocks; models new to the file get the next codes."""
+    codes = {name: code for code, name in enumerate(before.names)}
+    numbers = dict(enumerate(np.bincount(before.views["model"], minlength=len(codes)).tolist()))
+    (blocks,) = file.execute("SELECT coalesce(max(number), -1) + 1 FROM blocks").fetchone()
+    start, coming = len(before.views), iter(views)
     with file:
-        for view in views:
-            (number,) = file.execute(
-                "SELECT coalesce(max(number), -1) + 1 FROM views WHERE name = ?", (view.name,)
-            ).fetchone()
-            dx, dy, dz = view.direction or (None, None, None)
-            row = (view.name, number, dx, dy, dz, view.area, int(view.shape.cut))
-            new = file.execute(
-                "INSERT INTO views (name, number, dx, dy, dz, area, cut) VALUES (?,?,?,?,?,?,?)",
-                row,
-            ).lastrowid
-            file.executemany("INSERT INTO arrays VALUES (?,?,?,?,?,?)", _array_rows(new, view))
+        while new := list(islice(coming, BLOCK)):
+            for view in new:
+                if view.name not in codes:
+                    codes[view.name] = code = len(codes)
+                    known = (code, view.name, _sum(code, view.name.encode()))
+                    file.execute("INSERT INTO models VALUES (?, ?, ?)", known)
+            rows, also = _block(new, start, codes, numbers)
+            data = (rows.tobytes(), also.tobytes())
+            row = (blocks, *data, _sum(blocks, *data))
+            file.execute("INSERT INTO blocks VALUES (?, ?, ?, ?)", row)
+            file.executemany("INSERT INTO shapes VALUES (?, ?, ?, ?, ?)", _shape_rows(new, start))
+            start, blocks = start + len(new), blocks + 1
 
 
-def _array_rows(number: int | None, view: NewView) -> Iterator[tuple[Any, ...]]:
-    for field, (dtype, _, _) in _FIELDS.items():
-        value = view.shape.contour if field == "contour" else getattr(view.shape.graph, field)
-        array = np.ascontiguousarray(value, dtype=dtype)
-        columns = array.shape[1] if array.ndim == 2 else 0
-        yield number, field, dtype, len(array), columns, array.tobytes()
+def _block(
+    new: list[NewView], start: int, codes: dict[str, int], numbers: dict[int, int]
+) -> tuple[Records, Records]:
+    """The records of some views; `numbers` counts the views of each model."""
+    rows = np.zeros(len(new), dtype=VIEW)
+    also = []
+    for k, view in enumerate(new):
+        code = codes[view.name]
+        rows[k]["model"], rows[k]["number"] = code, numbers.get(code, 0)
+        numbers[code] = numbers.get(code, 0) + 1
+        rows[k]["direction"] = view.direction or (np.nan, np.nan, np.nan)
+        rows[k]["area"] = np.nan if view.area is None else view.area
+        rows[k]["smoothing"], rows[k]["cut"] = view.smoothing, view.shape.cut
+        rows[k]["root"] = node_records(view.shape.graph)[0]
+        rows[k]["sketch"] = sketch(view.shape.heights)
+        also += [(start + k, d) for d in view.also]
+    return rows, np.array(also, dtype=ALSO)
+
+
+def _shape_rows(new: list[NewView], start: int) -> Iterator[tuple[int, bytes, bytes, bytes, int]]:
+    for k, view in enumerate(new):
+        data = encode(view.shape)
+        parts = (data.nodes, data.edges, data.contour)
+        yield start + k, *parts, _sum(start + k, *parts)
+
+
+def _sum(number: int, *parts: bytes) -> int:
+    """Check sum of a row; its number is in it, so that rows cannot change places."""
+    total = number
+    for part in parts:
+        total = zlib.crc32(part, total)
+    return total
 
 
 def open_checked(path: Path) -> sqlite3.Connection:
     """Open a database for reading, after checking that it is one.
 
     Raises:
-        DatabaseError: Missing, not a database, truncated, or of another version.
+        DatabaseError: Missing, not a database, truncated, or of another version or layout.
     """
     if not path.is_file():
         raise DatabaseError(
@@ -195,9 +199,19 @@ def open_checked(path: Path) -> sqlite3.Connection:
         )
     _check_header(path)
     try:
-        return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+        file = sqlite3.connect(
+            f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False
+        )
     except sqlite3.Error as e:
         raise _unreadable(path, e) from e
+    try:
+        _check_tables(path, file)
+    except BaseException as e:
+        file.close()
+        if isinstance(e, sqlite3.Error):
+            raise _unreadable(path, e) from e
+        raise
+    return file
 
 
 def _check_header(path: Path) -> None:
@@ -237,111 +251,150 @@ def _check_header(path: Path) -> None:
         )
 
 
+def _check_tables(path: Path, file: sqlite3.Connection) -> None:
+    """Only tables as we write them: a view or a trigger of a foreign file could compute for ever."""
+    file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MOST_BYTES)
+    file.execute("PRAGMA trusted_schema = OFF")
+    file.execute("PRAGMA cell_size_check = ON")
+    query = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 50"
+    found = sorted(str(sql) for (sql,) in file.execute(query))
+    if found != sorted(_TABLES):
+        raise damaged(path, "its tables are not those of a model database", "; ".join(_TABLES))
+    layout = dict(file.execute("SELECT part, meaning FROM layout LIMIT 50").fetchall())
+    if layout != LAYOUT:
+        raise DatabaseError(
+            "this model database is of another layout",
+            where=str(path),
+            expected=str(LAYOUT),
+            hint=_BUILD_HINT,
+        )
+
+
+def read_contents(path: Path) -> Contents:
+    """All that stands in a database but the shapes.
+
+    Raises:
+        DatabaseError: As `open_checked`; or what stands there is not as it should be.
+    """
+    with closing(open_checked(path)) as file:
+        try:
+            names = _read_names(file)
+            views, also = _read_blocks(file)
+            _check_views(views, also, len(names))
+        except NotAsExpectedError as e:
+            raise damaged(path, str(e), "what 'visup models' writes") from e
+        except (sqlite3.Error, UnicodeDecodeError) as e:
+            raise _unreadable(path, e) from e
+    return Contents(names, views, also)
+
+
+def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:
+    names: list[str] = []
+    for code, name, crc in file.execute("SELECT code, name, crc FROM models ORDER BY code"):
+        # A damaged tree may lead round in circles: codes that do not count up end the reading.
+        if code != len(names) or not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
+            raise NotAsExpectedError(f"model {len(names)} without a name")
+        if crc != _sum(code, name.encode()):
+            raise NotAsExpectedError(f"a wrong check sum of model {code}")
+        names.append(name)
+    if len(set(names)) < len(names):
+        raise NotAsExpectedError("two models of one name")
+    return tuple(names)
+
+
+def _read_blocks(file: sqlite3.Connection) -> tuple[Records, Records]:
+    views, also = [np.empty(0, VIEW)], [np.empty(0, ALSO)]
+    query = "SELECT number, views, also, crc FROM blocks ORDER BY number"
+    for expected, (number, data, further, crc) in enumerate(file.execute(query)):
+        if number != expected:
+            raise NotAsExpectedError(f"block {expected} is missing")
+        rows = records(data, VIEW, 1, BLOCK, f"views in block {number}")
+        others = records(further, ALSO, 0, BLOCK * 10_000, f"directions in block {number}")
+        if crc != _sum(number, data, further):
+            raise NotAsExpectedError(f"a wrong check sum of block {number}")
+        views.append(rows)
+        also.append(others)
+    return np.concatenate(views), np.concatenate(also)
+
+
+def _check_views(views: Records, also: Records, models: int) -> None:
+    """Refuse views that cannot be, whoever has computed their check sums.
+
+    Raises:
+        NotAsExpectedError: There are some.
+    """
+    if len(views) and int(views["model"].max()) >= models:
+        raise NotAsExpectedError("a view of no model")
+    expected = _numbers_within(views["model"])
+    if not np.array_equal(views["number"], expected):
+        raise NotAsExpectedError("views that are not numbered")
+    directions = np.concatenate([views["direction"], also["direction"]])
+    length = np.linalg.norm(directions, axis=1)
+    unknown = np.isnan(directions).all(axis=1)
+    unknown[len(views) :] = False
+    area, smoothing = views["area"], views["smoothing"]
+    for sound, what in (
+        (unknown | (np.abs(length - 1) < 1e-3), "a direction that is no unit vector"),
+        (np.isnan(area) | ((area > 0) & np.isfinite(area)), "an area that cannot be"),
+        ((smoothing >= 0) & (smoothing < 1), "a smoothing that cannot be"),
+        (views["cut"] <= 1, "a mark of a cut that is none"),
+        (also["view"] < len(views), "a direction of no view"),
+        (np.diff(also["view"].astype(np.int64)) >= 0, "directions in disorder"),
+    ):
+        if not bool(sound.all()):
+            raise NotAsExpectedError(what)
+    check_nodes(views["root"])
+
+
+def _numbers_within(models: Records) -> Records:
+    """For each view how many views of its model come before it."""
+    order = np.argsort(models, kind="stable")
+    counts = np.bincount(models.astype(np.intp)) if len(models) else np.empty(0, np.intp)
+    out = np.empty(len(models), dtype=np.intp)
+    out[order] = np.arange(len(models)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return out
+
+
+def read_shape(path: Path, file: sqlite3.Connection, view: int) -> ShapeBytes:
+    """The bytes of one shape.
+
+    Args:
+        path: The file, for messages.
+        file: From `open_checked`.
+        view: Number of the view in the file, from 0.
+
+    Raises:
+        DatabaseError: They are not there, or not those that were written.
+    """
+    query = "SELECT nodes, edges, contour, crc FROM shapes WHERE view = ?"
+    try:
+        row = file.execute(query, (view,)).fetchone()
+    except (sqlite3.Error, UnicodeDecodeError) as e:
+        raise _unreadable(path, e) from e
+    if row is None:
+        raise damaged(path, f"view {view + 1} without a shape", "a shape for each view")
+    *parts, crc = row
+    if not all(isinstance(p, bytes) for p in parts) or crc != _sum(view, *parts):
+        raise damaged(
+            path, f"a wrong check sum of the shape of view {view + 1}", "what was written"
+        )
+    return ShapeBytes(*parts)
+
+
+def damaged(path: Path, found: str, expected: str) -> DatabaseError:
+    """The error of a file that is a database, but not a sound one."""
+    return DatabaseError(
+        f"this model database is damaged: {found}",
+        where=str(path),
+        expected=expected,
+        hint=_BUILD_HINT,
+    )
+
+
 def _unreadable(path: Path, error: object) -> DatabaseError:
     return DatabaseError(
         f"this is not a model database that can be read ({error})",
         where=str(path),
         expected="a file made by 'visup models build'",
-        hint=_BUILD_HINT,
-    )
-
-
-def read_views(path: Path) -> tuple[View, ...]:
-    """What stands in a database, without its arrays.
-
-    Raises:
-        DatabaseError: As `open_checked`; or rows that are not as they should be.
-    """
-    query = "SELECT id, name, number, dx, dy, dz, area, cut FROM views ORDER BY id"
-    with closing(open_checked(path)) as file:
-        try:
-            return tuple(_view(row, path) for row in file.execute(query))
-        except (sqlite3.Error, UnicodeDecodeError) as e:
-            raise _unreadable(path, e) from e
-
-
-def _view(row: tuple[Any, ...], path: Path) -> View:
-    number, name, within, dx, dy, dz, area, cut = row
-    direction = None if dx is None else (dx, dy, dz)
-    sound = isinstance(name, str) and isinstance(within, int) and cut in (0, 1)
-    sound = sound and (area is None or (isinstance(area, float) and 0 < area < float("inf")))
-    if direction is not None:
-        sound = sound and all(isinstance(d, float) and abs(d) <= 1.001 for d in direction)
-    if not sound:
-        raise _damaged(path, f"view {number}", "a name, a number, a direction, an area")
-    return View(number, name, within, direction, area, bool(cut))
-
-
-def read_shapes(path: Path, views: Sequence[View]) -> tuple[Shape, ...]:
-    """The shapes of views.
-
-    Raises:
-        DatabaseError: As `open_checked`; or arrays that are missing or not as they should be.
-    """
-    query = "SELECT view, field, dtype, rows, columns, data FROM arrays"
-    found: dict[int, dict[str, NDArray[Any]]] = {}
-    with closing(open_checked(path)) as file:
-        try:
-            for view, *rest in file.execute(query):
-                field, array = _checked_array(path, view, rest)
-                found.setdefault(view, {})[field] = array
-        except (sqlite3.Error, UnicodeDecodeError) as e:
-            raise _unreadable(path, e) from e
-    return tuple(_checked_shape(path, v, found.get(v.id, {})) for v in views)
-
-
-def _checked_array(path: Path, view: int, row: Iterable[Any]) -> tuple[str, NDArray[Any]]:
-    """An array from its row, when type, shape and length are as its field asks."""
-    field, dtype, rows, columns, data = row
-    if field not in _FIELDS:
-        raise _damaged(path, f"view {view}: field {field!r}", f"one of {', '.join(_FIELDS)}")
-    kind, most, width = _FIELDS[field]
-    expected = f"{kind} of at most {most} rows and {width} columns"
-    if dtype != kind or columns != width or not isinstance(rows, int) or not 0 <= rows <= most:
-        raise _damaged(path, f"view {view}: {field} of {dtype} with {rows} x {columns}", expected)
-    size = rows * max(1, width) * np.dtype(kind).itemsize
-    if not isinstance(data, bytes) or len(data) != size:
-        raise _damaged(path, f"view {view}: {field} of another length", f"{size} bytes")
-    array = np.frombuffer(data, dtype=kind)
-    if array.dtype.kind == "f" and not (np.abs(array) < 1e4).all():
-        raise _damaged(
-            path, f"view {view}: {field} with unlikely numbers", "magnitudes below 10000"
-        )
-    if array.dtype.kind == "f":
-        array = array.astype(np.float32)
-    return field, array.reshape(rows, width) if width else array
-
-
-def _checked_shape(path: Path, view: View, arrays: dict[str, NDArray[Any]]) -> Shape:
-    """A shape from its arrays, when they are all there and belong together."""
-    missing = [f for f in _FIELDS if f not in arrays]
-    if missing:
-        raise _damaged(path, f"view {view.id} without {', '.join(missing)}", "all arrays of a view")
-    if len(arrays["contour"]) < 8:
-        raise _damaged(path, f"view {view.id} with a degenerate outline", "at least 8 points")
-    return Shape(arrays["contour"], _checked_graph(path, view.id, arrays), view.cut)
-
-
-def _checked_graph(path: Path, view: int, arrays: dict[str, NDArray[Any]]) -> ShockGraph:
-    """A graph from its arrays, when they belong together."""
-    size = len(arrays["kinds"])
-    lengths = {len(arrays[f]) for f in _GRAPH_FIELDS if f != "edges"}
-    edges, kinds = arrays["edges"], arrays["kinds"]
-    sound = lengths == {size} and size >= 2 and bool(((kinds >= 0) & (kinds <= 4)).all())
-    # Parents before children: the graph has no cycle.
-    sound = sound and bool(((edges[:, 0] >= 0) & (edges[:, 0] < edges[:, 1])).all())
-    sound = sound and bool((edges < size).all())
-    positive = ("weights", "lengths", "profiles", "contexts")
-    sound = sound and all(bool((arrays[f] >= 0).all()) for f in positive)
-    if not sound:
-        raise _damaged(path, f"view {view} with a graph that is none", "a rooted acyclic graph")
-    return frozen_graph(**{f: arrays[f] for f in _GRAPH_FIELDS})
-
-
-def _damaged(path: Path, found: str, expected: str) -> DatabaseError:
-    return DatabaseError(
-        f"this model database is damaged: {found}",
-        where=str(path),
-        expected=expected,
         hint=_BUILD_HINT,
     )

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from visup.percepts.shape.compare import Shape, shape_of
 from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.records import NewView
 from visup.percepts.shape.silhouette import normalise
-from visup.percepts.shape.storage import NewView
 
 Mask = NDArray[np.bool_]
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 import sqlite3
+import zlib
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,8 @@ from visup.percepts.shape.build import (
 )
 from visup.percepts.shape.compare import compare
 from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.records import NODE, VIEW
+from visup.percepts.shape.shock_graph import ShockGraph
 from visup.percepts.shape.storage import APPLICATION_ID, VERSION
 from visup.percepts.shape.views import load_mesh, render_views
 
@@ -159,28 +163,109 @@ def truncate(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
+def check_sum(number: int, *parts: bytes) -> int:
+    for part in parts:
+        number = zlib.crc32(part, number)
+    return number
+
+
+def in_block(field: str, value: object) -> Callable[[Path], None]:
+    """Every view gets another value, and the block a check sum that agrees."""
+
+    def damage(path: Path) -> None:
+        with closing(sqlite3.connect(path)) as file, file:
+            for number, data, also in file.execute("SELECT number, views, also FROM blocks"):
+                rows = np.frombuffer(data, VIEW).copy()
+                part = rows["root"] if field in (NODE.names or ()) else rows
+                part[field] = value
+                row = (rows.tobytes(), check_sum(number, rows.tobytes(), also), number)
+                file.execute("UPDATE blocks SET views = ?, crc = ? WHERE number = ?", row)
+
+    return damage
+
+
+def in_shape(part: str, change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+    """The first view's shape gets another part, and a check sum that agrees."""
+
+    def damage(path: Path) -> None:
+        with closing(sqlite3.connect(path)) as file, file:
+            columns = ("nodes", "edges", "contour")
+            row = file.execute("SELECT nodes, edges, contour FROM shapes WHERE view = 0").fetchone()
+            parts = dict(zip(columns, row, strict=True))
+            parts[part] = change(parts[part])
+            file.execute(
+                "UPDATE shapes SET nodes = ?, edges = ?, contour = ?, crc = ? WHERE view = 0",
+                (*parts.values(), check_sum(0, *parts.values())),
+            )
+
+    return damage
+
+
+def nodes_with(field: str, value: object) -> Callable[[bytes], bytes]:
+    def change(data: bytes) -> bytes:
+        nodes = np.frombuffer(data, NODE).copy()
+        nodes[field][1:] = value
+        return nodes.tobytes()
+
+    return change
+
+
+def turn_into_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def exchange(path: Path) -> None:
+    """Two sound rows change places."""
+    with closing(sqlite3.connect(path)) as file, file:
+        for a, b in ((0, 77), (1, 0), (77, 1)):
+            file.execute(f"UPDATE shapes SET view = {b} WHERE view = {a}")
+
+
+ENDLESS = (
+    "DROP TABLE models; CREATE VIEW models AS WITH RECURSIVE c(code) AS "
+    "(SELECT 0 UNION ALL SELECT code + 1 FROM c) SELECT code, 'x' || code AS name, 0 AS crc FROM c"
+)
+
 REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
     "missing": (lambda p: p.unlink(), "no such model database"),
+    "a folder": (turn_into_folder, "no such model database"),
     "a text": (lambda p: p.write_text("this is no database at all\n" * 100), "can be read"),
     "empty": (lambda p: p.write_bytes(b""), "can be read"),
     "foreign": (set_pragma("application_id", 7), "not a model database"),
     "newer": (set_pragma("user_version", VERSION + 1), f"of version {VERSION + 1}"),
     "older": (set_pragma("user_version", 0), "of version 0"),
     "truncated": (truncate, "truncated"),
-    "no arrays": (run_sql("DELETE FROM arrays"), "without contour"),
-    "no table": (run_sql("DROP TABLE arrays"), "can be read"),
-    "huge": (run_sql("UPDATE arrays SET rows = 1000000000"), "with 1000000000"),
-    "negative": (run_sql("UPDATE arrays SET rows = -1"), "with -1"),
-    "other type": (run_sql("UPDATE arrays SET dtype = 'O'"), "of O"),
-    "other field": (run_sql("UPDATE OR REPLACE arrays SET field = 'x'"), "'x'"),
-    "short data": (run_sql("UPDATE arrays SET data = x'00'"), "another length"),
-    "text data": (run_sql("UPDATE arrays SET data = 'text'"), "another length"),
-    "cycle": (
-        run_sql("UPDATE arrays SET data = zeroblob(length(data)) WHERE field = 'edges'"),
-        "a graph that is none",
-    ),
-    "bad direction": (run_sql("UPDATE views SET dx = 9e9"), "damaged: view 1"),
-    "bad area": (run_sql("UPDATE views SET area = -1.0"), "damaged: view 1"),
+    "other layout": (run_sql("UPDATE layout SET meaning = '<f8' WHERE part = 'point'"), "layout"),
+    "no shapes": (run_sql("DELETE FROM shapes"), "view 1 without a shape"),
+    "no table": (run_sql("DROP TABLE shapes"), "its tables"),
+    "endless": (lambda p: [run_sql(sql)(p) for sql in ENDLESS.split("; ")], "its tables"),
+    "other bytes": (run_sql("UPDATE blocks SET views = zeroblob(length(views))"), "check sum"),
+    "bomb": (run_sql("UPDATE blocks SET views = zeroblob(40000000)"), "can be read"),
+    "huge": (run_sql(f"UPDATE blocks SET views = zeroblob({VIEW.itemsize * 9999})"), "9999 views"),
+    "short": (run_sql("UPDATE blocks SET views = x'00'"), "length"),
+    "text": (run_sql("UPDATE blocks SET views = 'text'"), "length"),
+    "no block": (run_sql("UPDATE blocks SET number = 7"), "block 0 is missing"),
+    "other name": (run_sql("UPDATE models SET name = 'x' WHERE code = 1"), "check sum of model 1"),
+    "no name": (run_sql("UPDATE models SET name = x'ff' WHERE code = 0"), "model 0 without a name"),
+    "no model": (in_block("model", 99), "a view of no model"),
+    "bad number": (in_block("number", 3), "not numbered"),
+    "bad direction": (in_block("direction", 9e9), "no unit vector"),
+    "bad area": (in_block("area", -1.0), "an area"),
+    "bad mark": (in_block("cut", 7), "mark of a cut"),
+    "bad smoothing": (in_block("smoothing", np.nan), "a smoothing"),
+    "bad root": (in_block("profiles", np.nan), "profiles"),
+    "exchanged": (exchange, "check sum of the shape"),
+    "other root": (in_shape("nodes", lambda b: b[NODE.itemsize :] + b[: NODE.itemsize]), "root"),
+    "bad kind": (in_shape("nodes", nodes_with("kinds", 9)), "no known kind"),
+    "negative": (in_shape("nodes", nodes_with("lengths", -1.0)), "negative lengths"),
+    "infinite": (in_shape("nodes", nodes_with("positions", np.inf)), "positions"),
+    "many nodes": (in_shape("nodes", lambda b: b * 99), "nodes"),
+    "no outline": (in_shape("contour", lambda b: b""), "0 points"),
+    "no extent": (in_shape("contour", lambda b: bytes(len(b))), "an outline that is none"),
+    "cycle": (in_shape("edges", lambda b: bytes(len(b))), "a graph that is none"),
+    "far edge": (in_shape("edges", lambda b: b[:-2] + b"\x70\x00"), "a graph that is none"),
+    "odd edges": (in_shape("edges", lambda b: b[:-1]), "length"),
 }
 
 
@@ -193,23 +278,27 @@ def test_a_file_that_is_not_as_it_should_be_is_refused(
     shutil.copyfile(stored, path)
     damage(path)
     with pytest.raises(DatabaseError) as refused:
-        _ = ModelDatabase.open(path).shapes
+        _ = list(ModelDatabase.open(path).shapes)
     assert message in refused.value.what
     assert str(path) in str(refused.value)
     assert refused.value.hint
 
 
-def test_random_damage_is_refused_or_harmless(stored: Path, tmp_path: Path) -> None:
-    sound = stored.read_bytes()
-    rng = np.random.default_rng(5)
-    path = tmp_path / "damaged.db"
-    for _ in range(60):
-        content = bytearray(sound)
-        for at in rng.integers(0, len(content), 20):
-            content[at] = rng.integers(0, 256)
-        path.write_bytes(content)
-        with suppress(DatabaseError):
-            ModelDatabase.open(path).query(ZOO["star"])
+def test_views_and_shapes_are_sequences_like_any_other(stored: Path) -> None:
+    database = ModelDatabase.open(stored)
+    views = list(database.views)
+    assert database.views[-1] == views[-1]
+    assert database.views[1:3] == tuple(views[1:3])
+    assert [v.id for v in database.views] == list(range(1, len(ZOO) + 1))
+    assert database.shapes[0] is database.shapes[0]
+    assert database.shapes[:2] == (database.shapes[0], database.shapes[1])
+    with pytest.raises(IndexError):
+        _ = database.views[len(ZOO)]
+
+
+def test_all_that_a_node_carries_is_stored() -> None:
+    derived = {"edges", "below", "key"}
+    assert {f.name for f in dataclasses.fields(ShockGraph)} - derived == set(NODE.names or ())
 
 
 def test_a_failed_write_leaves_the_old_file(stored: Path, tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ class _Shared:
 
 def _set_shapes(shapes: list[Shape]) -> None:
     _Shared.shapes = shapes
-    _Shared.index = ViewIndex([s.graph for s in shapes])
+    _Shared.index = ViewIndex(shapes)
     for shape in shapes:
         _ = shape.heights
 
@@ -171,13 +171,13 @@ def _pruning(
     shapes: list[Shape], both: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """For each query the share of the others that the index lets through, and 1 where it loses the best."""
-    index = ViewIndex([s.graph for s in shapes])
+    index = ViewIndex(shapes)
     everyone = np.arange(len(shapes))
     most = candidates_wanted(len(shapes) - 1)
     compared, lost = np.zeros(len(shapes)), np.zeros(len(shapes))
     for i, shape in enumerate(shapes):
         others = everyone[everyone != i]
-        found = index.candidates(shape.graph, others, most).numbers
+        found = index.candidates(shape, others, most).numbers
         compared[i] = len(found) / len(others)
         lost[i] = float(others[int(np.argmax(both[i, others]))] not in found)
     return compared, lost

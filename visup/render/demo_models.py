@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.shape.build import mesh_views, silhouette_views
 from visup.percepts.shape.database import ModelDatabase
-from visup.percepts.shape.storage import NewView
+from visup.percepts.shape.records import NewView
 from visup.render.library import shipped_scenario
 from visup.render.meshes import mesh
 from visup.render.renderer import Renderer
