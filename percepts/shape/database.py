@@ -171,7 +171,8 @@ class ModelDatabase:
             threshold: Least similarity.
             restrict: Names that alone are searched; all when None.
             try_first: Names whose likeliest views are compared whatever the index says.
-            budget: Share of the views that may be compared in full; at least 16 are.
+            budget: Share of the views that may be compared in full: at least 16 are, and at most
+                `CANDIDATES`. With 1, all are.
 
         Returns:
             The matches, best first; empty when the mask shows nothing.
@@ -286,6 +287,8 @@ class _Wanted:
 
 def candidates_wanted(views: int, budget: float = 0.1) -> int:
     """How many of so many views are compared in full: a share of them, but 16 to `CANDIDATES`."""
+    if budget >= 1:
+        return views
     return int(min(CANDIDATES, max(16, budget * views)))
 
 

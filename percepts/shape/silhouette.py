@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.errors import SettingsError
+
 SMOOTHING = 0.015
 """Standard deviation of the Gaussian, as a share of the square root of the area."""
 
@@ -66,13 +68,16 @@ def normalise(
         The silhouette of the largest connected part with its holes filled, or None when nothing of at
         least `LEAST_AREA` pixels is there.
 
+    Raises:
+        SettingsError: The mask is no picture of yes and no.
+
     Example:
         >>> disc = np.hypot(*np.mgrid[-30:31, -30:31]) <= 25
         >>> s = normalise(disc)
         >>> round(s.unit), np.round(np.hypot(*s.contour.T).mean(), 2) == round(np.pi ** -0.5, 2)
         (44, np.True_)
     """
-    cropped = _crop(np.ascontiguousarray(mask, dtype=np.uint8))
+    cropped = _crop(_as_bytes(mask))
     if cropped is None:
         return None
     part, corner, shrink = cropped
@@ -86,6 +91,19 @@ def normalise(
         return None
     unscaled = (outline + 0.5) / zoom - 0.5 - pad + np.asarray(inset)
     return _in_units((unscaled + 0.5) / shrink - 0.5 + np.asarray(corner), area / shrink**2, cut)
+
+
+def _as_bytes(mask: NDArray[np.generic]) -> NDArray[np.uint8]:
+    """A mask as bytes that are zero outside; whole numbers count as yes when they are not zero."""
+    given = np.asarray(mask)
+    if given.ndim != 2 or given.dtype.kind not in "biu":
+        raise SettingsError(
+            f"a mask of {given.ndim} dimensions and type {given.dtype} has no shape",
+            expected="a mask (H, W) of bool",
+        )
+    if given.dtype.itemsize > 1:
+        given = given != 0
+    return np.ascontiguousarray(given).view(np.uint8)
 
 
 def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], float] | None:

@@ -25,6 +25,7 @@ SPECTRUM = FREQUENCIES * ((HEIGHTS + 1) // 2)
 """Entries of a spectrum."""
 
 _UNIT = 127.0
+_TURNS = (np.arange(POINTS)[:, None] + np.arange(POINTS)) % POINTS
 _BETA = 0.2
 
 
@@ -76,10 +77,8 @@ def sketch_distances(query: NDArray[np.int8], sketches: NDArray[np.int8]) -> NDA
     """
     own, others = query.astype(np.float32) / _UNIT, sketches.astype(np.float32) / np.float32(_UNIT)
     # The mirror image has both axes reversed.
-    turned = [np.roll(side, k, axis=0) for side in (own, own[::-1, ::-1]) for k in range(POINTS)]
-    alike = (others.reshape(len(others), -1) @ np.stack(turned).reshape(2 * POINTS, -1).T).max(
-        axis=1
-    )
+    turned = np.stack([own, own[::-1, ::-1]])[:, _TURNS].reshape(2 * POINTS, -1)
+    alike = (others.reshape(len(others), -1) @ turned.T).max(axis=1)
     squares = (own**2).sum() + (others**2).sum(axis=(1, 2)) - 2 * alike
     mean = np.sqrt(np.maximum(squares, 0.0) / (POINTS * HEIGHTS))
     varied = own.std(axis=0).mean() + others.std(axis=1).mean(axis=1)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from visup.commands.clips import clips
+from visup.commands.databases import robustness, scale
 from visup.commands.views import views
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True)
 app.command("clips")(clips)
+app.command("scale")(scale)
+app.command("robustness")(robustness)
 app.command("views")(views)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
@@ -181,16 +184,24 @@ def _show(
     from visup.evaluation.record import write_record
 
     console = Console()
-    _print_table(console, f"{title}: {folder}", figures, keys)
+    print_table(console, f"{title}: {folder}", figures, keys)
     if ranks := figures["total"].get("ranks"):
         console.print("ranks 1 to 10: " + " ".join(str(r) for r in ranks))
     if json_file:
         write_record(json_file, figures, settings)
 
 
-def _print_table(
+def print_table(
     console: Console, title: str, figures: Mapping[str, Any], keys: tuple[str, ...]
 ) -> None:
+    """Print figures as a table that fits 80 columns.
+
+    Args:
+        console: Where to.
+        title: Of the table.
+        figures: With `items` by name and `total`.
+        keys: Which figures, in order; those that no item has are left out.
+    """
     shown = [k for k in keys if any(k in row for row in _rows(figures).values())]
     # Many columns are told as many rows: a table must be readable at 80 columns.
     tall = len(shown) > 8 and len(figures["items"]) <= 8
