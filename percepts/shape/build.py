@@ -5,8 +5,9 @@ Models are called as their mesh files. Nothing here depends on the order in whic
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from types import MappingProxyType
@@ -19,9 +20,11 @@ from visup.agent.errors import DatabaseError, SettingsError
 from visup.percepts.shape.cluster import medoids, similarity_matrix
 from visup.percepts.shape.compare import shape_of
 from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.directions import merged
+from visup.percepts.shape.parts import Part, made, parts_of, read_part
 from visup.percepts.shape.records import NewView
 from visup.percepts.shape.silhouette import binary_picture, looks_cut, normalise
-from visup.percepts.shape.views import load_mesh, render_views, sphere_directions
+from visup.percepts.shape.views import half_sphere_directions, load_mesh, render_views
 
 VIEWS = 32
 """Views rendered of each mesh unless asked otherwise."""
@@ -29,11 +32,17 @@ VIEWS = 32
 CLUSTERS = 8
 """Exemplars kept of a folder of silhouettes unless asked otherwise."""
 
+MOST_CLUSTERED = 400
+"""Silhouettes that are clustered at most; of more, so many evenly spaced ones are."""
+
 PICTURES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
 """Endings of the picture files that are read as silhouettes."""
 
+UNSCORED = 128
+"""Value of mask pixels that belong to no object for certain."""
+
 Progress = Callable[[int, int, str], None]
-"""Called with how many models are done, of how many, and the name of the last."""
+"""Called with how many views are done, of how many, and the name of the model they were done of."""
 
 
 def read_silhouette(path: Path) -> NDArray[np.bool_]:
@@ -42,6 +51,10 @@ def read_silhouette(path: Path) -> NDArray[np.bool_]:
     Raises:
         DatabaseError: The file is missing or no picture.
     """
+    return binary_picture(_read_grey(path))
+
+
+def _read_grey(path: Path) -> NDArray[np.uint8]:
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.is_file() else None
     if image is None:
         raise DatabaseError(
@@ -51,7 +64,7 @@ def read_silhouette(path: Path) -> NDArray[np.bool_]:
             where=str(path),
             expected="a silhouette, one shade on another, in a PNG or similar",
         )
-    return binary_picture(np.asarray(image, dtype=np.uint8))
+    return np.asarray(image, dtype=np.uint8)
 
 
 def read_silhouettes(folder: Path) -> list[NDArray[np.bool_]]:
@@ -60,6 +73,36 @@ def read_silhouettes(folder: Path) -> list[NDArray[np.bool_]]:
     Raises:
         DatabaseError: The folder is missing, holds no pictures, or a picture cannot be read.
     """
+    return [read_silhouette(f) for f in _pictures_in(folder)]
+
+
+def read_masks(folder: Path, label: int | None = None) -> list[NDArray[np.bool_]]:
+    """An object's masks in the frames of a video, (H, W) bool each, by file name.
+
+    Args:
+        folder: Label pictures: 0 is background, 128 is not scored, every other value is one object.
+        label: Value of the object; all objects are taken as one when None.
+
+    Returns:
+        A mask for each frame in which the object is seen.
+
+    Raises:
+        DatabaseError: The folder is missing, holds no pictures, a picture cannot be read, or no frame
+            shows the object.
+    """
+    frames = (_read_grey(f) for f in _pictures_in(folder))
+    masks = [(f == label) if label is not None else (f != 0) & (f != UNSCORED) for f in frames]
+    seen = [np.asarray(m) for m in masks if m.any()]
+    if not seen:
+        raise DatabaseError(
+            f"none of {len(masks)} masks shows {'anything' if label is None else f'label {label}'}",
+            where=str(folder),
+            expected="label pictures: 0 is background, other values are objects",
+        )
+    return seen
+
+
+def _pictures_in(folder: Path) -> list[Path]:
     files = sorted(p for p in folder.glob("*") if p.suffix.lower() in PICTURES)
     if not files:
         raise DatabaseError(
@@ -69,18 +112,23 @@ def read_silhouettes(folder: Path) -> list[NDArray[np.bool_]]:
             where=str(folder),
             expected=f"a folder of pictures ({', '.join(PICTURES)})",
         )
-    return [read_silhouette(f) for f in files]
+    return files
 
 
 def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
-    """Views of a mesh file, ready to be stored under the name of the file.
+    """Views of a mesh file, ready to be stored under the name of the file; symmetric ones are one.
 
     Raises:
         DatabaseError: The file is no mesh.
         ExtraMissingError: What renders meshes is not installed.
     """
+    return merged(rendered(mesh, half_sphere_directions(count, seed)))
+
+
+def rendered(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
+    """Views of a mesh file from these directions (V, 3), as `mesh_views` but none merged."""
     views = []
-    for seen in render_views(load_mesh(mesh), sphere_directions(count, seed)):
+    for seen in render_views(load_mesh(mesh), directions):
         silhouette = normalise(seen.mask)
         if silhouette is not None:
             x, y, z = (float(c) for c in seen.direction)
@@ -103,8 +151,11 @@ def silhouette_views(
             f"none of {len(masks)} silhouettes for {name!r} shows anything",
             expected="pictures with an object of at least 24 pixels",
         )
-    chosen = medoids(similarity_matrix(shapes), clusters)
-    return [NewView(name, None, None, shapes[k]) for k in chosen]
+    # All pairs are compared: of a long video, every so manyth frame stands for those around it.
+    every = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
+    some = [shapes[k] for k in every]
+    chosen = medoids(similarity_matrix(some), clusters)
+    return [NewView(name, None, None, some[k]) for k in chosen]
 
 
 def build_database(
@@ -120,18 +171,22 @@ def build_database(
 ) -> ModelDatabase:
     """Build a database from mesh files; each model's name is its file's stem.
 
+    What is done is kept in a folder beside the target until all is done: a build that was killed, or
+    that stopped at a bad mesh, goes on where it was when it is started again.
+
     Args:
         path: Where the database is written; what stands there is replaced when all is done.
         meshes: Mesh files with different stems.
         silhouettes: Name -> masks (H, W) bool, whole pictures; their exemplars are added to that name.
-        views: Views of each mesh.
+        views: Views of each mesh, before symmetric ones are merged.
         seed: Turns the directions of the views; 0 leaves them.
         clusters: Exemplars of each name's silhouettes.
         jobs: Processes.
-        progress: Told of each model done.
+        progress: Told of views done.
 
     Returns:
-        The database; the same bytes for the same input, whatever `jobs` is.
+        The database; the same bytes for the same input, whatever `jobs` is and however often the
+        build was begun.
 
     Raises:
         SettingsError: Two meshes have the same stem, or a number is out of range.
@@ -141,16 +196,25 @@ def build_database(
     _check_names(meshes)
     if not 1 <= views <= 10_000:
         raise SettingsError(f"{views} views of each mesh were asked for", expected="1 to 10000")
-    done: list[NewView] = []
-    for count, (mesh, new) in enumerate(
-        zip(meshes, _render_all(meshes, views, seed, jobs), strict=True)
-    ):
-        done.extend(new)
-        if progress is not None:
-            progress(count + 1, len(meshes), mesh.stem)
-    for name, masks in silhouettes.items():
-        done.extend(silhouette_views(name, masks, clusters))
-    return ModelDatabase.create(path, done)
+    target = Path(path)
+    folder = building_folder(target)
+    every = [parts_of(mesh, folder, views, seed) for mesh in meshes]
+    _make([p for parts in every for p in parts], jobs, progress)
+
+    def stored() -> Iterator[NewView]:
+        for parts in every:
+            yield from merged([v for part in parts for v in read_part(part)])
+        for name, masks in silhouettes.items():
+            yield from silhouette_views(name, masks, clusters)
+
+    built = ModelDatabase.create(target, stored())
+    shutil.rmtree(folder, ignore_errors=True)
+    return built
+
+
+def building_folder(target: Path) -> Path:
+    """Where what is done of a build is kept until all is done."""
+    return target.parent / f".{target.name}.building"
 
 
 def _check_names(meshes: Sequence[Path]) -> None:
@@ -164,13 +228,53 @@ def _check_names(meshes: Sequence[Path]) -> None:
         )
 
 
-def _render_all(
-    meshes: Sequence[Path], views: int, seed: int, jobs: int
-) -> Iterable[list[NewView]]:
-    if jobs <= 1 or len(meshes) <= 1:
-        for mesh in meshes:
-            yield mesh_views(mesh, views, seed)
+def _make(parts: Sequence[Part], jobs: int, progress: Progress | None) -> None:
+    """Make all parts that are not made yet."""
+    done, total = 0, sum(p.count for p in parts)
+
+    def tell(part: Part) -> None:
+        nonlocal done
+        done += part.count
+        if progress is not None:
+            progress(done, total, part.mesh.stem)
+
+    left = []
+    for part in parts:
+        if made(part):
+            tell(part)
+        else:
+            left.append(part)
+    if jobs <= 1 or len(left) <= 1:
+        for part in left:
+            make_part(part)
+            tell(part)
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        count = len(meshes)
-        yield from pool.map(mesh_views, meshes, [views] * count, [seed] * count)
+    with ProcessPoolExecutor(min(jobs, len(left)), mp_context=get_context("spawn")) as pool:
+        waiting = {pool.submit(make_part, part): part for part in left}
+        try:
+            for finished in as_completed(waiting):
+                finished.result()
+                tell(waiting[finished])
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def make_part(part: Part) -> None:
+    """Render a part's views and keep them in its file.
+
+    Raises:
+        DatabaseError: The mesh cannot be read, or the file cannot be written.
+        ExtraMissingError: What renders meshes is not installed.
+    """
+    directions = half_sphere_directions(part.views, part.seed)[part.first : part.first + part.count]
+    new = rendered(part.mesh, directions)
+    try:
+        part.path.parent.mkdir(exist_ok=True)
+    except OSError as e:
+        raise DatabaseError(
+            f"the database cannot be written ({e.strerror})",
+            where=str(part.path.parent.parent),
+            expected="a folder that exists and can be written to",
+        ) from e
+    ModelDatabase.create(part.path, new)

@@ -22,6 +22,7 @@ from visup.percepts.shape.compare import (
     outline_similarities,
     shape_of,
 )
+from visup.percepts.shape.directions import neighbours
 from visup.percepts.shape.index import Summaries, ViewIndex
 from visup.percepts.shape.match import Match, MatchWeights, in_plane_rotation, match_nodes
 from visup.percepts.shape.records import NewView, View
@@ -100,6 +101,7 @@ class ModelDatabase:
     def __init__(self, path: Path, views: Views) -> None:
         self.path = path
         self.views = views
+        self._neighbours: dict[str, list[tuple[int, ...]]] = {}
 
     @classmethod
     def open(cls, path: Path | str) -> ModelDatabase:
@@ -137,6 +139,22 @@ class ModelDatabase:
     @cached_property
     def _part_index(self) -> ViewIndex:
         return ViewIndex(self.shapes, _PART_WEIGHTS)
+
+    def neighbours(self, view: View) -> tuple[View, ...]:
+        """Views of the same model that are next to a view on the sphere of directions.
+
+        Each view stands for its directions and, mirrored, for the opposite ones.
+
+        Args:
+            view: One of this database.
+
+        Returns:
+            Its neighbours, rising by number; none when its direction is not known.
+        """
+        own = self.views.named({view.name})
+        if view.name not in self._neighbours:
+            self._neighbours[view.name] = neighbours([self.views[k].seen_from for k in own])
+        return tuple(self.views[own[k]] for k in self._neighbours[view.name][view.number])
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
         """Add views, to names new or known; the database as it is then. See `build.py`.

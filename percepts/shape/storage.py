@@ -23,9 +23,11 @@ from pathlib import Path
 import numpy as np
 
 from visup.agent.errors import DatabaseError
+from visup.percepts.shape.outline import outline_heights
 from visup.percepts.shape.records import (
     ALSO,
     LAYOUT,
+    POINT,
     VIEW,
     NewView,
     NotAsExpectedError,
@@ -164,7 +166,8 @@ def _block(
         rows[k]["area"] = np.nan if view.area is None else view.area
         rows[k]["smoothing"], rows[k]["cut"] = view.smoothing, view.shape.cut
         rows[k]["root"] = node_records(view.shape.graph)[0]
-        rows[k]["sketch"] = sketch(view.shape.heights)
+        # Of the outline as it will be read, so that it does not matter where a view comes from.
+        rows[k]["sketch"] = sketch(outline_heights(np.asarray(view.shape.contour, POINT.base)))
         also += [(start + k, d) for d in view.also]
     return rows, np.array(also, dtype=ALSO)
 
@@ -281,6 +284,9 @@ def read_contents(path: Path) -> Contents:
             names = _read_names(file)
             views, also = _read_blocks(file)
             _check_views(views, also, len(names))
+            (last,) = file.execute("SELECT max(view) FROM shapes").fetchone()
+            if (-1 if last is None else last) != len(views) - 1:
+                raise NotAsExpectedError("other views than shapes")
         except NotAsExpectedError as e:
             raise damaged(path, str(e), "what 'visup models' writes") from e
         except (sqlite3.Error, UnicodeDecodeError) as e:
@@ -323,8 +329,11 @@ def _check_views(views: Records, also: Records, models: int) -> None:
     Raises:
         NotAsExpectedError: There are some.
     """
-    if len(views) and int(views["model"].max()) >= models:
+    used = np.unique(views["model"])
+    if len(used) and int(used[-1]) >= models:
         raise NotAsExpectedError("a view of no model")
+    if len(used) < models:
+        raise NotAsExpectedError("a model without views")
     expected = _numbers_within(views["model"])
     if not np.array_equal(views["number"], expected):
         raise NotAsExpectedError("views that are not numbered")

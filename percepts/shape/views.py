@@ -19,6 +19,9 @@ from visup.agent.errors import DatabaseError, ExtraMissingError
 PICTURE = 200
 """Pixels along the longer side of a rendered silhouette."""
 
+_MOST_SPREAD = 400
+_STEPS = 60
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderedView:
@@ -60,10 +63,54 @@ def sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
     turn = np.pi * (1 + 5**0.5) * k
     flat = np.sqrt(1 - z**2)
     lattice = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-    if seed == 0:
-        return lattice
+    return lattice if seed == 0 else np.asarray(lattice @ _turn(seed).T)
+
+
+def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
+    """Directions spread evenly over the sphere when each stands for its opposite too.
+
+    In parallel projection the silhouette from behind is the mirror image of the one from before, and a
+    mirrored match tells of the opposite direction: half of the sphere is enough, and is covered
+    twice as densely by as many views.
+
+    Args:
+        count: How many, at least 1.
+        seed: Seed of the turn; 0 leaves them as they are.
+
+    Returns:
+        (count, 3) float64 unit vectors.
+
+    Example:
+        >>> d = half_sphere_directions(32)
+        >>> np.degrees(np.arccos(np.abs(d @ d.T - np.eye(32)).max())).round().item()
+        24.0
+    """
+    lattice = sphere_directions(2 * count)[:count]
+    # Many are even enough as they are, and each step would take long.
+    spread = _spread(lattice) if count <= _MOST_SPREAD else lattice
+    return spread if seed == 0 else np.asarray(spread @ _turn(seed).T)
+
+
+def _spread(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Let directions and their opposites push one another apart, as charges on a sphere do."""
+    out, size = directions.copy(), len(directions)
+    spacing = np.sqrt(2 * np.pi / size)
+    for step in range(_STEPS):
+        apart = out[:, None] - np.concatenate([out, -out])[None]
+        squares = (apart**2).sum(axis=-1)
+        squares[np.arange(size), np.arange(size)] = np.inf
+        force = (apart / squares[..., None] ** 1.5).sum(axis=1)
+        force -= (force * out).sum(axis=1, keepdims=True) * out
+        strongest = max(float(np.linalg.norm(force, axis=1).max()), 1e-12)
+        out += force * (0.3 * spacing / strongest * (1 - step / _STEPS))
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+    return out
+
+
+def _turn(seed: int) -> NDArray[np.float64]:
+    """A rotation drawn at random."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    return np.asarray(lattice @ (q * np.sign(np.diag(r))).T)
+    return np.asarray(q * np.sign(np.diag(r)))
 
 
 def picture_axes(direction: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
