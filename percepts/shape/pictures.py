@@ -1,76 +1,89 @@
-"""Pictures of shapes: outlines with their labelled shock graphs, for people.
+"""Pictures of shapes, for people: contact sheets, and why a silhouette matches a view.
 
 Colours follow the kinds of shock: protrusions orange, necks red, bends green, seeds blue.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.compare import Shape
+from visup.percepts.shape.database import ModelDatabase, Ranking, ViewMatch
+from visup.percepts.shape.drawing import (
+    BODY,
+    COLOURS,
+    INK,
+    OUTLINE,
+    PALE,
+    RULE,
+    Colour,
+    Point,
+    Sheet,
+    legend,
+)
 from visup.percepts.shape.shock_graph import ShockGraph, shock_graph
 from visup.percepts.shape.shocks import Kind, label_branch
 from visup.percepts.shape.silhouette import Silhouette
 from visup.percepts.shape.skeleton import skeletonise
 
-TILE = 96
+TILE = 104
 """Side of one view on a contact sheet, pixels."""
 
-COLOURS = {
-    Kind.PROTRUSION: (40, 140, 240),
-    Kind.NECK: (60, 60, 230),
-    Kind.BEND: (90, 190, 60),
-    Kind.SEED: (230, 150, 40),
-}
-"""Colour of each kind of shock, BGR."""
+_VIEWS_SHOWN = 10
+_LABEL = 170
+_HEAD = 44
+_ROW = 172
+_MARGIN = 18
 
-_VIEWS_SHOWN = 12
-_LABEL = 150
+Place = Callable[[NDArray[np.floating]], list[Point]]
 
 
-def draw_shape(
-    contour: NDArray[np.floating], graph: ShockGraph | None = None, tile: int = TILE
-) -> NDArray[np.uint8]:
-    """A silhouette in normal form, with the nodes of its shock graph.
+def _placed(
+    contour: NDArray[np.floating],
+    centre: Point,
+    side: float,
+    turn: NDArray[np.float64] | None = None,
+) -> Place:
+    """How points of a shape come to lie in a square of this side, turned or mirrored."""
+    matrix = np.eye(2) if turn is None else turn
+    turned = contour @ matrix.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    zoom = side / max(float((high - low).max()), 1e-6)
 
-    Args:
-        contour: (N, 2) outline, unit area, y down.
-        graph: Its shock graph; nodes are drawn as dots, edges as lines.
-        tile: Side of the picture, pixels.
+    def place(points: NDArray[np.floating]) -> list[Point]:
+        moved = (points @ matrix.T - 0.5 * (low + high)) * zoom + np.array(centre)
+        return [(float(x), float(y)) for x, y in moved]
 
-    Returns:
-        (tile, tile, 3) uint8, BGR.
-    """
-    canvas = np.full((tile, tile, 3), 255, dtype=np.uint8)
-    low, high = contour.min(axis=0), contour.max(axis=0)
-    zoom = (tile - 8) / max(float((high - low).max()), 1e-6)
-
-    def place(points: NDArray[np.floating]) -> NDArray[np.int32]:
-        moved = (points - 0.5 * (low + high)) * zoom + tile / 2
-        return np.asarray(np.round(moved * 16), dtype=np.int32)
-
-    cv2.fillPoly(canvas, [place(contour)], (215, 215, 215), lineType=cv2.LINE_AA, shift=4)
-    if graph is not None:
-        _draw_graph(canvas, graph, place(graph.positions))
-    return canvas
+    return place
 
 
-def _draw_graph(canvas: NDArray[np.uint8], graph: ShockGraph, at: NDArray[np.int32]) -> None:
+def _draw_shape(sheet: Sheet, contour: NDArray[np.floating], place: Place) -> None:
+    sheet.polygon(place(contour), BODY, OUTLINE)
+
+
+def _draw_graph(sheet: Sheet, graph: ShockGraph, place: Place, radius: float = 3.0) -> None:
+    at = place(graph.positions)
     for parent, child in graph.edges:
         if parent > 0:
-            a, b = at[parent].tolist(), at[child].tolist()
-            cv2.line(canvas, a, b, (120, 120, 120), 1, cv2.LINE_AA, shift=4)
-    for node in range(1, len(graph)):
-        colour = COLOURS[Kind(int(graph.kinds[node]))]
-        cv2.circle(canvas, at[node].tolist(), 40, colour, -1, cv2.LINE_AA, shift=4)
+            sheet.line([at[parent], at[child]], PALE, 1.0)
+    # Small parts first, so that what counts most lies on top.
+    for node in sorted(range(1, len(graph)), key=lambda n: float(graph.weights[n])):
+        size = radius * (0.7 + 1.2 * float(graph.weights[node]) ** 0.5)
+        sheet.dot(at[node], size, _colour(graph, node))
+
+
+def _colour(graph: ShockGraph, node: int) -> Colour:
+    return COLOURS.get(Kind(int(graph.kinds[node])), INK)
 
 
 def contact_sheet(database: ModelDatabase, names: Sequence[str] | None = None) -> NDArray[np.uint8]:
-    """A row for each model: its name, how many views it has, and up to twelve of them.
+    """A row for each model: its name, how many views it has, and up to ten of them.
 
     Args:
         database: The models.
@@ -79,22 +92,204 @@ def contact_sheet(database: ModelDatabase, names: Sequence[str] | None = None) -
     Returns:
         (H, W, 3) uint8, BGR.
     """
-    rows = [_row(database, n) for n in (database.names() if names is None else names)]
-    empty = np.full((TILE, _LABEL + _VIEWS_SHOWN * TILE, 3), 255, dtype=np.uint8)
-    return np.vstack(rows) if rows else empty
+    shown = list(database.names() if names is None else names)
+    sheet = Sheet(_LABEL + _VIEWS_SHOWN * TILE + _MARGIN, _HEAD + max(1, len(shown)) * TILE)
+    title = f"{len(shown)} models, {len(database.views)} views"
+    sheet.text((_MARGIN, 28), title, 16)
+    legend(sheet, (_LABEL + _VIEWS_SHOWN * TILE - 4 * 104, 28), 104)
+    for number, name in enumerate(shown):
+        _draw_row(sheet, database, name, _HEAD + number * TILE)
+    return sheet.picture()
 
 
-def _row(database: ModelDatabase, name: str) -> NDArray[np.uint8]:
-    own = [k for k, v in enumerate(database.views) if v.name == name]
-    label = np.full((TILE, _LABEL, 3), 255, dtype=np.uint8)
-    for line, text in enumerate((name[:20], f"{len(own)} views")):
-        where = (6, 44 + 18 * line)
-        cv2.putText(label, text, where, cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
-    spread = [own[i * len(own) // _VIEWS_SHOWN] for i in range(_VIEWS_SHOWN)]
-    shown = list(dict.fromkeys(spread))
-    tiles = [draw_shape(database.shapes[k].contour, database.shapes[k].graph) for k in shown]
-    blank = np.full((TILE, TILE, 3), 255, dtype=np.uint8)
-    return np.hstack([label, *tiles, *[blank] * (_VIEWS_SHOWN - len(tiles))])
+def _draw_row(sheet: Sheet, database: ModelDatabase, name: str, top: float) -> None:
+    own = database.views.named({name}).tolist()
+    views = [database.views[k] for k in own]
+    sheet.line([(0, top), (sheet.size[0], top)], RULE)
+    sheet.fitted((_MARGIN, top + 40), name, _LABEL - _MARGIN - 8, 14)
+    cut, directions = sum(v.cut for v in views), sum(len(v.seen_from) for v in views)
+    lines = [f"{len(views)} view{'s' if len(views) != 1 else ''}"]
+    if directions:
+        lines.append(f"{directions} directions")
+    if cut:
+        lines.append(f"{cut} cut by a border")
+    for k, line in enumerate(lines):
+        sheet.text((_MARGIN, top + 59 + 16 * k), line, 12, PALE)
+    spread = [own[i * len(own) // _VIEWS_SHOWN] for i in range(_VIEWS_SHOWN)] if own else []
+    for column, view in enumerate(dict.fromkeys(spread)):
+        shape = database.shapes[view]
+        centre = (_LABEL + (column + 0.5) * TILE, top + TILE / 2)
+        place = _placed(shape.contour, centre, TILE - 16)
+        _draw_shape(sheet, shape.contour, place)
+        _draw_graph(sheet, shape.graph, place)
+
+
+@dataclass(frozen=True, slots=True)
+class _Panel:
+    """Where a shape lies on the sheet."""
+
+    shape: Shape
+    place: Place
+
+
+def match_picture(
+    database: ModelDatabase, silhouette: Silhouette, ranking: Ranking, title: str, best: int = 5
+) -> NDArray[np.uint8]:
+    """Why a silhouette looks like views: its labelled shock graph, and the best views beside it.
+
+    Args:
+        database: What was searched.
+        silhouette: What was asked for.
+        ranking: What was answered.
+        title: Above the picture.
+        best: How many views are shown.
+
+    Returns:
+        (H, W, 3) uint8, BGR: to the left the silhouette with its skeleton and numbered nodes; to the
+        right a row for each view, turned as the silhouette is, with lines between corresponding
+        nodes.
+    """
+    shown = ranking.matches[:best]
+    height = _HEAD + max(3, len(shown)) * _ROW
+    sheet = Sheet(1120, height)
+    sheet.fitted((_MARGIN, 28), title, 480, 16)
+    legend(sheet, (700, 28), 104)
+    sheet.line([(0, _HEAD), (1120, _HEAD)], RULE)
+    query = Shape(silhouette.contour, shock_graph(silhouette), silhouette.cut)
+    _draw_query(sheet, silhouette, query, height)
+    for row, match in enumerate(shown):
+        _draw_match(sheet, database, query, match, row)
+    if not shown:
+        sheet.text((520, _HEAD + 60), "It looks like no view above the threshold.", 15, PALE)
+    return sheet.picture()
+
+
+def _draw_query(sheet: Sheet, silhouette: Silhouette, query: Shape, height: int) -> None:
+    """The silhouette, its skeleton by kind of shock, and its nodes with their numbers."""
+    place = _placed(query.contour, (250, _HEAD + 0.5 * min(height - _HEAD, 500)), 420)
+    _draw_shape(sheet, query.contour, place)
+    for point, kind in _labelled_points(silhouette)[::4]:
+        (x, y) = place(point[None])[0]
+        sheet.box((x - 1.2, y - 1.2), (x + 1.2, y + 1.2), COLOURS[kind])
+    _draw_numbers(sheet, query.graph, place)
+    counts = [
+        f"{count} {kind.name.lower()}" + ("s" if count > 1 else "")
+        for kind in COLOURS
+        if (count := int((query.graph.kinds == kind).sum()))
+    ]
+    lines = [
+        "Shock graph: " + ", ".join(counts),
+        "The greater a node, the more of the area it has.",
+    ]
+    if query.cut:
+        lines.append("Cut by the border of the picture.")
+    for k, line in enumerate(lines):
+        sheet.text((_MARGIN, _HEAD + 490 + 18 * k), line, 13, PALE)
+    if height - _HEAD > 640:
+        _draw_levels(sheet, query.graph, (_MARGIN, _HEAD + 550), (470, height - 24))
+
+
+def _draw_numbers(sheet: Sheet, graph: ShockGraph, place: Place) -> None:
+    at = place(graph.positions)
+    for parent, child in graph.edges:
+        if parent > 0:
+            sheet.line([at[parent], at[child]], PALE, 1.2)
+    for node in sorted(range(1, len(graph)), key=lambda n: float(graph.weights[n])):
+        sheet.dot(at[node], 7.0 + 6.0 * float(graph.weights[node]) ** 0.5, _colour(graph, node))
+        sheet.text(at[node], str(node), 11, (255, 255, 255), "mm")
+
+
+def _draw_levels(sheet: Sheet, graph: ShockGraph, corner: Point, other: Point) -> None:
+    """The graph as a tree of levels, each node below all its parents."""
+    depth = np.zeros(len(graph), dtype=int)
+    across = np.full(len(graph), 0.5)
+    # Parents come before children: one pass finds the longest way to each.
+    for parent, child in sorted(graph.edges.tolist()):
+        depth[child] = max(depth[child], depth[parent] + 1)
+    at: dict[int, Point] = {}
+    for level in range(depth.max() + 1):
+        nodes = np.flatnonzero(depth == level).tolist()
+        parents = {n: across[graph.edges[graph.edges[:, 1] == n, 0]] for n in nodes}
+        nodes.sort(key=lambda n: (float(parents[n].mean()) if len(parents[n]) else 0.5, n))
+        for k, node in enumerate(nodes):
+            across[node] = (k + 0.5) / len(nodes)
+            down = level / max(1, depth.max())
+            x = corner[0] + across[node] * (other[0] - corner[0])
+            at[node] = (x, corner[1] + down * (other[1] - corner[1]))
+    for parent, child in graph.edges.tolist():
+        sheet.line([at[parent], at[child]], RULE if parent == 0 else PALE, 1.0)
+    size = 9.0 if len(graph) < 30 else 6.0
+    sheet.text(at[0], "root", 12, PALE, "mm")
+    for node in range(1, len(graph)):
+        sheet.dot(at[node], size, _colour(graph, node))
+        sheet.text(at[node], str(node), 11 if size > 8 else 8, (255, 255, 255), "mm")
+
+
+def _draw_match(
+    sheet: Sheet, database: ModelDatabase, query: Shape, match: ViewMatch, row: int
+) -> None:
+    """One view: how alike, and which part of the silhouette is which part of it."""
+    top = _HEAD + row * _ROW
+    middle = top + _ROW / 2
+    sheet.line([(500, top), (1120, top)], RULE)
+    own = _Panel(query, _placed(query.contour, (600, middle), 140))
+    shape = database.shapes[match.view.id - 1]
+    theirs = _Panel(shape, _placed(shape.contour, (830, middle), 140, _turn(match)))
+    for panel in (own, theirs):
+        _draw_shape(sheet, panel.shape.contour, panel.place)
+    _draw_pairs(sheet, own, theirs, match)
+    x = 928
+    sheet.fitted((x, top + 42), f"{row + 1}. {match.view.name}", 180, 15)
+    sheet.box((x, top + 52), (x + 170, top + 60), RULE, 4)
+    sheet.box((x, top + 52), (x + max(8.0, 170 * match.similarity), top + 60), (38, 108, 214), 4)
+    for k, line in enumerate(_told(match)):
+        sheet.text((x, top + 80 + 17 * k), line, 12, INK if k == 0 else PALE)
+
+
+def _told(match: ViewMatch) -> list[str]:
+    turn = "rotation unknown"
+    if match.rotation is not None:
+        turn = f"turned by {math.degrees(match.rotation):.0f}°"
+    return [
+        f"similarity {match.similarity:.3f}",
+        f"view {match.view.number}, {turn}" + (", mirrored" if match.likeness.mirrored else ""),
+        f"graph {match.likeness.of_graphs:.2f}, outline {match.likeness.of_outlines:.2f}",
+        f"{len(match.likeness.match.pairs) - 1} corresponding nodes",
+    ]
+
+
+def _turn(match: ViewMatch) -> NDArray[np.float64]:
+    """The view as the silhouette shows it: mirrored if it is, then turned."""
+    angle = match.rotation or 0.0
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return turn @ np.diag([-1.0, 1.0]) if match.likeness.mirrored else turn
+
+
+def _draw_pairs(sheet: Sheet, own: _Panel, theirs: _Panel, match: ViewMatch) -> None:
+    """Lines between corresponding nodes, the stronger the more alike they are; the rest pale."""
+    here = own.place(own.shape.graph.positions)
+    there = theirs.place(theirs.shape.graph.positions)
+    for panel, at in ((own, here), (theirs, there)):
+        for node in range(1, len(panel.shape.graph)):
+            sheet.dot(at[node], 2.5, (190, 196, 205))
+    for u, v, similar in sorted(match.likeness.match.pairs, key=lambda p: p[2]):
+        if u == 0:
+            continue
+        colour = _colour(own.shape.graph, u)
+        sheet.line([here[u], there[v]], _faded(colour, similar), 0.6 + 1.6 * similar)
+    for u, v, _ in match.likeness.match.pairs:
+        if u == 0:
+            continue
+        weight = float(own.shape.graph.weights[u]) ** 0.5
+        sheet.dot(here[u], 3.0 + 3.5 * weight, _colour(own.shape.graph, u))
+        sheet.dot(there[v], 3.0 + 3.5 * weight, _colour(theirs.shape.graph, v))
+
+
+def _faded(colour: Colour, strength: float) -> Colour:
+    """A colour that is the paler the weaker."""
+    share = 0.3 + 0.6 * min(1.0, max(0.0, strength))
+    red, green, blue = (round(255 + (c - 255) * share) for c in colour)
+    return (red, green, blue)
 
 
 def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:

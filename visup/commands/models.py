@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from visup.percepts.shape.database import ModelDatabase, Ranking
 
 app = typer.Typer(
@@ -29,7 +32,11 @@ def build(
     seed: Annotated[int, typer.Option(help="Turns the directions of the views.")] = 0,
     jobs: Annotated[int, typer.Option(help="Processes; 0 for one on each core.")] = 0,
 ) -> None:
-    """Build a database from meshes. Each model is called as its file, without the ending."""
+    """Build a database from meshes. Each model is called as its file, without the ending.
+
+    A build that was stopped goes on where it was when the same command is given again. Views that are
+    the same by symmetry are stored once.
+    """
     import os
 
     from rich.progress import Progress
@@ -37,7 +44,7 @@ def build(
     from visup.percepts.shape.build import build_database
 
     with Progress(transient=True) as bar:
-        task = bar.add_task("views", total=len(meshes))
+        task = bar.add_task("views", total=len(meshes) * max(1, views))
         built = build_database(
             db,
             meshes,
@@ -53,12 +60,21 @@ def build(
 def add(
     db: Db,
     name: Annotated[str, typer.Option(help="Name of the model; one that exists gets more views.")],
-    silhouettes: Annotated[Path, typer.Option(help="Folder of silhouette pictures.")],
+    silhouettes: Annotated[
+        Path | None, typer.Option(help="Folder of pictures, a silhouette each.")
+    ] = None,
+    masks: Annotated[Path | None, typer.Option(help="Folder of a video's label masks.")] = None,
+    label: Annotated[
+        int | None, typer.Option(min=1, max=255, help="The object's value in --masks; any if none.")
+    ] = None,
     clusters: Annotated[int, typer.Option(help="Exemplars that stand for all pictures.")] = 8,
 ) -> None:
-    """Add exemplars of a folder of silhouettes, which may be cut by the pictures' borders."""
+    """Add exemplars of silhouettes, or of an object's masks in a video.
+
+    Silhouettes may be cut by the pictures' borders, and are then stored as such.
+    """
     from visup.agent.errors import SettingsError
-    from visup.percepts.shape.build import read_silhouettes, silhouette_views
+    from visup.percepts.shape.build import read_masks, read_silhouettes, silhouette_views
     from visup.percepts.shape.database import ModelDatabase
 
     if clusters < 1 or not name.strip():
@@ -66,8 +82,19 @@ def add(
             f"{clusters} exemplars for a model called {name!r} were asked for",
             expected="a name, and at least 1 exemplar",
         )
+    if label is not None and masks is None:
+        raise SettingsError("--label tells of --masks, which is not given")
     database = ModelDatabase.open(db)
-    _tell_size(database.add(silhouette_views(name, read_silhouettes(silhouettes), clusters)))
+    if silhouettes is not None and masks is None:
+        seen = read_silhouettes(silhouettes)
+    elif masks is not None and silhouettes is None:
+        seen = read_masks(masks, label)
+    else:
+        raise SettingsError(
+            "nothing to add, or two things at once",
+            expected="--silhouettes DIR or --masks DIR",
+        )
+    _tell_size(database.add(silhouette_views(name, seen, clusters)))
 
 
 @app.command("list")
@@ -79,11 +106,11 @@ def list_models(db: Db) -> None:
     from visup.percepts.shape.database import ModelDatabase
 
     database = ModelDatabase.open(db)
-    table = Table("object", "views", "of a mesh", "cut by a border", title=str(db))
+    table = Table("object", "views", "directions", "cut by a border", title=str(db))
     for name in database.names():
-        own = [v for v in database.views if v.name == name]
-        rendered = sum(v.direction is not None for v in own)
-        table.add_row(name, str(len(own)), str(rendered), str(sum(v.cut for v in own)))
+        own = [database.views[k] for k in database.views.named({name})]
+        directions = sum(len(v.seen_from) for v in own)
+        table.add_row(name, str(len(own)), str(directions), str(sum(v.cut for v in own)))
     Console().print(table)
     _tell_size(database)
 
@@ -94,8 +121,11 @@ def match_picture(
     image: Annotated[Path, typer.Argument(metavar="IMAGE", help="Picture of a silhouette.")],
     top: Annotated[int, typer.Option(help="How many views to show.")] = 5,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Picture of the best five views to write (PNG).")
+    ] = None,
 ) -> None:
-    """Rank the views that a silhouette looks like."""
+    """Rank the views that a silhouette looks like; with --out, draw why."""
     from visup.agent.errors import DatabaseError, SettingsError
     from visup.percepts.shape.build import read_silhouette
     from visup.percepts.shape.database import ModelDatabase
@@ -117,27 +147,39 @@ def match_picture(
         _print_json(ranking)
     else:
         _print_ranking(ranking, image, len(database.views))
+    if out is not None:
+        from visup.percepts.shape.pictures import match_picture
+
+        _write_picture(out, match_picture(database, silhouette, ranking, image.name), as_json)
 
 
 @app.command("show")
 def show(
     db: Db,
-    out: Annotated[Path, typer.Option(help="Picture to write (PNG).")],
+    out: Annotated[
+        Path | None, typer.Option(help="Picture to write (PNG); beside the database if none.")
+    ] = None,
 ) -> None:
     """Draw a contact sheet: a row for each model, its views with their shock graphs."""
-    import cv2
-
-    from visup.agent.errors import OutputError
     from visup.percepts.shape.database import ModelDatabase
     from visup.percepts.shape.pictures import contact_sheet
 
     sheet = contact_sheet(ModelDatabase.open(db))
-    done, data = cv2.imencode(".png", sheet)
+    _write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)
+
+
+def _write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -> None:
+    import cv2
+
+    from visup.agent.errors import OutputError
+
+    done, data = cv2.imencode(".png", picture)
     try:
         out.write_bytes(data.tobytes() if done else b"")
     except OSError as e:
         raise OutputError(f"the picture cannot be written ({e.strerror})", where=str(out)) from e
-    typer.echo(f"{out}: {sheet.shape[1]} x {sheet.shape[0]} pixels")
+    if not quiet:
+        typer.echo(f"{out}: {picture.shape[1]} x {picture.shape[0]} pixels")
 
 
 def _tell_size(database: ModelDatabase) -> None:
@@ -166,9 +208,16 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("rank", "object", "view", "similarity", "rotation", title=str(image))
+    table = Table(title=image.name, title_justify="left")
+    for heading, side in (("", "right"), ("object", "left"), ("view", "right")):
+        table.add_column(heading, justify=side, overflow="fold")  # type: ignore[arg-type]
+    for heading in ("similarity", "graph", "outline", "rotation"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for rank, m in enumerate(ranking.matches, start=1):
         turn = "unknown" if m.rotation is None else f"{math.degrees(m.rotation):.0f}°"
-        table.add_row(str(rank), m.view.name, str(m.view.number), f"{m.similarity:.3f}", turn)
+        mirrored = " mirrored" if m.likeness.mirrored else ""
+        terms = (m.similarity, m.likeness.of_graphs, m.likeness.of_outlines)
+        figures = (f"{t:.3f}" for t in terms)
+        table.add_row(str(rank), m.view.name, str(m.view.number), *figures, turn + mirrored)
     Console().print(table)
     typer.echo(f"{ranking.compared} of {views} views compared in full")
