@@ -11,18 +11,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.compare import GRAPH_SHARE, Shape, outline_similarities
+from visup.percepts.shape.areas import AreaIndex
+from visup.percepts.shape.compare import GRAPH_SHARE, Shape, second_looks
 from visup.percepts.shape.match import match
 
 
 def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
     """Similarities of all pairs, (N, N) float64 with ones on the diagonal."""
     out = np.eye(len(shapes))
+    index = AreaIndex(np.stack([s.areas for s in shapes]))
     for i, shape in enumerate(shapes):
-        others = shapes[:i]
-        outlines, _ = outline_similarities(shape, others)
-        graphs = np.array([match(shape.graph, o.graph).similarity for o in others])
-        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + (1 - GRAPH_SHARE) * outlines
+        looks = second_looks(shape, shapes[:i], index.overlaps(shape.areas, np.arange(i)))
+        graphs = np.array([match(shape.graph, o.graph).similarity for o in shapes[:i]])
+        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + looks.worth
     return out
 
 

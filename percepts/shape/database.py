@@ -1,12 +1,11 @@
-"""The model database: names, views and shock graphs, and the search for what a silhouette looks like.
+"""The model database: names, views and shapes, and what a silhouette looks like of them.
 
-Read `storage.py` for the file itself and `build.py` for what goes into it.
+Read `search.py` for the search, `storage.py` for the file and `build.py` for what goes into it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable
 from functools import cached_property
 from pathlib import Path
 
@@ -14,80 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.catalogue import Shapes, Views
-from visup.percepts.shape.compare import (
-    GRAPH_SHARE,
-    Likeness,
-    Shape,
-    join,
-    outline_similarities,
-    shape_of,
-)
+from visup.percepts.shape.compare import Shape, shape_of
 from visup.percepts.shape.directions import neighbours
-from visup.percepts.shape.index import Summaries, ViewIndex
-from visup.percepts.shape.match import Match, MatchWeights, in_plane_rotation, match_nodes
 from visup.percepts.shape.records import NewView, View
-from visup.percepts.shape.shock_graph import ShockGraph
+from visup.percepts.shape.search import Ranking, Search, ViewMatch, Wanted
 from visup.percepts.shape.silhouette import Silhouette, normalise
 from visup.percepts.shape.storage import write_more, write_new
 
+__all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
+
 CANDIDATES = 32
 """Views whose outlines are compared when no budget asks for fewer."""
-
-PART_SHARE = 0.55
-"""What a perfect match of a cut silhouette with a part of a whole view counts."""
-
-_PART_CANDIDATES = 12
-_PART_SCALES = (1.0, 0.8, 0.62, 0.45)
-_PART_WEIGHTS = MatchWeights(
-    kind=0.3, mass=0.0, length=0.8, profile=3.5, context=0.0, signature=0.0, root=0.0
-)
-
-
-@dataclass(frozen=True, slots=True)
-class ViewMatch:
-    """A view that a silhouette looks like.
-
-    Attributes:
-        view: The view.
-        likeness: How alike the two are, and why; pairs of nodes are (query, view, similarity).
-        rotation: In-plane rotation from view to query, radians (positive from x towards y, y down), or
-            None when the two have too little in common to tell. Of a mirrored match, the rotation from
-            the view's left-right mirror image, which is what is seen from the opposite direction.
-    """
-
-    view: View
-    likeness: Likeness
-    rotation: float | None = None
-
-    @property
-    def similarity(self) -> float:
-        """0 to 1."""
-        return self.likeness.similarity
-
-    @property
-    def direction(self) -> tuple[float, float, float] | None:
-        """Unit vector from the object to the viewer, model frame; None when it is not known.
-
-        In parallel projection the silhouette from behind is the mirror image of the one from before,
-        so that a mirrored match tells of the opposite direction.
-        """
-        if self.view.direction is None or not self.likeness.mirrored:
-            return self.view.direction
-        x, y, z = self.view.direction
-        return (-x, -y, -z)
-
-
-@dataclass(frozen=True, slots=True)
-class Ranking:
-    """The result of a query.
-
-    Attributes:
-        matches: Best first.
-        compared: How many views were compared in full.
-    """
-
-    matches: tuple[ViewMatch, ...]
-    compared: int
 
 
 class ModelDatabase:
@@ -132,13 +68,8 @@ class ModelDatabase:
         return Shapes(self.path, self.views)
 
     @cached_property
-    def _index(self) -> ViewIndex:
-        rows = self.views.records
-        return ViewIndex(self.shapes, summaries=Summaries(rows["root"], rows["sketch"]))
-
-    @cached_property
-    def _part_index(self) -> ViewIndex:
-        return ViewIndex(self.shapes, _PART_WEIGHTS)
+    def _search(self) -> Search:
+        return Search(self.views, self.shapes)
 
     def neighbours(self, view: View) -> tuple[View, ...]:
         """Views of the same model that are next to a view on the sphere of directions.
@@ -176,10 +107,12 @@ class ModelDatabase:
         restrict: Collection[str] | None = None,
         try_first: Collection[str] = (),
         budget: float = 0.1,
+        mirror: bool = True,
     ) -> Ranking:
         """Rank the views that a shape looks like.
 
-        A cut shape is compared with cut views as it is, and with whole views as a part of them.
+        A cut shape is compared with cut views as it is, and with whole views as they look when they are
+        cut in the same way.
 
         Args:
             shape: A mask (H, W) bool, a silhouette or a shape.
@@ -191,6 +124,8 @@ class ModelDatabase:
             try_first: Names whose likeliest views are compared whatever the index says.
             budget: Share of the views that may be compared in full: at least 16 are, and at most
                 `CANDIDATES`. With 1, all are.
+            mirror: Whether a view is also recognised by its mirror image, which is what is seen from
+                behind.
 
         Returns:
             The matches, best first; empty when the mask shows nothing.
@@ -200,107 +135,15 @@ class ModelDatabase:
             return Ranking((), 0)
         among = self.views.named(restrict)
         most = candidates_wanted(len(self.views), budget)
-        wanted = _Wanted(top, per_name, threshold)
-        found = self._whole_or_part(query, among, most, frozenset(try_first), wanted)
-        matches = tuple(self._with_rotation(query, m) for m in found.matches)
-        return Ranking(matches, found.compared)
-
-    def _whole_or_part(
-        self,
-        query: Shape,
-        among: NDArray[np.intp],
-        most: int,
-        first: frozenset[str],
-        wanted: _Wanted,
-    ) -> Ranking:
+        wanted = Wanted(top, per_name, threshold, most, mirror)
+        favoured = np.intersect1d(self.views.named(try_first), among) if try_first else None
         if not query.cut:
-            return self._whole(query, among, most, first, wanted)
+            return self._search.whole(query, among, wanted, favoured)
         cut_views = self.views.cut[among]
-        alike = self._whole(query, among[cut_views], most, first, wanted)
-        parts = self._parts(query, among[~cut_views], wanted)
+        alike = self._search.whole(query, among[cut_views], wanted, favoured)
+        parts = self._search.cut(query, among[~cut_views], wanted)
         matches = wanted.best([*alike.matches, *parts.matches])
         return Ranking(tuple(matches), alike.compared + parts.compared)
-
-    def _whole(
-        self,
-        query: Shape,
-        among: NDArray[np.intp],
-        most: int,
-        first: frozenset[str],
-        wanted: _Wanted,
-    ) -> Ranking:
-        """Candidates by index, their outlines at once, then graphs until no other can do better."""
-        favoured = np.intersect1d(self.views.named(first), among) if first else None
-        likely = self._index.candidates(query, among, most, favoured)
-        outlines, mirrored = outline_similarities(query, [self.shapes[k] for k in likely.numbers])
-        ceilings = GRAPH_SHARE * likely.bounds + (1 - GRAPH_SHARE) * outlines
-        found: list[ViewMatch] = []
-        for n in np.argsort(-ceilings, kind="stable"):
-            if ceilings[n] < wanted.least(found):
-                break
-            number = int(likely.numbers[n])
-            graphs = self._match(query, number, likely.similar[n])
-            likeness = join(graphs, float(outlines[n]), bool(mirrored[n]))
-            found = wanted.best([*found, ViewMatch(self.views[number], likeness)])
-        return Ranking(tuple(found), len(likely.numbers))
-
-    def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> Match:
-        """Graphs matched in their own order, so that the result does not depend on who asks."""
-        a, b = query.graph, self.shapes[number].graph
-        root = self._index.weights.root
-        if b.key < a.key:
-            return match_nodes(b, a, similar.T, root).turned()
-        return match_nodes(a, b, similar, root)
-
-    def _parts(self, query: Shape, among: NDArray[np.intp], wanted: _Wanted) -> Ranking:
-        """The query as a part of whole views, at several sizes of the part within the whole."""
-        best: dict[int, Match] = {}
-        compared: set[int] = set()
-        for scale in _PART_SCALES:
-            graph = _scaled(query.graph, scale)
-            bounds, similar = self._part_index.bounds(graph, among, part=True)
-            for k in np.argsort(-bounds, kind="stable")[:_PART_CANDIDATES]:
-                number = int(among[k])
-                compared.add(number)
-                whole = self.shapes[number].graph
-                matched = match_nodes(graph, whole, similar[k], 0.0, part=True)
-                if number not in best or matched.similarity > best[number].similarity:
-                    best[number] = matched
-        found = [
-            ViewMatch(self.views[k], Likeness(PART_SHARE * m.similarity, m.similarity, 0.0, m))
-            for k, m in best.items()
-        ]
-        return Ranking(tuple(wanted.best(found)), len(compared))
-
-    def _with_rotation(self, query: Shape, found: ViewMatch) -> ViewMatch:
-        own = self.shapes[found.view.id - 1].graph
-        likeness = found.likeness
-        turn = in_plane_rotation(own, query.graph, likeness.match, mirrored=likeness.mirrored)
-        return replace(found, rotation=turn)
-
-
-@dataclass(frozen=True, slots=True)
-class _Wanted:
-    """How many matches, how many of one model, and how good they must be."""
-
-    top: int
-    per_name: int | None
-    threshold: float
-
-    def best(self, found: Iterable[ViewMatch]) -> list[ViewMatch]:
-        """The best matches, no more than so many of one model."""
-        seen: dict[str, int] = {}
-        kept = []
-        for m in sorted(found, key=lambda m: (-m.similarity, m.view.id)):
-            seen[m.view.name] = seen.get(m.view.name, 0) + 1
-            within = self.per_name is None or seen[m.view.name] <= self.per_name
-            if within and m.similarity >= self.threshold:
-                kept.append(m)
-        return kept[: self.top]
-
-    def least(self, found: Sequence[ViewMatch]) -> float:
-        """What a further match must reach to change the result."""
-        return found[-1].similarity if len(found) >= self.top else self.threshold
 
 
 def candidates_wanted(views: int, budget: float = 0.1) -> int:
@@ -308,15 +151,6 @@ def candidates_wanted(views: int, budget: float = 0.1) -> int:
     if budget >= 1:
         return views
     return int(min(CANDIDATES, max(16, budget * views)))
-
-
-def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:
-    """The graph of the same shape in a larger unit."""
-    return replace(
-        graph,
-        lengths=graph.lengths * np.float32(scale),
-        profiles=graph.profiles * np.float32(scale),
-    )
 
 
 def as_shape(shape: NDArray[np.bool_] | Silhouette | Shape, cut: bool = False) -> Shape | None:

@@ -5,8 +5,8 @@ Three sieves, each finer and dearer than the one before:
 1. *Roots.* A view's root carries its topological signature vector (Shokoufandeh et al. 2005), how much
    of the shape lies how far from its middle, and its greatest radius; its outline's spectrum stands
    beside it. One product of the query's vector with all views' leaves the nearest `NEAREST`.
-2. *Sketches.* Of these, the outlines are compared at a few points at all rotations, and the roots
-   again: that leaves as many as are to be compared in full.
+2. *Sketches.* Of these, the outlines are compared at a few points at all rotations, the areas are laid
+   on each other, and the roots again: that leaves as many as are to be compared in full.
 3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every
    node takes its best partner, whoever else wants it and whatever hangs below. The matching of
    `match.py` can only do worse, so that views can be matched best bound first until no bound left
@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.areas import AreaIndex, Overlaps, area_overlaps
 from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.match import WEIGHTS, MatchWeights, embed, node_similarities
 from visup.percepts.shape.records import Records, graph_arrays, node_records
@@ -40,7 +41,9 @@ KEPT = 4096
 _ROOT_SCALE = 3.75
 _SPECTRUM_SCALE = 0.106
 _SKETCH_SCALE = 0.467
+_AREA_SCALE = 0.25
 _ROOT_SHARE = 0.65
+_AREA_SHARE = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +54,13 @@ class Candidates:
         numbers: (C,) numbers of the views, rising.
         bounds: (C,) what the similarity of the graphs cannot exceed.
         similar: For each view the (N, M) similarities of the query's nodes with the view's.
+        overlaps: How the query's area lies on theirs.
     """
 
     numbers: NDArray[np.intp]
     bounds: NDArray[np.float64]
     similar: list[NDArray[np.float32]]
+    overlaps: Overlaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,16 +70,24 @@ class Summaries:
     Attributes:
         roots: (V,) records of `records.NODE`.
         sketches: (V, POINTS, HEIGHTS) int8.
+        areas: (V, RINGS, ANGLES) uint8.
     """
 
     roots: Records
     sketches: NDArray[np.int8]
+    areas: NDArray[np.uint8]
+
+    @classmethod
+    def read(cls, views: Records) -> Summaries:
+        """Those of views in a file, (V,) records of `records.VIEW`."""
+        return cls(views["root"], views["sketch"], views["areas"])
 
     @classmethod
     def of(cls, shapes: Sequence[Shape]) -> Summaries:
         """Those of shapes in memory, at least one."""
         roots = np.concatenate([node_records(s.graph)[:1] for s in shapes])
-        return cls(roots, np.stack([sketch(s.heights) for s in shapes]))
+        sketches = np.stack([sketch(s.heights) for s in shapes])
+        return cls(roots, sketches, np.stack([s.areas for s in shapes]))
 
 
 class ViewIndex:
@@ -144,7 +157,12 @@ class ViewIndex:
         features = len(own) - SPECTRUM
         squares = ((self._roots[among, :features] - own[:features]) ** 2).sum(axis=1)
         outlines = sketch_distances(sketch(query.heights), self._summaries.sketches[among])
-        apart = outlines / _SKETCH_SCALE + _ROOT_SHARE * np.sqrt(squares)
+        uncovered = 1.0 - self.overlaps(query, among).similarity.max(axis=1)
+        apart = (
+            outlines / _SKETCH_SCALE
+            + _ROOT_SHARE * np.sqrt(squares)
+            + _AREA_SHARE * np.sqrt(uncovered / _AREA_SCALE)
+        )
         return np.sort(among[np.argsort(apart, kind="stable")[:most]])
 
     def _apart(
@@ -175,7 +193,25 @@ class ViewIndex:
             extra = self.likeliest(query, favoured, most)
             numbers = np.union1d(numbers, extra).astype(np.intp)
         bounds, similar = self.bounds(query.graph, numbers)
-        return Candidates(numbers, bounds, similar)
+        return Candidates(numbers, bounds, similar, self.overlaps(query, numbers))
+
+    def overlaps(self, query: Shape, among: NDArray[np.intp]) -> Overlaps:
+        """How a shape's area lies on those of some views."""
+        if len(self) <= KEPT:
+            return self._areas.overlaps(query.areas, among)
+        return area_overlaps(query.areas, self._summaries.areas[among])
+
+    def best_covered(self, query: Shape, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+        """The views whose areas lie best on a shape's: at most so many of the numbers, rising."""
+        covered = [
+            self.overlaps(query, among[k : k + KEPT]).similarity.max(axis=1)
+            for k in range(0, len(among), KEPT)
+        ]
+        return np.sort(among[np.argsort(-np.concatenate(covered), kind="stable")[:most]])
+
+    @cached_property
+    def _areas(self) -> AreaIndex:
+        return AreaIndex(self._summaries.areas)
 
     def bounds(
         self, query: ShockGraph, among: NDArray[np.intp], *, part: bool = False

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.shape.silhouette import resample_closed
 
-POINTS = 96
+POINTS = 72
 """Points along an outline."""
 
 HEIGHTS = 24
@@ -25,8 +25,8 @@ HEIGHTS = 24
 SKIP = 0.2
 """Cost of a step that is not straight on, per step."""
 
-_ROTATIONS = 3
-_BAND = 12
+_ROTATIONS = 2
+_BAND = 9
 _BETA = 0.2
 
 
@@ -59,25 +59,24 @@ def complexity(heights: NDArray[np.float32]) -> float:
 
 def outline_distances(
     first: NDArray[np.float32], second: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Distances of pairs of outlines, each at its best rotation, mirrored or not.
+) -> NDArray[np.float64]:
+    """Distances of pairs of outlines, each at its best rotation, as they are and mirrored.
 
     Args:
         first: (B, POINTS, HEIGHTS) or, for one that is compared with all, (1, POINTS, HEIGHTS).
         second: The same, of the other outlines.
 
     Returns:
-        (B,) float64, 0 for equal outlines; about 0.2 within a class and 0.45 between. And (B,) bool,
-        whether the mirror image fits better.
+        (B, 2) float64, 0 for equal outlines; about 0.2 within a class and 0.45 between. The second
+        column is that of the mirror image.
     """
     count = max(len(first), len(second))
     both = np.stack([second, second[:, ::-1, ::-1]], axis=1)
     costs = _point_costs(first[:, None], both)
     costs = np.broadcast_to(costs, (count, 2, POINTS, POINTS)).reshape(count * 2, -1)
-    shifted = costs.take(_shifts(), axis=1).reshape(count, 2 * POINTS, POINTS)
-    distance, mirrored = _align(shifted)
+    least = _align(costs.take(_shifts(), axis=1).reshape(count * 2, POINTS, POINTS))
     varied = _complexities(first) + _complexities(second)
-    return np.asarray(distance / (_BETA + varied), dtype=np.float64), mirrored
+    return np.asarray(least.reshape(count, 2) / (_BETA + varied)[:, None], dtype=np.float64)
 
 
 def _complexities(heights: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -104,27 +103,19 @@ def _shifts() -> NDArray[np.intp]:
     return np.asarray(i[None] * POINTS + (i[None] + d[:, None]) % POINTS, dtype=np.intp).ravel()
 
 
-def _align(shifted: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Least mean cost of an alignment and whether it is mirrored, both (B,).
-
-    Costs come by diagonal, (B, 2 * POINTS, POINTS): the upper half of the diagonals is mirrored.
-    """
-    count = len(shifted)
-    starts = _best_diagonals(shifted.sum(axis=-1).reshape(count, 2, POINTS))
-    side, diagonal = starts // POINTS, starts % POINTS
-    band = (diagonal[..., None] + np.arange(-_BAND, _BAND + 1)) % POINTS + side[..., None] * POINTS
-    rows = np.arange(count)[:, None, None]
+def _align(shifted: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Least mean cost of an alignment, (B,), from costs by diagonal, (B, POINTS, POINTS)."""
+    diagonal = _best_diagonals(shifted.sum(axis=-1))
+    band = (diagonal[..., None] + np.arange(-_BAND, _BAND + 1)) % POINTS
+    rows = np.arange(len(shifted))[:, None, None]
     lanes = np.ascontiguousarray(np.moveaxis(shifted[rows, band], -1, 0))
-    least = _descend(lanes).min(axis=2)
-    best = least.argmin(axis=1)
-    each = np.arange(count)
-    return least[each, best].astype(np.float64) / POINTS, side[each, best] > 0
+    return np.asarray(_descend(lanes).min(axis=(1, 2)).astype(np.float64) / POINTS)
 
 
 def _best_diagonals(sums: NDArray[np.float32]) -> NDArray[np.intp]:
-    """The best few local minima (B, R) among the sums along diagonals, (B, 2, POINTS)."""
-    lower = (sums <= np.roll(sums, 1, axis=2)) & (sums <= np.roll(sums, -1, axis=2))
-    candidates = np.where(lower, sums, np.inf).reshape(len(sums), -1)
+    """The best few local minima (B, R) among the sums along diagonals, (B, POINTS)."""
+    lower = (sums <= np.roll(sums, 1, axis=1)) & (sums <= np.roll(sums, -1, axis=1))
+    candidates = np.where(lower, sums, np.inf)
     return np.argsort(candidates, axis=1, kind="stable")[:, :_ROTATIONS]
 
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.compare import Shape
+from visup.percepts.shape.compare import Shape, shape_of
 from visup.percepts.shape.database import ModelDatabase, Ranking, ViewMatch
 from visup.percepts.shape.drawing import (
     BODY,
@@ -155,7 +155,7 @@ def match_picture(
     sheet.fitted((_MARGIN, 28), title, 480, 16)
     legend(sheet, (700, 28), 104)
     sheet.line([(0, _HEAD), (1120, _HEAD)], RULE)
-    query = Shape(silhouette.contour, shock_graph(silhouette), silhouette.cut)
+    query = shape_of(silhouette)
     _draw_query(sheet, silhouette, query, height)
     for row, match in enumerate(shown):
         _draw_match(sheet, database, query, match, row)
@@ -247,20 +247,19 @@ def _draw_match(
 
 
 def _told(match: ViewMatch) -> list[str]:
-    turn = "rotation unknown"
-    if match.rotation is not None:
-        turn = f"turned by {math.degrees(match.rotation):.0f}°"
+    turn = f"turned by {math.degrees(match.rotation):.0f}°"
+    terms = match.likeness
     return [
         f"similarity {match.similarity:.3f}",
         f"view {match.view.number}, {turn}" + (", mirrored" if match.likeness.mirrored else ""),
-        f"graph {match.likeness.of_graphs:.2f}, outline {match.likeness.of_outlines:.2f}",
+        f"graph {terms.of_graphs:.2f}, outline {terms.of_outlines:.2f}, area {terms.of_areas:.2f}",
         f"{len(match.likeness.match.pairs) - 1} corresponding nodes",
     ]
 
 
 def _turn(match: ViewMatch) -> NDArray[np.float64]:
     """The view as the silhouette shows it: mirrored if it is, then turned."""
-    angle = match.rotation or 0.0
+    angle = match.rotation
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return turn @ np.diag([-1.0, 1.0]) if match.likeness.mirrored else turn
 

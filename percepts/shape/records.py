@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.areas import ANGLES, RINGS
 from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.shock_graph import (
     CONTEXT,
@@ -62,6 +63,8 @@ VIEW = np.dtype(
         ("area", "<f8"),
         ("smoothing", "<f4"),
         ("cut", "|u1"),
+        ("border", "<f4"),
+        ("areas", "|u1", (RINGS, ANGLES)),
         ("root", NODE),
         ("sketch", "|i1", (POINTS, HEIGHTS)),
     ]
@@ -193,7 +196,9 @@ def decode(stored: ShapeBytes, view: np.void) -> Shape:
     outline = contour.astype(np.float32)
     if not (np.abs(outline) < 1e3).all() or not np.ptp(outline, axis=0).min() > 0:
         raise NotAsExpectedError("an outline that is none")
-    return Shape(outline, frozen_graph(edges=edges, **graph_arrays(nodes)), bool(view["cut"]))
+    graph = frozen_graph(edges=edges, **graph_arrays(nodes))
+    border = None if np.isnan(view["border"]) else float(view["border"])
+    return Shape(outline, graph, view["areas"], bool(view["cut"]), border)
 
 
 def records(data: object, dtype: np.dtype[Any], least: int, most: int, what: str) -> Records:

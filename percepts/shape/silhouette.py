@@ -1,4 +1,4 @@
-"""Silhouettes in normal form: one outline, without holes, of unit area, smoothed.
+"""Silhouettes in normal form: one outline of unit area, smoothed, and a map of the area itself.
 
 The normal form is what makes a rendered model and a region of an image comparable. Its unit of
 length is the square root of the silhouette's area; its origin is the silhouette's centroid; x points
@@ -10,6 +10,7 @@ Read next: `skeleton.py`.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.errors import SettingsError
+from visup.percepts.shape.areas import area_map
+from visup.percepts.shape.islands import joined
 
 SMOOTHING = 0.015
 """Standard deviation of the Gaussian, as a share of the square root of the area."""
@@ -30,6 +33,10 @@ SPACING = 0.03
 LEAST_AREA = 24
 """Pixels below which a mask has no shape to speak of."""
 
+SIDES = ("right", "bottom", "left", "top")
+"""Sides of an image."""
+
+_BEARINGS = {"right": 0.0, "bottom": 0.5 * np.pi, "left": np.pi, "top": -0.5 * np.pi}
 _MOST_PIXELS = 1 << 21
 _MOST_EXTENT = 1400
 
@@ -44,29 +51,42 @@ class Silhouette:
         origin: (x, y) of the centroid in the source image, pixels.
         unit: Pixels of the source image per unit of length; the square root of `area`.
         area: Area in the source image, holes filled, pixels squared.
+        areas: (RINGS, ANGLES) uint8, the mask's own area by ring and angle, with its holes and islands;
+            see `areas.area_map`.
         cut: Whether the border of the source image cuts the silhouette.
+        border: Where the border that cuts lies as seen from the silhouette: 0 right, pi/2 below, pi
+            left, -pi/2 above, radians; None when nothing is cut.
     """
 
     contour: NDArray[np.float64]
     origin: tuple[float, float]
     unit: float
     area: float
+    areas: NDArray[np.uint8]
     cut: bool = False
+    border: float | None = None
 
 
 def normalise(
-    mask: NDArray[np.bool_], *, cut: bool = False, smoothing: float = SMOOTHING
+    mask: NDArray[np.bool_],
+    *,
+    cut: bool = False,
+    sides: Collection[str] = SIDES,
+    smoothing: float = SMOOTHING,
 ) -> Silhouette | None:
     """Bring a mask to normal form.
 
     Args:
         mask: (H, W) bool, what belongs to the object.
         cut: Whether the image border cuts the object.
+        sides: Sides of the mask's array that are the image border, of `SIDES`; of these, the one along
+            which most of a cut object lies is taken for the border that cuts it. An object cut by two
+            sides, in a corner, is so taken for one that ends there at the other.
         smoothing: Standard deviation of the Gaussian in units of the square root of the area.
 
     Returns:
-        The silhouette of the largest connected part with its holes filled, or None when nothing of at
-        least `LEAST_AREA` pixels is there.
+        The silhouette of the largest part with the islands that lie near (`islands.py`), its holes
+        filled, or None when nothing of at least `LEAST_AREA` pixels is there.
 
     Raises:
         SettingsError: The mask is no picture of yes and no.
@@ -81,7 +101,7 @@ def normalise(
     if cropped is None:
         return None
     part, corner, shrink = cropped
-    solid, inset = _solid_largest(part)
+    solid, inset = _solid(part)
     area = float(np.count_nonzero(solid))
     if area < LEAST_AREA:
         return None
@@ -90,7 +110,19 @@ def normalise(
     if outline is None:
         return None
     unscaled = (outline + 0.5) / zoom - 0.5 - pad + np.asarray(inset)
-    return _in_units((unscaled + 0.5) / shrink - 0.5 + np.asarray(corner), area / shrink**2, cut)
+    contour, origin = _in_units((unscaled + 0.5) / shrink - 0.5 + np.asarray(corner))
+    area /= shrink**2
+    border = _border(mask, sides) if cut else None
+    areas = area_map(part > 0)
+    return Silhouette(contour, origin, area**0.5, area, areas, cut, border)
+
+
+def _border(mask: NDArray[np.generic], sides: Collection[str]) -> float | None:
+    """Where the side lies along which most of a mask touches, radians; None when it touches none."""
+    along = {"right": mask[:, -1], "bottom": mask[-1], "left": mask[:, 0], "top": mask[0]}
+    touched = {side: int(np.count_nonzero(along[side])) for side in SIDES if side in sides}
+    longest = max(touched, key=lambda side: touched[side], default=None)
+    return _BEARINGS[longest] if longest is not None and touched[longest] > 0 else None
 
 
 def _as_bytes(mask: NDArray[np.generic]) -> NDArray[np.uint8]:
@@ -124,14 +156,12 @@ def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], 
     return part, (x0, y0), shrink
 
 
-def _solid_largest(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """The largest 8-connected part, holes filled, and where its corner lies."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(part, connectivity=8)
-    if count <= 1:
-        return np.zeros_like(part), (0, 0)
-    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    x, y, w, h = (int(n) for n in stats[best, :4])
-    around = np.pad((labels[y : y + h, x : x + w] != best).astype(np.uint8), 1, constant_values=1)
+def _solid(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
+    """What belongs together, holes filled, and where its corner lies."""
+    whole = joined(part)
+    x, y, w, h = cv2.boundingRect(whole.astype(np.uint8))
+    inside = whole[y : y + h, x : x + w]
+    around = np.pad((~inside).astype(np.uint8), 1, constant_values=1)
     _, outside = cv2.connectedComponents(around, connectivity=4)
     return np.asarray(outside[1:-1, 1:-1] != outside[0, 0], dtype=np.uint8), (x, y)
 
@@ -164,13 +194,13 @@ def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
     return np.asarray(longest[:-1, ::-1], dtype=np.float64) if len(longest) > 8 else None
 
 
-def _in_units(outline: NDArray[np.float64], area: float, cut: bool) -> Silhouette:
-    """An outline in pixels of the image, scaled to unit area around its centroid."""
+def _in_units(outline: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """An outline in pixels scaled to unit area around its centroid, and the centroid."""
     outer, centroid = polygon_moments(outline)
     if outer < 0:
         outline, outer = outline[::-1], -outer
     contour = resample_closed((outline - centroid) / outer**0.5)
-    return Silhouette(contour, (float(centroid[0]), float(centroid[1])), area**0.5, area, cut)
+    return contour, (float(centroid[0]), float(centroid[1]))
 
 
 def polygon_moments(polygon: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

@@ -165,6 +165,8 @@ def _block(
         rows[k]["direction"] = view.direction or (np.nan, np.nan, np.nan)
         rows[k]["area"] = np.nan if view.area is None else view.area
         rows[k]["smoothing"], rows[k]["cut"] = view.smoothing, view.shape.cut
+        rows[k]["border"] = np.nan if view.shape.border is None else view.shape.border
+        rows[k]["areas"] = view.shape.areas
         rows[k]["root"] = node_records(view.shape.graph)[0]
         # Of the outline as it will be read, so that it does not matter where a view comes from.
         rows[k]["sketch"] = sketch(outline_heights(np.asarray(view.shape.contour, POINT.base)))
@@ -347,6 +349,7 @@ def _check_views(views: Records, also: Records, models: int) -> None:
         (np.isnan(area) | ((area > 0) & np.isfinite(area)), "an area that cannot be"),
         ((smoothing >= 0) & (smoothing < 1), "a smoothing that cannot be"),
         (views["cut"] <= 1, "a mark of a cut that is none"),
+        (np.isnan(views["border"]) | (np.abs(views["border"]) < 4), "a border that is nowhere"),
         (also["view"] < len(views), "a direction of no view"),
         (np.diff(also["view"].astype(np.int64)) >= 0, "directions in disorder"),
     ):

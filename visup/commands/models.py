@@ -211,12 +211,12 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
     table = Table(title=image.name, title_justify="left")
     for heading, side in (("", "right"), ("object", "left"), ("view", "right")):
         table.add_column(heading, justify=side, overflow="fold")  # type: ignore[arg-type]
-    for heading in ("similarity", "graph", "outline", "rotation"):
+    for heading in ("similarity", "graph", "outline", "area", "rotation"):
         table.add_column(heading, justify="right", no_wrap=True)
     for rank, m in enumerate(ranking.matches, start=1):
-        turn = "unknown" if m.rotation is None else f"{math.degrees(m.rotation):.0f}°"
+        turn = f"{math.degrees(m.rotation):.0f}°"
         mirrored = " mirrored" if m.likeness.mirrored else ""
-        terms = (m.similarity, m.likeness.of_graphs, m.likeness.of_outlines)
+        terms = (m.similarity, m.likeness.of_graphs, m.likeness.of_outlines, m.likeness.of_areas)
         figures = (f"{t:.3f}" for t in terms)
         table.add_row(str(rank), m.view.name, str(m.view.number), *figures, turn + mirrored)
     Console().print(table)

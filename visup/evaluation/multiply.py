@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.areas import area_map, painted
 from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.shape.records import NewView, View
@@ -18,6 +19,7 @@ from visup.percepts.shape.silhouette import polygon_moments
 STRENGTH = 0.18
 """Standard deviation of the stretch, and of the radii's change."""
 
+_PIXELS, _HALF = 32, 3.6
 _WAVES = 3
 
 Warp = Callable[[NDArray[np.floating]], NDArray[np.float64]]
@@ -75,7 +77,10 @@ def deformed(shape: Shape, seed: int, number: int) -> Shape:
     area, centre = polygon_moments(contour)
     unit = max(abs(area), 1e-6) ** 0.5
     outline = ((contour - centre) / unit).astype(np.float32)
-    return Shape(outline, _swollen(shape.graph, warp, centre, unit, rng), shape.cut)
+    graph = _swollen(shape.graph, warp, centre, unit, rng)
+    return Shape(
+        outline, graph, area_map(painted(outline, _PIXELS, _HALF) > 0.5), shape.cut, shape.border
+    )
 
 
 def _warp(rng: np.random.Generator) -> Warp:

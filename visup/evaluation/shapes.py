@@ -1,7 +1,7 @@
 """Shape retrieval against classes: leave one out over folders of silhouettes.
 
 Figures as the data's README defines them. The first line is the product as it is (shock graphs, then
-outlines); the second, `graph_alone`, is the shock graph without the outlines.
+outlines and areas); the second, `graph_alone`, is the shock graph without these.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.errors import SettingsError
+from visup.percepts.shape.areas import AreaIndex
 from visup.percepts.shape.build import PICTURES, read_silhouette
-from visup.percepts.shape.compare import GRAPH_SHARE, Shape, outline_similarities, shape_of
+from visup.percepts.shape.compare import GRAPH_SHARE, Shape, second_looks, shape_of
 from visup.percepts.shape.database import candidates_wanted
 from visup.percepts.shape.index import ViewIndex
 from visup.percepts.shape.match import WEIGHTS, match_nodes
@@ -38,7 +39,7 @@ class _Rows:
 
     rows: list[int]
     graphs: list[NDArray[np.float64]]
-    outlines: list[NDArray[np.float64]]
+    looks: list[NDArray[np.float64]]
     seconds: float
 
 
@@ -63,8 +64,9 @@ def evaluate_shapes(
     """
     labels, files = _listed(folder, limit)
     shapes, ms_shape = _shapes(files, progress)
-    graphs, outlines, ms_pair = _similarities(shapes, progress)
-    both = GRAPH_SHARE * graphs + (1 - GRAPH_SHARE) * outlines
+    graphs, looks, ms_pair = _similarities(shapes, progress)
+    both = GRAPH_SHARE * graphs + looks
+    np.fill_diagonal(both, 1.0)
     compared, lost = _pruning(shapes, both)
     items = _figures(both, labels)
     alone = _figures(graphs, labels)
@@ -113,9 +115,9 @@ def _shapes(
 def _similarities(
     shapes: list[Shape], progress: Callable[[str], None] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Similarities of graphs and of outlines of all pairs, and milliseconds a pair."""
+    """Similarities of graphs of all pairs, what the second looks add, and milliseconds a pair."""
     size = len(shapes)
-    graphs, outlines = np.eye(size), np.eye(size)
+    graphs, looks = np.eye(size), np.eye(size)
     begins = list(range(1, size, _ROWS))
     seconds = 0.0
     with ProcessPoolExecutor(
@@ -123,12 +125,12 @@ def _similarities(
     ) as pool:
         for done in pool.map(_compare_rows, begins):
             seconds += done.seconds
-            for i, g, o in zip(done.rows, done.graphs, done.outlines, strict=True):
+            for i, g, o in zip(done.rows, done.graphs, done.looks, strict=True):
                 graphs[i, :i] = graphs[:i, i] = g
-                outlines[i, :i] = outlines[:i, i] = o
+                looks[i, :i] = looks[:i, i] = o
             if progress:
                 progress(f"{done.rows[-1] + 1} of {size} queries")
-    return graphs, outlines, 1e3 * seconds / (size * (size - 1) / 2)
+    return graphs, looks, 1e3 * seconds / (size * (size - 1) / 2)
 
 
 class _Shared:
@@ -136,11 +138,13 @@ class _Shared:
 
     shapes: list[Shape]
     index: ViewIndex
+    areas: AreaIndex
 
 
 def _set_shapes(shapes: list[Shape]) -> None:
     _Shared.shapes = shapes
     _Shared.index = ViewIndex(shapes)
+    _Shared.areas = AreaIndex(np.stack([s.areas for s in shapes]))
     for shape in shapes:
         _ = shape.heights
 
@@ -149,8 +153,8 @@ def _compare_rows(begin: int) -> _Rows:
     start = time.perf_counter()
     rows = list(range(begin, min(begin + _ROWS, len(_Shared.shapes))))
     graphs = [_graph_row(i) for i in rows]
-    outlines = [outline_similarities(_Shared.shapes[i], _Shared.shapes[:i])[0] for i in rows]
-    return _Rows(rows, graphs, outlines, time.perf_counter() - start)
+    looks = [_looks_row(i) for i in rows]
+    return _Rows(rows, graphs, looks, time.perf_counter() - start)
 
 
 def _graph_row(i: int) -> NDArray[np.float64]:
@@ -165,6 +169,13 @@ def _graph_row(i: int) -> NDArray[np.float64]:
         else:
             out[j] = match_nodes(query, other, similar[j], WEIGHTS.root).similarity
     return out
+
+
+def _looks_row(i: int) -> NDArray[np.float64]:
+    """What outlines and areas give to the similarities of one shape with all before it."""
+    query = _Shared.shapes[i]
+    overlaps = _Shared.areas.overlaps(query.areas, np.arange(i))
+    return second_looks(query, _Shared.shapes[:i], overlaps).worth
 
 
 def _pruning(
