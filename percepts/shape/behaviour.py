@@ -88,7 +88,7 @@ class ShapeBehaviour:
         """Hypotheses for all regions of a frame, the best of each region first.
 
         Args:
-            frame: The frame; only its time is used.
+            frame: The frame; its time and its size are used.
             seen: Holds the regions.
             directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
                 (data: names) has these compared whatever the index says.
@@ -100,9 +100,7 @@ class ShapeBehaviour:
         here = {r.id for r in regions}
         self._remembered = {k: v for k, v in self._remembered.items() if k in here}
         for region in self._due(regions, frame.time, restrict):
-            self._remembered[region.id] = self._match(
-                self.database, region, frame.time, restrict, first
-            )
+            self._remembered[region.id] = self._match(self.database, region, frame, restrict, first)
         return [
             Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
             for r in regions
@@ -143,11 +141,11 @@ class ShapeBehaviour:
         self,
         database: ModelDatabase,
         region: Region,
-        time: float,
+        frame: Frame,
         restrict: frozenset[str] | None,
         first: Collection[str],
     ) -> _Remembered:
-        silhouette = normalise(region.mask, cut=region.cut)
+        silhouette = normalise(region.mask, cut=region.cut, sides=_border_sides(region, frame))
         found: tuple[ViewMatch, ...] = ()
         if silhouette is not None:
             found = database.query(
@@ -160,7 +158,7 @@ class ShapeBehaviour:
                 budget=self.settings.budget,
             ).matches
         return _Remembered(
-            time=time,
+            time=frame.time,
             thumb=_thumb(region),
             aspect=_aspect(region),
             cut=region.cut,
@@ -168,6 +166,14 @@ class ShapeBehaviour:
             hypotheses=tuple(_hypothesis(region, m) for m in found),
             areas=tuple(m.view.area for m in found),
         )
+
+
+def _border_sides(region: Region, frame: Frame) -> tuple[str, ...]:
+    """Sides of a region's box that lie on the image border."""
+    x, y, w, h = region.bbox
+    height, width = frame.image.shape[:2]
+    lies = {"right": x + w >= width, "bottom": y + h >= height, "left": x <= 0, "top": y <= 0}
+    return tuple(side for side, on in lies.items() if on)
 
 
 def _aspect(region: Region) -> float:

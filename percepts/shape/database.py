@@ -112,7 +112,7 @@ class ModelDatabase:
         """Rank the views that a shape looks like.
 
         A cut shape is compared with cut views as it is, and with whole views as they look when they are
-        cut in the same way.
+        cut in the same way; one of which it is not known where the border lies, as it is.
 
         Args:
             shape: A mask (H, W) bool, a silhouette or a shape.
@@ -137,7 +137,7 @@ class ModelDatabase:
         most = candidates_wanted(len(self.views), budget)
         wanted = Wanted(top, per_name, threshold, most, mirror)
         favoured = np.intersect1d(self.views.named(try_first), among) if try_first else None
-        if not query.cut:
+        if not query.cut or query.border is None:
             return self._search.whole(query, among, wanted, favoured)
         cut_views = self.views.cut[among]
         alike = self._search.whole(query, among[cut_views], wanted, favoured)

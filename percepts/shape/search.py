@@ -193,21 +193,22 @@ class Search:
             among: Numbers of whole views to be searched, rising.
             wanted: What is wanted.
         """
-        if query.border is None or not len(among):
+        border = query.border
+        if border is None or not len(among):
             return Ranking((), 0)
         if len(among) > CUT_VIEWS:
             among = self.index.best_covered(query, among, CUT_VIEWS)
-        own = query_map(query.contour, query.border)
+        own = query_map(query.contour, border)
         likely = self._cut_index.likeliest(own, among, wanted.most, mirror=wanted.mirror)
         left = [_left_of(self._shapes[number], cut) for number, cut in likely]
-        looks = second_looks(query, left, _covered([c for _, c in likely], query.border))
+        looks = second_looks(query, left, _covered([c for _, c in likely], border))
         found = [
-            self._cut_match(query, number, cut, looks.joined(n, self._part(query, number, cut)))
+            self._cut_match(number, cut, looks.joined(n, self._part(query, number, cut)))
             for n, (number, cut) in enumerate(likely)
         ]
         return Ranking(tuple(wanted.best(found)), len(likely))
 
-    def _cut_match(self, query: Shape, number: int, cut: Cut, likeness: Likeness) -> ViewMatch:
+    def _cut_match(self, number: int, cut: Cut, likeness: Likeness) -> ViewMatch:
         lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
         return ViewMatch(self._views[number], lowered, cut)
 

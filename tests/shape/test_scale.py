@@ -96,7 +96,7 @@ def test_only_candidates_are_ever_read(many: ModelDatabase) -> None:
 
     rows = many.views.records
     shapes = Reads()
-    index = ViewIndex(shapes, summaries=Summaries(rows["root"], rows["sketch"]))
+    index = ViewIndex(shapes, summaries=Summaries.read(rows))
     found = index.candidates(shape(ZOO["star"]), None, 20)
     assert asked == set(found.numbers.tolist())
     assert len(asked) == 20
