@@ -45,11 +45,20 @@ def outline_heights(contour: NDArray[np.floating]) -> NDArray[np.float32]:
     tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     tangent /= np.hypot(*tangent.T)[:, None] + 1e-12
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    following = (np.arange(POINTS)[:, None] + np.arange(1, POINTS)) % POINTS
-    heights = np.einsum("ijk,ik->ij", points[following] - points[:, None], normal)
-    stops = np.linspace(0, POINTS - 1, HEIGHTS + 1).round().astype(int)
+    following, stops = _following()
+    # Height over the tangent: along the normal, from the point itself.
+    along = normal @ points.T
+    heights = np.take_along_axis(along, following, axis=1) - np.diagonal(along)[:, None]
     means = np.add.reduceat(heights, stops[:-1], axis=1) / np.diff(stops)
     return np.asarray(means / (np.abs(means).max(axis=0) + 0.05), dtype=np.float32)
+
+
+@lru_cache(maxsize=1)
+def _following() -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Numbers of the points that follow each, in order, and where each stretch of them begins."""
+    following = (np.arange(POINTS)[:, None] + np.arange(1, POINTS)) % POINTS
+    stops = np.linspace(0, POINTS - 1, HEIGHTS + 1).round().astype(np.intp)
+    return following.astype(np.intp), stops
 
 
 def complexity(heights: NDArray[np.float32]) -> float:

@@ -202,20 +202,28 @@ class Search:
         likely = self._cut_index.likeliest(own, among, wanted.most, mirror=wanted.mirror)
         left = [_left_of(self._shapes[number], cut) for number, cut in likely]
         looks = second_looks(query, left, _covered([c for _, c in likely], border))
-        found = [
-            self._cut_match(number, cut, looks.joined(n, self._part(query, number, cut)))
-            for n, (number, cut) in enumerate(likely)
-        ]
-        return Ranking(tuple(wanted.best(found)), len(likely))
+        found: list[ViewMatch] = []
+        for n in np.argsort(-looks.worth, kind="stable"):
+            if CUT_SHARE * (GRAPH_SHARE + float(looks.worth[n])) < wanted.least(found):
+                break
+            number, cut = likely[n]
+            graphs = self._part(
+                query, number, cut, wanted.least(found) / CUT_SHARE - looks.worth[n]
+            )
+            likeness = looks.joined(int(n), graphs)
+            lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
+            found = wanted.best([*found, ViewMatch(self._views[number], lowered, cut)])
+        return Ranking(tuple(found), len(likely))
 
-    def _cut_match(self, number: int, cut: Cut, likeness: Likeness) -> ViewMatch:
-        lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
-        return ViewMatch(self._views[number], lowered, cut)
+    def _part(self, query: Shape, number: int, cut: Cut, least: float) -> Match:
+        """The query's graph as a part of a view's, in the view's unit of length.
 
-    def _part(self, query: Shape, number: int, cut: Cut) -> Match:
-        """The query's graph as a part of a view's, in the view's unit of length."""
+        Where they cannot give so much to the similarity as is needed, nothing is matched.
+        """
         graph = _scaled(query.graph, (1.0 - cut.share) ** 0.5)
-        _, similar = self._part_index.bounds(graph, np.array([number]), part=True)
+        bounds, similar = self._part_index.bounds(graph, np.array([number]), part=True)
+        if GRAPH_SHARE * bounds[0] < least:
+            return Match(0.0, ())
         return match_nodes(graph, self._shapes[number].graph, similar[0], 0.0, part=True)
 
 
