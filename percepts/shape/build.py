@@ -141,6 +141,13 @@ def silhouette_views(
 ) -> list[NewView]:
     """Exemplars of silhouettes, ready to be stored.
 
+    Whole silhouettes and those that a border cuts are clustered apart: none stands for the other.
+
+    Args:
+        name: Of the model.
+        masks: (H, W) bool each, whole pictures.
+        clusters: How many exemplars, shared between whole and cut ones by their numbers.
+
     Raises:
         DatabaseError: No mask shows anything.
     """
@@ -154,8 +161,17 @@ def silhouette_views(
     # All pairs are compared: of a long video, every so manyth frame stands for those around it.
     every = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
     some = [shapes[k] for k in every]
-    chosen = medoids(similarity_matrix(some), clusters)
-    return [NewView(name, None, None, some[k]) for k in chosen]
+    cut = [s for s in some if s.cut]
+    of_cut = round(clusters * len(cut) / len(some))
+    if 0 < len(cut) < len(some) and clusters > 1:
+        of_cut = min(max(1, of_cut), clusters - 1)
+    groups = (([s for s in some if not s.cut], clusters - of_cut), (cut, of_cut))
+    return [
+        NewView(name, None, None, group[k])
+        for group, count in groups
+        if count
+        for k in medoids(similarity_matrix(group), count)
+    ]
 
 
 def build_database(

@@ -14,6 +14,8 @@ from tests.shape.shapes import ZOO, flower, limbs, small_database
 from visup.agent.errors import DatabaseError, SettingsError, VisupError
 from visup.commands.models import app
 from visup.evaluation.shapes import evaluate_shapes
+from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.drawing import COLOURS
 
 SHARED = Path(__file__).resolve().parents[2] / "../shared/data"
 
@@ -46,6 +48,9 @@ def test_a_database_is_built_listed_and_shown(tmp_path: Path) -> None:
     sheet = cv2.imread(str(out))
     assert sheet is not None
     assert sheet.std() > 10
+    assert run("show", db).exit_code == 0
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "m-sheet.png")), sheet)
+    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize("invert", [False, True], ids=["white on black", "black on white"])
@@ -69,6 +74,59 @@ def test_exemplars_are_added_under_a_name(zoo: Path, tmp_path: Path) -> None:
     assert f"{len(ZOO) + 1} models, {len(ZOO) + 2} views" in added.output
 
 
+def test_masks_of_a_video_are_added_with_what_the_border_cuts(zoo: Path, tmp_path: Path) -> None:
+    whole = ZOO["star"]
+    for k in range(6):
+        # The star leaves the picture to the left; something else stands beside it.
+        frame = np.roll(whole, -30 * k, axis=1).astype(np.uint8) * 7
+        frame[:, whole.shape[1] - 30 * k :] = 0
+        frame[:12, -40:] = 9
+        assert cv2.imwrite(str(make(tmp_path / "masks") / f"{k:05}.png"), frame)
+    args = ("add", zoo, "--name", "comet", "--masks", tmp_path / "masks", "--label", 7)
+    added = run(*args, "--clusters", 3)
+    assert added.exit_code == 0, added.output
+    own = [v for v in ModelDatabase.open(zoo).views if v.name == "comet"]
+    assert len(own) == 3
+    assert any(v.cut for v in own)
+    assert not all(v.cut for v in own)
+    again = run(*args, "--clusters", 1)
+    assert again.exit_code == 0, again.output
+    own = [v for v in ModelDatabase.open(zoo).views if v.name == "comet"]
+    assert [v.number for v in own] == [0, 1, 2, 3]
+
+
+def make(folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def test_a_match_is_drawn_with_its_reasons(zoo: Path, tmp_path: Path) -> None:
+    picture, out = save(ZOO["walker"], tmp_path / "p.png"), tmp_path / "why.png"
+    drawn = run("match", zoo, picture, "--out", out)
+    assert drawn.exit_code == 0, drawn.output
+    image = cv2.imread(str(out))
+    assert image is not None
+    # Every kind of shock that is there shows in its colour, in the legend if nowhere else.
+    for red, green, blue in COLOURS.values():
+        near = np.abs(image.astype(int) - (blue, green, red)).max(axis=2) < 12
+        assert near.sum() > 20
+    # The walker itself is the best view: lines join nodes at equal heights, in full colour.
+    assert (image[44:216, 500:920].std(axis=2) > 30).sum() > 500
+
+
+def test_the_table_of_a_match_fits_eighty_columns(
+    zoo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    name = "a_long_name_of_a_model_that_nobody_would_choose"
+    picture = save(ZOO["walker"], tmp_path / name / "p.png")
+    run("add", zoo, "--name", name, "--silhouettes", picture.parent)
+    lines = run("match", zoo, picture).output.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "similarity" in "".join(lines)
+    assert "0.99" in "".join(lines) or "1.000" in "".join(lines)
+
+
 @pytest.mark.parametrize(
     ("args", "error"),
     [
@@ -79,6 +137,11 @@ def test_exemplars_are_added_under_a_name(zoo: Path, tmp_path: Path) -> None:
         (("match", "zoo.db", "empty.png"), DatabaseError),
         (("add", "zoo.db", "--name", "x", "--silhouettes", "nowhere"), DatabaseError),
         (("add", "zoo.db", "--name", " ", "--silhouettes", "."), SettingsError),
+        (("add", "zoo.db", "--name", "x"), SettingsError),
+        (("add", "zoo.db", "--name", "x", "--silhouettes", ".", "--masks", "."), SettingsError),
+        (("add", "zoo.db", "--name", "x", "--silhouettes", ".", "--label", "3"), SettingsError),
+        (("add", "zoo.db", "--name", "x", "--masks", ".", "--label", "3"), DatabaseError),
+        (("match", "zoo.db", "walker.png", "--out", "nowhere/a.png"), VisupError),
         (("build", "new.db", "walker.png"), DatabaseError),
         (("build", "new.db", "walker.png", "--views", 0), SettingsError),
         (("show", "zoo.db", "--out", "nowhere/a.png"), VisupError),

@@ -113,7 +113,8 @@ def test_growth_is_measured(tmp_path: Path) -> None:
     trimesh.creation.box(extents=(1, 2, 3)).export(tmp_path / "box.ply")
     figures = evaluate_scale(tmp_path, most=200)
     first, second, largest = figures["items"].values()
-    assert first["lost"] == second["lost"] == 0.0
+    assert first["lost"] == 0.0
+    assert 0.0 <= second["lost"] <= 0.5
     assert largest["open_ms"] > 0
     assert largest["compared"] < first["compared"]
     assert figures["total"]["slower"] > 0
