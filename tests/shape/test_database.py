@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tests.shape.shapes import ZOO, flower, limbs, shape, small_database
 from visup.agent.errors import DatabaseError, SettingsError
-from visup.percepts.shape import build
+from visup.percepts.shape import build, parts
 from visup.percepts.shape.build import (
     build_database,
     building_folder,
@@ -156,8 +156,9 @@ def test_a_database_is_built_alike_by_one_process_or_two(tmp_path: Path) -> None
 def test_a_build_that_was_killed_goes_on_where_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(parts, "VIEWS_OF_A_PART", 3)
     meshes = [box(tmp_path / "a.ply"), box(tmp_path / "b.ply", (1, 1, 4))]
-    whole = build_database(tmp_path / "whole.db", meshes, views=70)
+    whole = build_database(tmp_path / "whole.db", meshes, views=5)
     target = tmp_path / "killed.db"
     rendered: list[str] = []
     once = build.rendered
@@ -170,13 +171,13 @@ def test_a_build_that_was_killed_goes_on_where_it_was(
 
     monkeypatch.setattr(build, "rendered", dies)
     with pytest.raises(KeyboardInterrupt):
-        build_database(target, meshes, views=70)
+        build_database(target, meshes, views=5)
     assert not target.exists()
     kept = building_folder(target)
     assert len(list(kept.iterdir())) == 2
     # One of the two that are done is damaged: it alone is made again, with what is missing.
     sorted(kept.iterdir())[0].write_bytes(b"cut short")
-    again = build_database(target, meshes, views=70)
+    again = build_database(target, meshes, views=5)
     assert len(rendered) == 3 + 3
     assert again.path.read_bytes() == whole.path.read_bytes()
     assert not kept.exists()

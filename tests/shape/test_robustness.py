@@ -27,9 +27,10 @@ def test_damaged_files_and_odd_masks_are_refused_answered_or_nothing() -> None:
 
 
 def test_a_campaign_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
+    sound = sound_database(tmp_path / "sound.db", 0).path.read_bytes()
+    assert sound_database(tmp_path / "again.db", 0).path.read_bytes() == sound
     for kind in DAMAGES:
         contents = []
-        sound = sound_database(tmp_path / "sound.db", 0).path.read_bytes()
         for _ in range(2):
             damage(tmp_path / "damaged.db", sound, kind, np.random.default_rng(4))
             contents.append((tmp_path / "damaged.db").read_bytes())
