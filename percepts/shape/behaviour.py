@@ -35,6 +35,7 @@ class ShapeSettings:
         unchanged: Overlap (IoU) with the silhouette last matched above which it counts as unchanged.
         matches_per_frame: Regions matched in one frame at most; the others wait their turn.
         budget: Share of the database's views that one match may compare in full.
+        budget_ms: Milliseconds for the matches of one frame together; see `ModelDatabase.query_all`.
     """
 
     threshold: float = 0.4
@@ -45,6 +46,7 @@ class ShapeSettings:
     unchanged: float = 0.97
     matches_per_frame: int = 2
     budget: float = 0.1
+    budget_ms: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,8 +101,10 @@ class ShapeBehaviour:
         restrict, first = _wishes(directives)
         here = {r.id for r in regions}
         self._remembered = {k: v for k, v in self._remembered.items() if k in here}
-        for region in self._due(regions, frame.time, restrict):
-            self._remembered[region.id] = self._match(self.database, region, frame, restrict, first)
+        due = self._due(regions, frame.time, restrict)
+        found = self._match(self.database, due, frame, restrict, first)
+        for region, matches in zip(due, found, strict=True):
+            self._remembered[region.id] = _remembered(region, frame.time, restrict, matches)
         return [
             Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
             for r in regions
@@ -140,32 +144,42 @@ class ShapeBehaviour:
     def _match(
         self,
         database: ModelDatabase,
-        region: Region,
+        regions: Sequence[Region],
         frame: Frame,
         restrict: frozenset[str] | None,
         first: Collection[str],
-    ) -> _Remembered:
-        silhouette = normalise(region.mask, cut=region.cut, sides=_border_sides(region, frame))
-        found: tuple[ViewMatch, ...] = ()
-        if silhouette is not None:
-            found = database.query(
-                silhouette,
+    ) -> list[tuple[ViewMatch, ...]]:
+        """What each of the regions looks like; nothing for one that has no shape."""
+        silhouettes = [
+            normalise(r.mask, cut=r.cut, sides=_border_sides(r, frame)) for r in regions
+        ]
+        rankings = iter(
+            database.query_all(
+                [s for s in silhouettes if s is not None],
+                budget_ms=self.settings.budget_ms,
                 top=self.settings.most,
                 per_name=self.settings.per_name,
                 threshold=self.settings.threshold,
                 restrict=restrict,
                 try_first=first,
                 budget=self.settings.budget,
-            ).matches
-        return _Remembered(
-            time=frame.time,
-            thumb=_thumb(region),
-            aspect=_aspect(region),
-            cut=region.cut,
-            restrict=restrict,
-            hypotheses=tuple(_hypothesis(region, m) for m in found),
-            areas=tuple(m.view.area for m in found),
+            )
         )
+        return [() if s is None else next(rankings).matches for s in silhouettes]
+
+
+def _remembered(
+    region: Region, time: float, restrict: frozenset[str] | None, found: tuple[ViewMatch, ...]
+) -> _Remembered:
+    return _Remembered(
+        time=time,
+        thumb=_thumb(region),
+        aspect=_aspect(region),
+        cut=region.cut,
+        restrict=restrict,
+        hypotheses=tuple(_hypothesis(region, m) for m in found),
+        areas=tuple(m.view.area for m in found),
+    )
 
 
 def _border_sides(region: Region, frame: Frame) -> tuple[str, ...]:

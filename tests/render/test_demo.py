@@ -13,7 +13,7 @@ import pytest
 import trimesh
 
 from visup.percepts.shape.database import ModelDatabase
-from visup.percepts.shape.views import render_views, sphere_directions
+from visup.percepts.shape.views import half_sphere_directions, render_views
 from visup.render.demo_clip import CLIP, RECORD
 from visup.render.demo_models import MODELS, rendered_views, view_counts
 from visup.render.library import shipped_scenario
@@ -147,7 +147,7 @@ def test_each_shipped_view_is_found_again_by_its_silhouette() -> None:
     solid = mesh("spartan")
     body = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
     views = [v for v in database.views if v.name == "spartan"][::5]
-    for view, seen in zip(views, render_views(body, sphere_directions(22)[::5]), strict=True):
+    for view, seen in zip(views, render_views(body, half_sphere_directions(22)[::5]), strict=True):
         best = database.query(seen.mask, top=1).matches[0]
         assert (best.view.name, best.view.number) == ("spartan", view.number)
         assert best.similarity > 0.99

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from visup.agent.records import (
 )
 from visup.percepts.depth import DepthBehaviour, focal_px
 from visup.percepts.shape.behaviour import ShapeBehaviour, ShapeSettings
+from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.database import ModelDatabase, Ranking
 
 SIZE = (640, 480)
@@ -125,6 +127,39 @@ def test_a_frame_never_pays_for_more_matches_than_it_may(database: Counting) -> 
         hypotheses(behaviour, k / 25, regions)
         counts.append(database.queries - before)
     assert counts == [2, 2, 1, 0]
+
+
+def test_regions_of_a_frame_are_matched_in_one_call(
+    database: Counting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[int, object]] = []
+    every = Counting.query_all
+
+    def count(self: Counting, shapes: Sequence[Shape], **wanted: Any) -> tuple[Ranking, ...]:
+        calls.append((len(shapes), wanted["budget_ms"]))
+        return every(self, shapes, **wanted)
+
+    monkeypatch.setattr(Counting, "query_all", count)
+    speck = region(np.ones((3, 3), bool), 3)
+    behaviour = ShapeBehaviour(database, ShapeSettings(matches_per_frame=5, budget_ms=40.0))
+    found = hypotheses(behaviour, 0.0, [region(ZOO["star"], 1), speck, region(ZOO["pear"], 2)])
+    # What is too small to have a shape is no reason to ask.
+    assert calls == [(2, 40.0)]
+    assert {h.region_id for h in found} == {1, 2}
+    hypotheses(behaviour, 0.04, [region(ZOO["star"], 1), speck, region(ZOO["pear"], 2)])
+    assert database.queries == 2
+
+
+def test_an_unchanged_region_is_not_matched_again_before_it_is_time(database: Counting) -> None:
+    behaviour = ShapeBehaviour(database)
+    moved = [region(np.roll(ZOO["walker"], k, axis=1)) for k in range(40)]
+    for k, seen in enumerate(moved):
+        hypotheses(behaviour, k / 25, [seen])
+    assert database.queries == 1
+    hypotheses(behaviour, ShapeSettings().renew_s + 0.1, [moved[0]])
+    assert database.queries == 2
+    hypotheses(behaviour, ShapeSettings().renew_s + 0.4, [region(np.rot90(ZOO["walker"]))])
+    assert database.queries == 3
 
 
 def test_a_directive_restricts_the_names(database: Counting) -> None:

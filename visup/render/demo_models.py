@@ -17,9 +17,10 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from visup.percepts.shape.build import mesh_views, silhouette_views
+from visup.percepts.shape.build import rendered, silhouette_views
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.shape.records import NewView
+from visup.percepts.shape.views import half_sphere_directions
 from visup.render.library import shipped_scenario
 from visup.render.meshes import mesh
 from visup.render.renderer import Renderer
@@ -45,13 +46,14 @@ def view_counts() -> dict[str, int]:
 
 
 def rendered_views(name: str, count: int) -> list[NewView]:
-    """Views of one of our meshes from directions spread evenly over the sphere."""
+    """Views of one of our meshes from directions spread evenly over half of the sphere."""
     solid = mesh(name)
     with TemporaryDirectory() as folder:
         # Through a file, as any user's mesh would come, so that both are treated alike.
         path = Path(folder) / f"{name}.ply"
         trimesh.Trimesh(solid.vertices, solid.faces, process=False).export(path)
-        return mesh_views(path, count)
+        # Symmetric views stay apart, so that there are as many as the paper had.
+        return rendered(path, half_sphere_directions(count))
 
 
 def arm_masks(every: int = EVERY) -> list[NDArray[np.bool_]]:
