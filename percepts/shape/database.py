@@ -5,13 +5,14 @@ Read `search.py` for the search, `storage.py` for the file and `build.py` for wh
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.shape.budget import share_within
 from visup.percepts.shape.catalogue import Shapes, Views
 from visup.percepts.shape.compare import Shape, shape_of
 from visup.percepts.shape.directions import neighbours
@@ -87,6 +88,49 @@ class ModelDatabase:
             self._neighbours[view.name] = neighbours([self.views[k].seen_from for k in own])
         return tuple(self.views[own[k]] for k in self._neighbours[view.name][view.number])
 
+    def query_all(
+        self,
+        shapes: Sequence[NDArray[np.bool_] | Silhouette | Shape],
+        *,
+        budget_ms: float | None = None,
+        top: int = 10,
+        per_name: int | None = None,
+        threshold: float = 0.0,
+        restrict: Collection[str] | None = None,
+        try_first: Collection[str] = (),
+        budget: float = 0.1,
+    ) -> tuple[Ranking, ...]:
+        """Rank the views that each of several shapes looks like, such as all regions of a frame.
+
+        Args:
+            shapes: Masks (H, W) bool of what no border cuts, silhouettes or shapes.
+            budget_ms: Milliseconds for all together on the machine of the benchmarks, shared evenly;
+                the likeliest views are compared first. See `budget.py`.
+            top: For each shape, as for `query`; so are the rest.
+            per_name: See `query`.
+            threshold: See `query`.
+            restrict: See `query`.
+            try_first: See `query`.
+            budget: See `query`.
+
+        Returns:
+            A ranking for each shape.
+        """
+        if budget_ms is not None and shapes:
+            budget = min(budget, share_within(budget_ms / len(shapes), len(self.views)))
+        return tuple(
+            self.query(
+                shape,
+                top=top,
+                per_name=per_name,
+                threshold=threshold,
+                restrict=restrict,
+                try_first=try_first,
+                budget=budget,
+            )
+            for shape in shapes
+        )
+
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
         """Add views, to names new or known; the database as it is then. See `build.py`.
 
@@ -122,8 +166,8 @@ class ModelDatabase:
             threshold: Least similarity.
             restrict: Names that alone are searched; all when None.
             try_first: Names whose likeliest views are compared whatever the index says.
-            budget: Share of the views that may be compared in full: at least 16 are, and at most
-                `CANDIDATES`. With 1, all are.
+            budget: Share of the views that may be compared in full: at least 16 are (4 when less than
+                the usual tenth is asked for), and at most `CANDIDATES`. With 1, all are.
             mirror: Whether a view is also recognised by its mirror image, which is what is seen from
                 behind.
 
@@ -147,10 +191,10 @@ class ModelDatabase:
 
 
 def candidates_wanted(views: int, budget: float = 0.1) -> int:
-    """How many of so many views are compared in full: a share of them, but 16 to `CANDIDATES`."""
+    """How many of so many views are compared in full: a share of them, within limits (see `query`)."""
     if budget >= 1:
         return views
-    return int(min(CANDIDATES, max(16, budget * views)))
+    return int(min(CANDIDATES, max(16 if budget >= 0.1 else 4, budget * views)))
 
 
 def as_shape(shape: NDArray[np.bool_] | Silhouette | Shape, cut: bool = False) -> Shape | None:

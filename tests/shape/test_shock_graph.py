@@ -40,6 +40,9 @@ MODULES = (
     "shape.cluster",
     "shape.views",
     "shape.pictures",
+    "shape.sketch",
+    "shape.directions",
+    "shape.budget",
     "depth",
 )
 
