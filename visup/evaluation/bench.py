@@ -12,6 +12,7 @@ EVALUATIONS = (
     ("shapes", "shapes/kimia99"),
     ("shapes", "shapes/mpeg7-half"),
     ("views", "models"),
+    ("scale", "models"),
     ("motion", "missions"),
     ("motion", "video/davis"),
     ("motion", "video/static"),
@@ -26,7 +27,7 @@ def main() -> int:
     """Run the evaluations one after another; figures go to the terminal and to JSON files.
 
     Returns:
-        0 when all ran and no clip missed its bar, else 1; what has no data is left out.
+        0 when all ran and none missed its bar, else 1; what has no data is left out.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     beside = Path.cwd().parent / "shared" / "data"
@@ -35,8 +36,12 @@ def main() -> int:
     parser.add_argument("--only", help="only evaluations whose name contains this")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    # Rendered clips need no data.
-    results = [_run("clips", None, given.out)] if (given.only or "") in "clips" else []
+    # Rendered clips and what is damaged on purpose need no data.
+    results = [
+        _run(kind, None, given.out)
+        for kind in ("clips", "robustness")
+        if (given.only or "") in kind
+    ]
     if not given.data.is_dir():
         print(f"no data at {given.data}: nothing else to measure (see --data)")
     results += [
