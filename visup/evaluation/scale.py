@@ -59,8 +59,9 @@ def evaluate_scale(
         `items` by number of views, each with `open_ms`, `first_ms` (the first query), `ms_query` (median
         from mask to ranked list), `ms_search` (the database's part of it), `ms_worst`, `rss_mb`,
         `compared` (share of views) and, up to ten times the meshes' views, `lost` (share of exhaustive
-        search's best matches; among many views, of a sample of the queries); `total` with `build_views_per_s` and `slower` (time of a query with
-        ten times the views by the time with once the views).
+        search's best matches; among many views, of a sample of the queries); `total` with
+        `build_views_per_s` and `slower` (time of a query with ten times the views by the time with
+        once the views).
 
     Raises:
         SettingsError: There are no meshes.
