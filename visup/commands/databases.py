@@ -16,6 +16,7 @@ SCALE_KEYS = (
     "first_ms",
     "ms_query",
     "ms_search",
+    "ms_cpu",
     "ms_worst",
     "rss_mb",
     "compared",
