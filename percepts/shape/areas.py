@@ -87,7 +87,9 @@ def painted(contour: NDArray[np.floating], pixels: int, half: float) -> NDArray[
     side = int(2 * half * pixels)
     canvas = np.zeros((side, side), dtype=np.uint8)
     spots = np.round((np.asarray(contour) + half) * pixels * 16 - 8).astype(np.int32)
-    cv2.fillPoly(canvas, [spots], 255, lineType=cv2.LINE_AA, shift=4)
+    cv2.fillPoly(canvas, [spots], 255, shift=4)
+    # The pixels along the outline are painted whole, but only half of them is inside.
+    cv2.polylines(canvas, [spots], True, 128, shift=4)
     return np.asarray(canvas.astype(np.float32) / np.float32(255), dtype=np.float32)
 
 

@@ -70,7 +70,7 @@ class _Picture:
 
     def __init__(self, contour: NDArray[np.floating]) -> None:
         self.tone = _blurred(contour)
-        rows, columns = np.nonzero(painted(contour, _SAMPLE, _HALF) > 0.5)
+        rows, columns = np.nonzero(painted(contour, _SAMPLE, _HALF) > 0.6)
         self.points = (np.stack([columns, rows], axis=1) + 0.5) / _SAMPLE - _HALF
 
     def cut(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -80,7 +80,7 @@ class _Picture:
             (B, S, R * A) float64, the weighted map of each, the line on the right; and the lines' offsets
             (B, S).
         """
-        bearings, shares = np.arange(BEARINGS) * (2 * np.pi / BEARINGS), np.array(SHARES)
+        bearings, shares = _bearings(), np.array(SHARES)
         normals = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
         heights = self.points @ normals.T
         order = np.argsort(heights, axis=0)
@@ -257,6 +257,10 @@ def what_is_left(contour: NDArray[np.floating], cut: Cut) -> NDArray[np.float64]
         return points
     area, centroid = polygon_moments(kept)
     return resample_closed((kept - centroid) / max(abs(area), 1e-9) ** 0.5)
+
+
+def _bearings() -> NDArray[np.float64]:
+    return np.asarray(np.arange(BEARINGS) * (2 * np.pi / BEARINGS), dtype=np.float64)
 
 
 @lru_cache(maxsize=1)

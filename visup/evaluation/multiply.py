@@ -79,7 +79,7 @@ def deformed(shape: Shape, seed: int, number: int) -> Shape:
     outline = ((contour - centre) / unit).astype(np.float32)
     graph = _swollen(shape.graph, warp, centre, unit, rng)
     return Shape(
-        outline, graph, area_map(painted(outline, _PIXELS, _HALF) > 0.5), shape.cut, shape.border
+        outline, graph, area_map(painted(outline, _PIXELS, _HALF) > 0.6), shape.cut, shape.border
     )
 
 
