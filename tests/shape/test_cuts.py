@@ -52,8 +52,10 @@ def test_only_given_sides_can_cut() -> None:
     box = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     top = normalise(box, cut=True, sides=("top",))
     nowhere = normalise(box, cut=True, sides=())
-    assert top is not None and top.border == pytest.approx(-np.pi / 2)
-    assert nowhere is not None and nowhere.border is None
+    assert top is not None
+    assert top.border == pytest.approx(-np.pi / 2)
+    assert nowhere is not None
+    assert nowhere.border is None
     assert silhouette(box).border is None
 
 
