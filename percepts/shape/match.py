@@ -3,7 +3,9 @@
 After figure 3 of the paper (Shokoufandeh et al. 2005): every node of the one graph is compared with every
 node of the other, by what it looks like and by its topological signature; a maximum-cardinality,
 best-weight bipartite matching is found; its best pair is taken for true; the graphs are split at that
-pair, so that what hangs below one node may only match what hangs below the other; and so on.
+pair, so that what hangs below one node should match what hangs below the other; and so on. Where two
+limbs are about as thick, noise decides which of them hangs below the other. Therefore, other than in the
+paper, a pair that contradicts a better one is not forbidden, it is worth less.
 
 Node features are embedded such that the similarity of two nodes is exp(-|a - b|^2): one matrix product
 compares a silhouette with a whole database.
@@ -19,6 +21,9 @@ from scipy.optimize import linear_sum_assignment
 
 from visup.percepts.shape.shock_graph import ShockGraph
 
+BREAK = 0.9
+"""What a pair is worth that contradicts the hierarchy of a better one, for each such one."""
+
 
 @dataclass(frozen=True, slots=True)
 class MatchWeights:
@@ -26,7 +31,6 @@ class MatchWeights:
 
     Attributes:
         kind: Different kinds of shock.
-        mass: Square root of the share of the area.
         length: Square root of the length along the skeleton.
         profile: Square roots of the radii along the node.
         context: What the shape looks like from the node.
@@ -35,12 +39,11 @@ class MatchWeights:
     """
 
     kind: float = 0.2
-    mass: float = 0.8
-    length: float = 0.5
-    profile: float = 2.0
-    context: float = 2.0
-    signature: float = 0.12
-    root: float = 0.45
+    length: float = 0.3
+    profile: float = 3.5
+    context: float = 2.2
+    signature: float = 0.05
+    root: float = 0.15
 
 
 WEIGHTS = MatchWeights()
@@ -70,13 +73,12 @@ def embed(graph: ShockGraph, weights: MatchWeights = WEIGHTS) -> NDArray[np.floa
         (N, D) float32.
     """
     kind = np.eye(5, dtype=np.float32)[graph.kinds] * weights.kind
-    mass = np.sqrt(graph.weights)[:, None] * weights.mass
     length = np.sqrt(graph.lengths)[:, None] * weights.length
     scale = weights.profile / graph.profiles.shape[1] ** 0.5
     profile = np.sqrt(graph.profiles) * scale
     context = np.sqrt(graph.contexts) * weights.context
     signature = graph.signatures * weights.signature
-    return np.hstack([kind, mass, length, profile, context, signature]).astype(np.float32)
+    return np.hstack([kind, length, profile, context, signature]).astype(np.float32)
 
 
 def node_similarities(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -127,18 +129,20 @@ def match_nodes(
     shares = 0.5 * (a.weights[:, None] + theirs) * similar
     pairs = correspond(a.below, b.below, shares)
     whole = float(similar[0, 0])
-    total = float(sum(shares[u, v] for u, v in pairs))
-    found = ((0, 0, whole), *((u, v, float(similar[u, v])) for u, v in pairs))
+    total = sum(worth for _, _, worth in pairs)
+    found = ((0, 0, whole), *((u, v, float(similar[u, v])) for u, v, _ in pairs))
     return Match(min(1.0, root * whole + (1 - root) * total), found)
 
 
 def correspond(
-    below_a: NDArray[np.bool_], below_b: NDArray[np.bool_], value: NDArray[np.float32]
-) -> list[tuple[int, int]]:
+    below_a: NDArray[np.bool_], below_b: NDArray[np.bool_], value: NDArray[np.floating]
+) -> list[tuple[int, int, float]]:
     """Corresponding nodes by recursive bipartite matching; roots (node 0) are left out.
 
-    The matching is solved anew only when a split forbids a pair of it: what is left of a best matching
-    whose pairs are all still allowed is a best matching of what is left.
+    The best pair of a best matching is taken for true; every pair that contradicts it, one node below
+    its node and the other not, is from then on worth `BREAK` of what it was; and so on with what is
+    left. The matching is solved anew only when a pair of it has lost: what is left of a best matching
+    whose pairs keep their worth is a best matching of what is left.
 
     Args:
         below_a: (N, N) bool, row u marks u and its descendants.
@@ -146,30 +150,27 @@ def correspond(
         value: (N, M), worth of each pair, 0 or more.
 
     Returns:
-        Pairs of nodes, best first.
+        Pairs of nodes with what they are worth in the end, in the order found.
     """
-    left = np.array(value, dtype=np.float64)
-    left[0, :] = left[:, 0] = -1.0
-    pairs: list[tuple[int, int]] = []
-    rows, columns = _assign(left)
+    left = np.array(value, dtype=np.float64)[1:, 1:]
+    rows, columns = linear_sum_assignment(left, maximize=True)
+    pairs: list[tuple[int, int, float]] = []
     while len(rows):
-        best = int(np.argmax(left[rows, columns]))
-        u, v = int(rows[best]), int(columns[best])
-        pairs.append((u, v))
-        left[below_a[u][:, None] != below_b[v][None]] = -1.0
-        left[u, :] = left[:, v] = -1.0
+        worth = left[rows, columns]
+        best = int(np.argmax(worth))
+        u, v = int(rows[best]) + 1, int(columns[best]) + 1
+        if worth[best] <= 0.0:
+            break
+        pairs.append((u, v, float(worth[best])))
+        broken = below_a[u, 1:, None] != below_b[v, None, 1:]
+        broken |= below_a[1:, u, None] != below_b[None, 1:, v]
+        left[broken] *= BREAK
+        left[u - 1, :] = left[:, v - 1] = 0.0
         others = np.arange(len(rows)) != best
         rows, columns = rows[others], columns[others]
-        if (left[rows, columns] < 0).any():
-            rows, columns = _assign(left)
+        if broken[rows, columns].any():
+            rows, columns = linear_sum_assignment(left, maximize=True)
     return pairs
-
-
-def _assign(left: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The best matching among pairs that are still allowed (not negative)."""
-    rows, columns = linear_sum_assignment(np.maximum(left, 0.0), maximize=True)
-    allowed = left[rows, columns] >= 0
-    return rows[allowed], columns[allowed]
 
 
 def in_plane_rotation(

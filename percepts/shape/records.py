@@ -17,13 +17,8 @@ from numpy.typing import NDArray
 
 from visup.percepts.shape.areas import ANGLES, RINGS
 from visup.percepts.shape.compare import Shape
-from visup.percepts.shape.shock_graph import (
-    CONTEXT,
-    MOST_NODES,
-    PROFILE,
-    ShockGraph,
-    frozen_graph,
-)
+from visup.percepts.shape.context import CONTEXT
+from visup.percepts.shape.shock_graph import MOST_NODES, PROFILE, ShockGraph, frozen_graph
 from visup.percepts.shape.signature import LENGTH
 from visup.percepts.shape.silhouette import SMOOTHING
 from visup.percepts.shape.sketch import HEIGHTS, POINTS

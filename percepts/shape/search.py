@@ -31,7 +31,7 @@ CUT_VIEWS = 1000
 """Whole views that are cut for one silhouette at most; of more, those whose areas lie best on it."""
 
 _PART_WEIGHTS = MatchWeights(
-    kind=0.3, mass=0.0, length=0.8, profile=3.5, context=0.0, signature=0.0, root=0.0
+    kind=0.3, length=0.8, profile=3.5, context=0.0, signature=0.0, root=0.0
 )
 
 

@@ -33,9 +33,9 @@ def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
 def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float) -> None:
     likeness = compare(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
     assert likeness.of_outlines > 0.95
-    # Where limbs are alike, the graph's hierarchy may turn with the raster and its share of the
-    # similarity falls (to 0.19 for three limbs in a fan): a known weakness of the graph, not a wish.
-    assert likeness.similarity > 0.8
+    # Where limbs are alike, noise decides which hangs below which; the graph bears it.
+    assert likeness.of_graphs > 0.7
+    assert likeness.similarity > 0.85
 
 
 @FEW
