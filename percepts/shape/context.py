@@ -198,13 +198,14 @@ def whole_context(area: NDArray[np.float64]) -> NDArray[np.float64]:
         >>> float(seen[:, 0].sum().round(6)), bool((seen[:, 1:4] < 0.01).all())
         (1.0, True)
     """
-    centred = area - area.mean(axis=0)
-    ring = _rings(np.hypot(*centred.T))
-    share = np.maximum(0.0, 1.0 - np.abs(ring[None] - np.arange(RINGS)[:, None]))
-    orders = np.arange(ANGLES // 2)
-    waves = np.exp(1j * orders * np.arctan2(centred[:, 1], centred[:, 0])[:, None])
+    x, y = (area - area.mean(axis=0)).T
+    distance = np.hypot(x, y)
+    share = np.maximum(0.0, 1.0 - np.abs(_rings(distance) - np.arange(RINGS)[:, None]))
+    turn = (x + 1j * y) / np.maximum(distance, 1e-9)
+    orders = ANGLES // 2
+    waves = np.cumprod([np.ones_like(turn), *[turn] * (orders - 1)], axis=0)
     out = np.zeros(CONTEXT)
-    out[: RINGS * len(orders)] = np.abs(share @ waves).ravel() / len(area)
+    out[: RINGS * orders] = np.abs(share @ waves.T).ravel() / len(area)
     return out
 
 

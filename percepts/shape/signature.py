@@ -74,12 +74,22 @@ def signatures(edges: NDArray[np.int16], size: int, length: int = LENGTH) -> NDA
     below = descendants(edges, size)
     fanout = np.bincount(edges[:, 0], minlength=size) if len(edges) else np.zeros(size, dtype=int)
     sums = np.zeros(size)
-    for u in np.flatnonzero(fanout):
+    parents = np.flatnonzero(fanout)
+    # The root's own sum enters no vector.
+    for u in parents[1:]:
+        if below[u].sum() == fanout[u] + 1:
+            sums[u] = _star(int(fanout[u]))
+            continue
         # A real antisymmetric matrix is normal: its singular values are its eigenvalues' magnitudes.
         part = matrix[np.ix_(below[u], below[u])]
         sums[u] = np.linalg.svd(part, compute_uv=False)[: fanout[u]].sum()
     out = np.zeros((size, length), dtype=np.float32)
-    for u in np.flatnonzero(fanout):
+    for u in parents:
         values = np.sort(sums[edges[edges[:, 0] == u, 1]])[::-1][:length]
         out[u, : len(values)] = values
     return out
+
+
+def _star(leaves: int) -> float:
+    """The sum for a node whose children are leaves: the eigenvalues are +-i sqrt(leaves) and 0."""
+    return min(leaves, 2) * leaves**0.5

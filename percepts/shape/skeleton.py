@@ -89,7 +89,7 @@ def _voronoi_tree(
         return None
     triangles = mesh.simplices
     centres, radii = _circumcircles(contour[triangles])
-    inside = _inside(contour, centres) & np.isfinite(radii)
+    inside = _inside(contour, triangles) & np.isfinite(radii)
     if not inside.any():
         return None
     faces = np.repeat(np.arange(len(triangles)), 3)
@@ -123,16 +123,15 @@ def _circumcircles(
     return a + centre, np.hypot(ux, uy)
 
 
-def _inside(contour: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points an outline encloses, by counting crossings to the right; (T,) bool."""
-    ax, ay = contour.T
-    bx, by = np.roll(contour, -1, axis=0).T
-    with np.errstate(invalid="ignore"):
-        px, py = points[:, :1], points[:, 1:]
-        spans = (ay > py) != (by > py)
-        slope = (bx - ax) / np.where(by == ay, 1.0, by - ay)
-        crossings = spans & (px < ax + (py - ay) * slope)
-    return np.asarray(crossings.sum(axis=1) % 2 == 1)
+def _inside(contour: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Which triangles between points of an outline it encloses, (T,) bool.
+
+    Neighbours on the outline are joined by a side of some triangle, so that none lies across the
+    outline; one inside has its corners, by their numbers, in the same sense as the outline runs.
+    """
+    a, b, c = (contour[corner] for corner in np.sort(triangles, axis=1).T)
+    u, v = b - a, c - a
+    return np.asarray(u[:, 0] * v[:, 1] > u[:, 1] * v[:, 0])
 
 
 def _residual(
@@ -157,6 +156,9 @@ def _largest_tree(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The edges of the largest connected part, with the outline point that each touches."""
     size = len(points)
+    if len(np.unique(edges)) == len(edges) + 1:
+        # There are no cycles: with one edge less than points, all hangs together already.
+        return edges, touched
     ones = np.ones(len(edges))
     _, part = connected_components(coo_matrix((ones, edges.T), shape=(size, size)), directed=False)
     lengths = np.hypot(*(points[edges[:, 0]] - points[edges[:, 1]]).T)
