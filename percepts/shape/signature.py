@@ -92,4 +92,4 @@ def signatures(edges: NDArray[np.int16], size: int, length: int = LENGTH) -> NDA
 
 def _star(leaves: int) -> float:
     """The sum for a node whose children are leaves: the eigenvalues are +-i sqrt(leaves) and 0."""
-    return min(leaves, 2) * leaves**0.5
+    return float(min(leaves, 2) * leaves**0.5)
