@@ -38,10 +38,10 @@ class MatchWeights:
         root: Share of the similarity that the root has: the shape as a whole.
     """
 
-    kind: float = 0.2
-    length: float = 0.3
-    profile: float = 3.5
-    context: float = 2.2
+    kind: float = 0.15
+    length: float = 0.25
+    profile: float = 3.0
+    context: float = 1.9
     signature: float = 0.05
     root: float = 0.15
 
