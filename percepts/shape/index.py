@@ -38,7 +38,7 @@ KEPT = 4096
 
 # What makes squared distances of roots, squared ones of spectra, and distances of sketches comparable:
 # medians over pairs of 39 meshes' views.
-_ROOT_SCALE = 1.77
+_ROOT_SCALE = 1.35
 _SPECTRUM_SCALE = 0.106
 _SKETCH_SCALE = 0.467
 _AREA_SCALE = 0.25

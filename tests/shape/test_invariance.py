@@ -32,10 +32,10 @@ def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
 @given(LIMBS, st.floats(0, 2 * np.pi))
 def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float) -> None:
     likeness = compare(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
-    assert likeness.of_outlines > 0.95
+    assert likeness.of_outlines > 0.93
     # Where limbs are alike, noise decides which hangs below which; the graph bears it.
-    assert likeness.of_graphs > 0.7
-    assert likeness.similarity > 0.85
+    assert likeness.of_graphs > 0.8
+    assert likeness.similarity > 0.9
 
 
 @FEW
