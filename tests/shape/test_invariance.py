@@ -72,14 +72,15 @@ def test_a_shape_is_like_itself_fully_and_like_others_less(name: str) -> None:
 def test_growing_damage_lowers_the_similarity() -> None:
     whole = limbs((0.3, 1.2, 2.0, 4.0))
     own = shape(whole)
-    similarities = []
+    found = []
     for share in (0.0, 0.15, 0.3, 0.45):
         damaged = whole.copy()
         rows = np.flatnonzero(whole.any(axis=1))
         damaged[rows[0] : rows[0] + int(share * len(rows))] = False
-        similarities.append(compare(own, shape(damaged)).similarity)
-    assert similarities == sorted(similarities, reverse=True)
-    assert similarities[-1] < similarities[0] - 0.1
+        found.append(compare(own, shape(damaged)))
+    for similarities in ([f.similarity for f in found], [f.of_graphs for f in found]):
+        assert similarities == sorted(similarities, reverse=True)
+        assert similarities[-1] < similarities[0] - 0.1
 
 
 def test_holes_and_islands_do_not_matter() -> None:
