@@ -150,9 +150,7 @@ class ShapeBehaviour:
         first: Collection[str],
     ) -> list[tuple[ViewMatch, ...]]:
         """What each of the regions looks like; nothing for one that has no shape."""
-        silhouettes = [
-            normalise(r.mask, cut=r.cut, sides=_border_sides(r, frame)) for r in regions
-        ]
+        silhouettes = [normalise(r.mask, cut=r.cut, sides=_border_sides(r, frame)) for r in regions]
         rankings = iter(
             database.query_all(
                 [s for s in silhouettes if s is not None],
