@@ -61,6 +61,8 @@ _TABLES = (
     "contour BLOB NOT NULL, crc INTEGER NOT NULL)",
 )
 _MOST_BYTES = 1 << 24
+# Messages about damaged tables quote them, and are no text when what they quote is none.
+_UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
 _BUILD_HINT = "build it anew with 'visup models build'"
 
 
@@ -213,7 +215,7 @@ def open_checked(path: Path) -> sqlite3.Connection:
         _check_tables(path, file)
     except BaseException as e:
         file.close()
-        if isinstance(e, sqlite3.Error):
+        if isinstance(e, _UNREADABLE):
             raise _unreadable(path, e) from e
         raise
     return file
@@ -291,7 +293,7 @@ def read_contents(path: Path) -> Contents:
                 raise NotAsExpectedError("other views than shapes")
         except NotAsExpectedError as e:
             raise damaged(path, str(e), "what 'visup models' writes") from e
-        except (sqlite3.Error, UnicodeDecodeError) as e:
+        except _UNREADABLE as e:
             raise _unreadable(path, e) from e
     return Contents(names, views, also)
 
@@ -381,7 +383,7 @@ def read_shape(path: Path, file: sqlite3.Connection, view: int) -> ShapeBytes:
     query = "SELECT nodes, edges, contour, crc FROM shapes WHERE view = ?"
     try:
         row = file.execute(query, (view,)).fetchone()
-    except (sqlite3.Error, UnicodeDecodeError) as e:
+    except _UNREADABLE as e:
         raise _unreadable(path, e) from e
     if row is None:
         raise damaged(path, f"view {view + 1} without a shape", "a shape for each view")

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.shape.shapes import ZOO
-from visup.agent.errors import SettingsError
+from visup.agent.errors import DatabaseError, SettingsError
 from visup.commands.evaluate import app
 from visup.evaluation.damage import DAMAGES, MASKS, damage, odd_mask
 from visup.evaluation.robustness import evaluate_robustness, sound_database, try_file, try_mask
@@ -24,6 +24,17 @@ def test_damaged_files_and_odd_masks_are_refused_answered_or_nothing() -> None:
     assert figures["total"]["trials"] == 240
     assert figures["items"]["foreign"]["refused"] == 12
     assert figures["items"]["empty"]["nothing"] == 8
+
+
+def test_a_table_whose_name_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bad.db"
+    sound = sound_database(path, 0).path.read_bytes()
+    for at in range(8):
+        path.write_bytes(
+            sound.replace(b"CREATE TABLE models", b"CREATE TA\xff\xff models"[: 19 + at])
+        )
+        with pytest.raises(DatabaseError):
+            ModelDatabase.open(path)
 
 
 def test_a_campaign_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
