@@ -22,16 +22,19 @@ from visup.percepts.shape.outline import outline_distances, outline_heights
 from visup.percepts.shape.shock_graph import ShockGraph, shock_graph
 from visup.percepts.shape.silhouette import Silhouette
 
-GRAPH_SHARE = 0.2
+GRAPH_SHARE = 0.25
 """Share of the similarity that the shock graph gives."""
 
-AREA_SHARE = 0.3
+AREA_SHARE = 0.2
 """Share that the areas give; the outlines give the rest."""
 
 OUTLINE_SHARE = 1.0 - GRAPH_SHARE - AREA_SHARE
 """Share that the outlines give."""
 
-OUTLINE_SCALE = 0.42
+AREA_POWER = 8
+"""Overlaps of unlike shapes are high already; to this power they differ as the other terms do."""
+
+OUTLINE_SCALE = 0.36
 """Distance of outlines at which their similarity has fallen to 1/e."""
 
 
@@ -157,7 +160,7 @@ def second_looks(
         overlaps: How its area lies on theirs.
         mirror: Whether mirror images count.
     """
-    outlines, areas = _outline_similarities(query, others), overlaps.similarity**2
+    outlines, areas = _outline_similarities(query, others), overlaps.similarity**AREA_POWER
     worth = OUTLINE_SHARE * outlines + AREA_SHARE * areas
     mirrored = (worth[:, 1] > worth[:, 0]) & mirror
     each, side = np.arange(len(others)), mirrored.astype(np.intp)
@@ -174,11 +177,7 @@ def _outline_similarities(query: Shape, others: Sequence[Shape]) -> NDArray[np.f
     if not others:
         return np.empty((0, 2))
     heights = np.stack([o.heights for o in others])
-    query_first = np.array([query.graph.key <= o.graph.key for o in others])
-    distance = np.empty((len(others), 2))
-    own = query.heights[None]
-    if query_first.any():
-        distance[query_first] = outline_distances(own, heights[query_first])
-    if not query_first.all():
-        distance[~query_first] = outline_distances(heights[~query_first], own)
+    own = np.broadcast_to(query.heights, heights.shape)
+    first = np.array([query.graph.key <= o.graph.key for o in others])[:, None, None]
+    distance = outline_distances(np.where(first, own, heights), np.where(first, heights, own))
     return np.asarray(np.exp(-((distance / OUTLINE_SCALE) ** 2)))

@@ -6,7 +6,8 @@ Three sieves, each finer and dearer than the one before:
    of the shape lies how far from its middle, and its greatest radius; its outline's spectrum stands
    beside it. One product of the query's vector with all views' leaves the nearest `NEAREST`.
 2. *Sketches.* Of these, the outlines are compared at a few points at all rotations, the areas are laid
-   on each other, and the roots again: that leaves as many as are to be compared in full.
+   on each other, and the roots again: that leaves as many as are to be compared in full. A quarter of
+   them are views of models that would have none otherwise, so that a ranking of models is full.
 3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every
    node takes its best partner, whoever else wants it and whatever hangs below. The matching of
    `match.py` can only do worse, so that views can be matched best bound first until no bound left
@@ -19,6 +20,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,23 +73,26 @@ class Summaries:
         roots: (V,) records of `records.NODE`.
         sketches: (V, POINTS, HEIGHTS) int8.
         areas: (V, RINGS, ANGLES) uint8.
+        models: (V,) whole numbers, which views are of one model.
     """
 
     roots: Records
     sketches: NDArray[np.int8]
     areas: NDArray[np.uint8]
+    models: NDArray[np.integer[Any]]
 
     @classmethod
     def read(cls, views: Records) -> Summaries:
         """Those of views in a file, (V,) records of `records.VIEW`."""
-        return cls(views["root"], views["sketch"], views["areas"])
+        return cls(views["root"], views["sketch"], views["areas"], views["model"])
 
     @classmethod
     def of(cls, shapes: Sequence[Shape]) -> Summaries:
-        """Those of shapes in memory, at least one."""
+        """Those of shapes in memory, at least one; each is taken for a model of its own."""
         roots = np.concatenate([node_records(s.graph)[:1] for s in shapes])
         sketches = np.stack([sketch(s.heights) for s in shapes])
-        return cls(roots, sketches, np.stack([s.areas for s in shapes]))
+        areas = np.stack([s.areas for s in shapes])
+        return cls(roots, sketches, areas, np.arange(len(shapes)))
 
 
 class ViewIndex:
@@ -163,7 +168,8 @@ class ViewIndex:
             + _ROOT_SHARE * np.sqrt(squares)
             + _AREA_SHARE * np.sqrt(uncovered / _AREA_SCALE)
         )
-        return np.sort(among[np.argsort(apart, kind="stable")[:most]])
+        order = among[np.argsort(apart, kind="stable")]
+        return np.sort(_spread(order, self._summaries.models[order], most))
 
     def _apart(
         self, own: NDArray[np.float32], among: NDArray[np.intp] | None
@@ -253,6 +259,17 @@ class ViewIndex:
             if len(self._features) > KEPT:
                 self._features.popitem(last=False)
         return kept
+
+
+def _spread(
+    order: NDArray[np.intp], models: NDArray[np.integer[Any]], most: int
+) -> NDArray[np.intp]:
+    """The first of an order; a quarter of the places goes to models that have none yet."""
+    sure = most - most // 4
+    later, first_of = order[sure:], np.unique(models[sure:], return_index=True)
+    new = np.sort(first_of[1][~np.isin(first_of[0], models[:sure])])[: most // 4]
+    others = np.delete(np.arange(len(later)), new)[: most - sure - len(new)]
+    return np.concatenate([order[:sure], later[new], later[others]])
 
 
 def _vectors(summaries: Summaries, part: slice, weights: MatchWeights) -> NDArray[np.float32]:

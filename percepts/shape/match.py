@@ -134,6 +134,20 @@ def match_nodes(
     return Match(min(1.0, root * whole + (1 - root) * total), found)
 
 
+def match_ceiling(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> float:
+    """What the similarity of `match_nodes` cannot exceed: the best matching, whatever hangs below what.
+
+    Args:
+        a: The first graph, N nodes.
+        b: The second graph, M nodes.
+        similar: (N, M), similarity of each pair of nodes.
+        root: Share of the similarity that the root has.
+    """
+    worth = (0.5 * (a.weights[:, None] + b.weights[None]) * similar)[1:, 1:]
+    rows, columns = linear_sum_assignment(worth, maximize=True)
+    return float(root * similar[0, 0] + (1 - root) * worth[rows, columns].sum())
+
+
 def correspond(
     below_a: NDArray[np.bool_], below_b: NDArray[np.bool_], value: NDArray[np.floating]
 ) -> list[tuple[int, int, float]]:

@@ -20,7 +20,7 @@ from visup.percepts.shape.catalogue import Shapes, Views
 from visup.percepts.shape.compare import GRAPH_SHARE, Likeness, Shape, second_looks
 from visup.percepts.shape.cuts import Cut, CutIndex, query_map, what_is_left
 from visup.percepts.shape.index import Summaries, ViewIndex
-from visup.percepts.shape.match import Match, MatchWeights, match_nodes
+from visup.percepts.shape.match import Match, MatchWeights, match_ceiling, match_nodes
 from visup.percepts.shape.records import View
 from visup.percepts.shape.shock_graph import ShockGraph
 
@@ -173,6 +173,10 @@ class Search:
             if ceilings[n] < wanted.least(found):
                 break
             number = int(likely.numbers[n])
+            graph, root = self._shapes[number].graph, self.index.weights.root
+            ceiling = match_ceiling(query.graph, graph, likely.similar[n], root)
+            if GRAPH_SHARE * ceiling + looks.worth[n] < wanted.least(found):
+                continue
             likeness = looks.joined(int(n), self._match(query, number, likely.similar[n]))
             found = wanted.best([*found, ViewMatch(self._views[number], likeness)])
         return Ranking(tuple(found), len(likely.numbers))

@@ -27,7 +27,7 @@ SMOOTHING = 0.015
 RESOLUTION = 80
 """Pixels of the working raster per unit of length."""
 
-SPACING = 0.03
+SPACING = 0.04
 """Distance between neighbouring points of the outline, units."""
 
 LEAST_AREA = 24
@@ -184,14 +184,30 @@ def _smooth_field(
 
 def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
     """The sub-pixel outline of the largest part, (N, 2) as (x, y); None when the blur left nothing."""
-    from skimage.measure import find_contours
-
     level = 0.5 if field.max() > 0.55 else 0.5 * float(field.max())
-    found: list[NDArray[np.float64]] = find_contours(field, level)  # type: ignore[no-untyped-call]
+    solid = (field > level).astype(np.uint8)
+    found, _ = cv2.findContours(solid, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not found:
         return None
-    longest = max(found, key=len)
-    return np.asarray(longest[:-1, ::-1], dtype=np.float64) if len(longest) > 8 else None
+    longest = np.asarray(max(found, key=len)[:, 0], dtype=np.intp)
+    return _on_level(field, longest, level) if len(longest) > 8 else None
+
+
+def _on_level(
+    field: NDArray[np.float32], pixels: NDArray[np.intp], level: float
+) -> NDArray[np.float64]:
+    """Pixels moved along the slope to where a smooth field is at a level: one step of Newton's method."""
+    x, y = pixels.T
+    across = 0.5 * (
+        field[y, np.minimum(x + 1, field.shape[1] - 1)] - field[y, np.maximum(x - 1, 0)]
+    )
+    down = 0.5 * (field[np.minimum(y + 1, field.shape[0] - 1), x] - field[np.maximum(y - 1, 0), x])
+    slope = np.maximum(across**2 + down**2, 1e-6)
+    step = (level - field[y, x]) / slope
+    # On a ridge the slope vanishes: the outline is never further than a pixel from the pixel inside.
+    step *= np.minimum(1.0, 1.0 / np.maximum(np.abs(step) * np.sqrt(slope), 1e-6))
+    moved = np.stack([x + step * across, y + step * down], axis=1)
+    return np.asarray(moved, dtype=np.float64)
 
 
 def _in_units(outline: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[float, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ pytest.importorskip("embreex", reason="the extra visup[render] is not installed"
 X, Y, Z = np.eye(3)
 
 
-def wedge() -> object:
+def wedge() -> Any:
     """A solid without any symmetry."""
     corners = [[0, 0, 0], [3, 0, 0], [0, 2, 0], [0.3, 0.4, 1.0]]
     return trimesh.Trimesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])

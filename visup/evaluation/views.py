@@ -23,7 +23,7 @@ from visup.evaluation.symmetry import angle_to, silhouette_symmetries
 from visup.evaluation.view_queries import CONDITIONS, Query, draw_queries
 from visup.percepts.shape.build import build_database
 from visup.percepts.shape.database import ModelDatabase, ViewMatch
-from visup.percepts.shape.views import load_mesh, render_views, sphere_directions
+from visup.percepts.shape.views import half_sphere_directions, load_mesh, render_views
 
 TOP = 5
 """Different objects that are looked at for `top5`."""
@@ -169,7 +169,7 @@ def _baselines(
     seen = [
         (path.stem, v.mask)
         for path in meshes
-        for v in render_views(load_mesh(path), sphere_directions(views))
+        for v in render_views(load_mesh(path), half_sphere_directions(views))
     ]
     names = [name for name, _ in seen]
     table: dict[str, dict[str, float]] = {}
