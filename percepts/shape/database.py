@@ -23,7 +23,7 @@ from visup.percepts.shape.storage import write_more, write_new
 
 __all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
 
-CANDIDATES = 24
+CANDIDATES = 20
 """Views whose outlines are compared when no budget asks for fewer."""
 
 

@@ -32,7 +32,7 @@ from visup.percepts.shape.records import Records, graph_arrays, node_records
 from visup.percepts.shape.shock_graph import ShockGraph
 from visup.percepts.shape.sketch import SPECTRUM, sketch, sketch_distances, spectra
 
-NEAREST = 600
+NEAREST = 500
 """Views whose sketches are compared."""
 
 KEPT = 4096
