@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from visup.agent import Directive, Region
 from visup.percepts.motion.contour import MARGIN, Outline, outline
 from visup.percepts.motion.image import Floats
-from visup.percepts.motion.life import least_area
-from visup.percepts.motion.scene import Scene
+from visup.percepts.motion.scene import Scene, least_area
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.tracking import Track
 

@@ -67,6 +67,11 @@ class Scene:
         return np.asarray(self.cells.labels[y, x])
 
 
+def least_area(scene: Scene, settings: MotionSettings) -> float:
+    """Least area of a region, working pixels."""
+    return settings.min_area * scene.image.grey.size
+
+
 def outside(scene: Scene) -> Floats:
     """(N,) float32: 1 for points away from all objects, 0 for those in or beside one."""
     owner = scene.owner > 0

@@ -25,8 +25,9 @@ from visup.percepts.motion.constraints import (
 from visup.percepts.motion.dense import flow_back, label, warped
 from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
+from visup.percepts.motion.joining import absorb, merge, release
 from visup.percepts.motion.layers import Affine
-from visup.percepts.motion.life import absorb, bear, bury, confirm, merge, release, update
+from visup.percepts.motion.life import bear, bury, confirm, update
 from visup.percepts.motion.looked import Looked
 from visup.percepts.motion.report import chosen, obey, report, sought
 from visup.percepts.motion.resting import RestingView
@@ -42,7 +43,7 @@ from visup.percepts.motion.scene import (
 )
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels, superpixels
-from visup.percepts.motion.tracking import Rate, Track, carry, priors, transition
+from visup.percepts.motion.tracking import Rate, Tracks, carry, priors, transition
 
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
 
@@ -69,7 +70,7 @@ class MotionSegmenter:
         self._size = size
         self.looked: Looked | None = None
         self._history = History(max(self.settings.lags_s) * 1.1)
-        self._tracks: tuple[Track, ...] = ()
+        self._tracks: Tracks = ()
         self._cells: Superpixels | None = None
         self._grid: Floats = np.zeros((0, 0, 2), np.float32)
         self._ground = bare_ground((1, 1))
@@ -140,7 +141,7 @@ class MotionSegmenter:
 
     def _look(
         self, image: WorkImage, before: Superpixels, coming: Future[Superpixels]
-    ) -> tuple[Scene, tuple[Track, ...]]:
+    ) -> tuple[Scene, Tracks]:
         """Measure motion, and carry the tracks to the newest image."""
         old = self._history.back(1)
         seconds = image.time - old.time
@@ -185,7 +186,7 @@ class MotionSegmenter:
         c = track(points, points.xy + flow[y, x], old, image, 1, self.settings.noise)
         return with_flow(c, points, flow, old, image, self.settings.noise)
 
-    def _later(self, scene: Scene, tracks: tuple[Track, ...], lag: int) -> Future[Constraints]:
+    def _later(self, scene: Scene, tracks: Tracks, lag: int) -> Future[Constraints]:
         """Begin to look for the points over a longer baseline, where known motions expect them."""
         old = self._history.back(lag)
         span = scene.time - old.time

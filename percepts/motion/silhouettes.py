@@ -28,22 +28,16 @@ from visup.percepts.motion.silhouette import (
     histogram_of,
     window_of,
 )
+from visup.percepts.motion.templates import shared, sought
 
 CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
 VISIBLE = 0.2  # share of its template below which an object is hidden
 FRAGMENT = 0.2  # gap between fragments of one object, as a share of its length
-SEARCH = 3  # pixels around the prediction in which a template is sought
 FOLLOW = 0.35  # weight of a newly measured velocity
 APART = 2  # frames apart from others after which an object is one of its own
-LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
-LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
-LEAST_SHARE = 0.25  # the same as a share of its size
-STRAIGHT = 0.6  # net way as a share of the way
 PASSED = 0.6  # lengths that an object goes in pieces before they are taken for several objects
 PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an object
-TAKEN = 0.3  # how far a pixel that another object shows still speaks for one behind it
 GROWN = 1.3  # how much more than its template is seen of an object that has come into view
-GHOST = 0.6  # edges in the image, as a share of those at rest, below which nothing is there
 
 
 def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]:
@@ -65,7 +59,7 @@ def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]
     claims = [[b for b in c if i in rivals[b]] for i, c in enumerate(claims)]
     parts: list[list[Mask]] = [[] for _ in ahead]
     for b in range(1, view.count + 1):
-        for i, mask in _shared(b, [(i, ahead[i]) for i in rivals[b]], view):
+        for i, mask in shared(b, [(i, ahead[i]) for i in rivals[b]], view):
             parts[i].append(mask)
             taken[b] = True
     left = []
@@ -148,76 +142,6 @@ def _look(mask: Mask, view: View) -> tuple[tuple[float, float], Floats]:
     return centre, histogram_of(view.image[ys, xs])
 
 
-def _shared(
-    blob: int, rivals: Sequence[tuple[int, Silhouette]], view: View
-) -> list[tuple[int, Mask]]:
-    """What part of a blob each of its claimants has, as (claimant, mask of the image)."""
-    whole = view.labels == blob
-    if len(rivals) < 2:
-        return [(i, whole) for i, _ in rivals]
-    ys, xs = np.nonzero(whole)
-    tones = view.image[ys, xs]
-    costs = [np.empty(0, np.float32)] * len(rivals)
-    for n, dx, dy in _arranged([s for _, s in rivals], whole, view):
-        costs[n] = _cost(rivals[n][1], dx, dy, xs, ys, tones)
-    winner = np.argmin(costs, axis=0)
-    out = []
-    for n, (i, _) in enumerate(rivals):
-        mask = np.zeros_like(whole)
-        mask[ys[winner == n], xs[winner == n]] = True
-        out.append((i, mask))
-    return out
-
-
-def _arranged(rivals: Sequence[Silhouette], blob: Mask, view: View) -> list[tuple[int, int, int]]:
-    """Number and shift of each object in a blob; the best seen first, the others beside it."""
-    free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
-    while left:
-        fits = [(_sought(rivals[n], free, view), n) for n in left]
-        (_, dx, dy), n = min(fits)
-        left.remove(n)
-        out.append((n, dx, dy))
-        where, own = window_of(rivals[n], blob.shape, dx, dy)
-        cut(free, where)[cut(rivals[n].shape, own)] *= TAKEN
-    return out
-
-
-def _sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
-    """The cost and shift from its prediction at which a template fits a blob (h, w) best."""
-    best, at = np.inf, (0, 0)
-    reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            where, own = window_of(s, blob.shape, dx, dy)
-            shape = cut(s.shape, own)
-            if not shape.any():
-                continue
-            gap = np.abs(cut(view.image, where) - cut(s.tone, own)).mean(axis=2)
-            gap = 60.0 - (60.0 - np.minimum(gap, 60.0)) * cut(blob, where)
-            cost = float(gap[shape].mean()) + 0.5 * float(np.hypot(dx, dy))
-            if cost < best:
-                best, at = cost, (dx, dy)
-    return best, *at
-
-
-def _cost(
-    s: Silhouette, dx: int, dy: int, xs: NDArray[np.int64], ys: NDArray[np.int64], tones: Floats
-) -> Floats:
-    """How little each of N pixels looks like a part of an object, (N,) float32."""
-    pad = 30
-    outer = cv2.copyMakeBorder(
-        (~s.shape).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1
-    )
-    far = cv2.distanceTransform(outer, cv2.DIST_L2, 3)
-    x = np.clip(xs - round(s.corner[0]) - dx + pad, 0, far.shape[1] - 1)
-    y = np.clip(ys - round(s.corner[1]) - dy + pad, 0, far.shape[0] - 1)
-    away = far[y, x]
-    h, w = s.shape.shape
-    tone = s.tone[np.clip(y - pad, 0, h - 1), np.clip(x - pad, 0, w - 1)]
-    gap = np.minimum(np.abs(tones - tone).mean(axis=1), 60.0)
-    return np.asarray(np.where(away > 0, 60.0 + 5 * away, gap), dtype=np.float32)
-
-
 def _whole(s: Silhouette, parts: Sequence[Mask], alone: bool) -> tuple[Mask | None, list[Mask]]:
     """The parts of an object as one mask, and those too far from the largest to be its own."""
     if not parts:
@@ -287,7 +211,7 @@ def _seen(
     elapsed = max(view.time - before.seen, view.seconds, 1e-3)
     if not alone and np.count_nonzero(mask) < GROWN * full:
         # Of what is partly hidden only the shift of its template tells where it is.
-        _, dx, dy = _sought(s, mask.astype(np.float32), view)
+        _, dx, dy = sought(s, mask.astype(np.float32), view)
         corner = (s.corner[0] + dx, s.corner[1] + dy)
         gain = 0.3 * FOLLOW
         velocity = (
@@ -321,67 +245,3 @@ def _seen(
         cut=s.cut or at_border(box, view),
         parted=before.parted + step if pieces else 0.0,
     )
-
-
-def is_salient(s: Silhouette) -> bool:
-    """Whether a side of an object's box has left its place and kept a course while it did."""
-    gone = s.gone()
-    least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
-    return s.frames >= 3 and bool(np.any((gone > least) & (gone > STRAIGHT * s.way)))
-
-
-def joined(known: Silhouettes) -> Silhouettes:
-    """Give small parts that were born beside an object, and go with it, to that object."""
-    out = list(known)
-    for s in known:
-        if s.now is None:
-            continue
-        for i, host in enumerate(out):
-            if host.key >= s.key or host.now is None or s.cut or not _goes_with(s, host):
-                continue
-            out[i] = _with_part(host, s)
-            out = [o for o in out if o.key != s.key]
-            break
-    return tuple(out)
-
-
-def _goes_with(s: Silhouette, host: Silhouette) -> bool:
-    if np.count_nonzero(s.shape) > LIMB * np.count_nonzero(host.shape) or s.frames < 3:
-        return False
-    a, b = s.sides, host.sides
-    gap = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
-    off = np.hypot(*np.subtract(s.velocity, host.velocity))
-    speed = float(np.hypot(*host.velocity))
-    return bool(gap <= max(3, FRAGMENT * max(host.shape.shape)) and off < 0.5 * speed + 3.0)
-
-
-def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
-    assert host.now is not None
-    assert s.now is not None
-    (a, shape), (b, part) = host.now, s.now
-    box = (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3]))
-    mask = np.zeros((box[3] - box[1], box[2] - box[0]), dtype=bool)
-    tone = np.zeros((*mask.shape, 3), dtype=np.float32)
-    for (x0, y0, x1, y1), m, t in ((a, shape, host.tone), (b, part, s.tone)):
-        where = (slice(y0 - box[1], y1 - box[1]), slice(x0 - box[0], x1 - box[0]))
-        mask[where] |= m
-        if t.shape[:2] == m.shape:
-            tone[where] = t
-    corner = (float(box[0]), float(box[1]))
-    return replace(host, id=host.id or s.id, now=(box, mask), shape=mask, tone=tone, corner=corner)
-
-
-def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
-    """Whether an outline has its edges in the picture of the rest: it shows where something left.
-
-    Args:
-        s: The object.
-        now: (h, w) float32 strength of edges in the image.
-        rest: The same in the picture of the rest.
-    """
-    if s.now is None or s.crowded:
-        return False
-    box, shape = s.now
-    inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
-    rim = shape & (inner == 0)
-    return float(cut(now, box)[rim].mean()) < GHOST * float(cut(rest, box)[rim].mean())

@@ -202,6 +202,9 @@ class Track:
         return main.best_rate(self.centre)
 
 
+Tracks = tuple[Track, ...]
+
+
 def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -> sparse.csr_matrix:
     """Which superpixels of the last frame each new one comes from, following the flow.
 

@@ -7,11 +7,12 @@ from hypothesis import strategies as st
 
 from tests.motion.clips import FPS, SIZE, Shot, clip, texture
 from visup.agent import Frame
+from visup.percepts.motion.objecthood import is_salient
 from visup.percepts.motion.picture import changed, exposed, first_picture, learnt, shaded
-from visup.percepts.motion.resting import common
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.silhouette import Silhouettes, histogram_of, view_of
-from visup.percepts.motion.silhouettes import follow, is_salient
+from visup.percepts.motion.silhouettes import follow
+from visup.percepts.motion.telling import common
 
 GROUND = np.repeat(texture(1, SIZE)[..., None], 3, axis=2).astype(np.float32)
 NOWHERE = np.zeros(SIZE, dtype=bool)

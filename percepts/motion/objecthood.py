@@ -1,0 +1,82 @@
+"""Which silhouettes are objects: neither what has not left its place, nor limbs, nor ghosts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from visup.percepts.motion.image import Floats
+from visup.percepts.motion.silhouette import Silhouette, Silhouettes, cut
+
+LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
+LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
+LEAST_SHARE = 0.25  # the same as a share of its size
+STRAIGHT = 0.6  # net way as a share of the way
+GHOST = 0.6  # edges in the image, as a share of those at rest, below which nothing is there
+FRAGMENT = 0.2  # gap between a part and its object, as a share of its length
+
+
+def is_salient(s: Silhouette) -> bool:
+    """Whether a side of an object's box has left its place and kept a course while it did."""
+    gone = s.gone()
+    least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
+    return s.frames >= 3 and bool(np.any((gone > least) & (gone > STRAIGHT * s.way)))
+
+
+def joined(known: Silhouettes) -> Silhouettes:
+    """Give small parts that were born beside an object, and go with it, to that object."""
+    out = list(known)
+    for s in known:
+        if s.now is None:
+            continue
+        for i, host in enumerate(out):
+            if host.key >= s.key or host.now is None or s.cut or not _goes_with(s, host):
+                continue
+            out[i] = _with_part(host, s)
+            out = [o for o in out if o.key != s.key]
+            break
+    return tuple(out)
+
+
+def _goes_with(s: Silhouette, host: Silhouette) -> bool:
+    if np.count_nonzero(s.shape) > LIMB * np.count_nonzero(host.shape) or s.frames < 3:
+        return False
+    a, b = s.sides, host.sides
+    gap = max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3])
+    off = np.hypot(*np.subtract(s.velocity, host.velocity))
+    speed = float(np.hypot(*host.velocity))
+    return bool(gap <= max(3, FRAGMENT * max(host.shape.shape)) and off < 0.5 * speed + 3.0)
+
+
+def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
+    assert host.now is not None
+    assert s.now is not None
+    (a, shape), (b, part) = host.now, s.now
+    box = (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3]))
+    mask = np.zeros((box[3] - box[1], box[2] - box[0]), dtype=bool)
+    tone = np.zeros((*mask.shape, 3), dtype=np.float32)
+    for (x0, y0, x1, y1), m, t in ((a, shape, host.tone), (b, part, s.tone)):
+        where = (slice(y0 - box[1], y1 - box[1]), slice(x0 - box[0], x1 - box[0]))
+        mask[where] |= m
+        if t.shape[:2] == m.shape:
+            tone[where] = t
+    corner = (float(box[0]), float(box[1]))
+    return replace(host, id=host.id or s.id, now=(box, mask), shape=mask, tone=tone, corner=corner)
+
+
+def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
+    """Whether an outline has its edges in the picture of the rest: it shows where something left.
+
+    Args:
+        s: The object.
+        now: (h, w) float32 strength of edges in the image.
+        rest: The same in the picture of the rest.
+    """
+    if s.now is None or s.crowded:
+        return False
+    box, shape = s.now
+    inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
+    rim = shape & (inner == 0)
+    return float(cut(now, box)[rim].mean()) < GHOST * float(cut(rest, box)[rim].mean())
