@@ -9,17 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.motion.constraints import Constraints
+from visup.percepts.motion.dominant import GRID, fit_dominant, spread_weights
 from visup.percepts.motion.image import Floats
-from visup.percepts.motion.layers import (
-    GRID,
-    STILL,
-    Affine,
-    distances,
-    fit_bent,
-    fit_dominant,
-    log_likelihood,
-    spread_weights,
-)
+from visup.percepts.motion.layers import STILL, Affine, distances, fit_bent, log_likelihood
 
 
 def slack_of(model: Affine, c: Constraints) -> float:

@@ -22,7 +22,7 @@ from visup.percepts.motion.constraints import (
     track,
     with_flow,
 )
-from visup.percepts.motion.dense import flow_back, label, warped
+from visup.percepts.motion.dense import label
 from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.joining import absorb, merge, release
@@ -44,6 +44,7 @@ from visup.percepts.motion.scene import (
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels, superpixels
 from visup.percepts.motion.tracking import Rate, Tracks, carry, priors, transition
+from visup.percepts.motion.warping import flow_back, warped
 
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
 

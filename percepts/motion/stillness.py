@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from visup.percepts.motion.layers import GRID, STILL, Affine, distances
+from visup.percepts.motion.dominant import GRID
+from visup.percepts.motion.layers import STILL, Affine, distances
 from visup.percepts.motion.scene import Scene
 
 TELLS = 16.0  # information, 1 / pixels squared, of a point that would show a motion

@@ -6,14 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from visup.percepts.motion.constraints import Constraints
-from visup.percepts.motion.layers import (
-    STILL,
-    Affine,
-    distances,
-    fit_affine,
-    fit_bent,
-    fit_dominant,
-)
+from visup.percepts.motion.dominant import fit_dominant
+from visup.percepts.motion.layers import STILL, Affine, distances, fit_affine, fit_bent
 
 
 def made(seed: int, motion: Affine, wrong: float = 0.0) -> Constraints:
