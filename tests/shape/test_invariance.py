@@ -129,3 +129,18 @@ def test_odd_masks_have_a_shape_or_none_and_never_fail(mask: np.ndarray) -> None
         assert np.isfinite(own.contour).all()
         assert own.graph.weights.sum() == pytest.approx(1.0, abs=1e-4)
         assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(-3.1, 3.1))
+def test_a_mirror_image_is_told_apart_on_request(turn: float) -> None:
+    """A body with limbs to one side only is not its mirror image, however it is turned."""
+    angles = (0.3, 1.2, 2.9)
+    own, image = shape(limbs(angles)), shape(limbs(angles, turn=turn)[:, ::-1])
+    either, strict = compare(own, image), compare(own, image, mirror=False)
+    assert either.mirrored
+    assert not strict.mirrored
+    assert either.similarity > 0.9
+    assert strict.similarity < either.similarity - 0.1
+    again = compare(own, shape(limbs(angles, turn=turn)), mirror=False)
+    assert again.similarity > 0.9
