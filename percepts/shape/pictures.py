@@ -179,7 +179,7 @@ def _draw_query(sheet: Sheet, silhouette: Silhouette, query: Shape, height: int)
     ]
     lines = [
         "Shock graph: " + ", ".join(counts),
-        "The greater a node, the more of the area it has.",
+        "The greater a node, the more of the skeleton it has.",
     ]
     if query.cut:
         lines.append("Cut by the border of the picture.")

@@ -215,9 +215,11 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     for rank, m in enumerate(ranking.matches, start=1):
         turn = f"{math.degrees(m.rotation):.0f}°"
-        mirrored = " mirrored" if m.likeness.mirrored else ""
+        mirrored = " m" if m.likeness.mirrored else ""
         terms = (m.similarity, m.likeness.of_graphs, m.likeness.of_outlines, m.likeness.of_areas)
         figures = (f"{t:.3f}" for t in terms)
         table.add_row(str(rank), m.view.name, str(m.view.number), *figures, turn + mirrored)
     Console().print(table)
+    if any(m.likeness.mirrored for m in ranking.matches):
+        typer.echo("m: mirrored, as seen from behind")
     typer.echo(f"{ranking.compared} of {views} views compared in full")
