@@ -93,18 +93,24 @@ def _held_weight(weight: float, belief: ObjectBelief, settings: TaskSettings) ->
 def unexplained(
     mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
 ) -> tuple[int, ...]:
-    """Objects in the scene that no actor explains, by id.
+    """Objects in view that no actor explains, by id.
 
     With every actor bound that is any further object. With an actor still unbound, an object that
-    is not identified yet may be it, and so may one that could be any of the actors; only one that
-    is clearly something else is unexplained.
+    is not identified yet may be it, and so may one that could be any of the actors, or whose identity
+    rests on a few seconds only; only one that is clearly something else is unexplained.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
-    others = [o for o in mind.present() if o.id not in bound]
+    others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
     if all(b.object_id is not None for b in bindings):
         return tuple(o.id for o in others)
     known = {m for b in bindings for m in b.models}
-    return tuple(o.id for o in others if o.strength >= settings.familiar and o.name not in known)
+    return tuple(
+        o.id
+        for o in others
+        if o.strength >= settings.familiar
+        and o.name not in known
+        and mind.time - o.first_seen >= settings.acquainted_s
+    )
 
 
 def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:

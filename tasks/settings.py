@@ -27,6 +27,8 @@ class TaskSettings:
         regret_s: A task that is done may be undone by contrary evidence for so long.
         unexplained_s: An object that no actor explains must be there so long to be named.
         familiar: An object whose best identity has at least this share is taken to be identified.
+        acquainted_s: Seconds for which an object must have been in the scene before it is taken for something
+            other than an actor that is still looked for.
         most_courses: How many courses of a task are followed side by side.
     """
 
@@ -45,6 +47,7 @@ class TaskSettings:
     regret_s: float = 10.0
     unexplained_s: float = 0.0
     familiar: float = 0.35
+    acquainted_s: float = 4.0
     most_courses: int = 24
 
 

@@ -50,7 +50,9 @@ class TaskMemory:
         time: Seconds of the last step.
         readings: The courses followed; empty until its first actors are found.
         belief: What was last believed.
-        interrupted: Why the task was interrupted, or empty; once set it stays.
+        interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
+            unexpected object that turns out to be one of the actors.
+        strangers: The objects that interrupted the task by being unexpected.
         strange_since: Since when objects have been unexplained, by id.
         broken_since: Since when each invariant has been broken, or None.
         rival: A matching that would change who plays whom, by actor; empty when there is none.
@@ -61,6 +63,7 @@ class TaskMemory:
     readings: tuple[Reading, ...]
     belief: TaskBelief
     interrupted: str = ""
+    strangers: tuple[int, ...] = ()
     strange_since: tuple[tuple[int, float], ...] = ()
     broken_since: tuple[float | None, ...] = ()
     rival: tuple[int | None, ...] = ()
@@ -145,11 +148,17 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
         readings = follower.follow(readings, scene.see, now, dt)
     broken = _broken(follower, scene, memory)
     strange = _strange(scene, memory, settings)
-    interrupted = memory.interrupted or _interrupted(follower, scene, memory, broken)
+    interrupted, strangers = memory.interrupted, memory.strangers
+    if {b.object_id for b in bindings} & set(strangers):
+        interrupted, strangers = "", ()
+    if not interrupted:
+        interrupted, strangers = _interrupted(follower, scene, memory, broken)
     belief = believe(follower, scene, readings, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     belief = replace(belief, unexplained=lasting)
-    new = TaskMemory(now, readings, belief, interrupted, strange, broken, rival, rival_since)
+    new = TaskMemory(
+        now, readings, belief, interrupted, strangers, strange, broken, rival, rival_since
+    )
     events = (
         *stage_events(memory.belief, belief, mind),
         *_invariant_events(follower, memory, new, mind),
@@ -208,17 +217,21 @@ def _strange(
 
 def _interrupted(
     follower: Follower, scene: Scene, memory: TaskMemory, broken: tuple[float | None, ...]
-) -> str:
-    """Why the task is interrupted by something unsafe, or empty; a task that is over is not."""
+) -> tuple[str, tuple[int, ...]]:
+    """Why the task is interrupted by something unsafe, or empty; and by which unexpected objects.
+
+    A task that is over is not interrupted.
+    """
     if memory.belief.verdict in (Verdict.SUCCEEDED, Verdict.FAILED):
-        return ""
+        return "", ()
     for alert in scene.mind.alerts:
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
-            return alert.cause.rstrip(".")
+            strangers = alert.objects if alert.kind == "unexpected_object" else ()
+            return alert.cause.rstrip("."), strangers
     for invariant, since in zip(follower.task.invariants, broken, strict=True):
         if since is not None and scene.mind.time - since >= follower.settings.contrary_s:
-            return f"`{invariant}` does not hold"
-    return ""
+            return f"`{invariant}` does not hold", ()
+    return "", ()
 
 
 def _broken(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[float | None, ...]:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import permutations
 from types import MappingProxyType
 
@@ -94,9 +95,24 @@ def test_objects_that_no_actor_explains(
     third: dict[str, float], arm_known: bool, expected: tuple[int, ...]
 ) -> None:
     arm = {"arm": 0.9} if arm_known else {"guitar": 0.2}
-    mind = mind_of(arm, {"satellite": 0.9}, third)
+    mind = replace(mind_of(arm, {"satellite": 0.9}, third), time=10.0)
     found = match(DOCK, mind)
     assert unexplained(mind, found) == expected
+
+
+def test_a_new_identity_does_not_make_an_object_unexplained_while_an_actor_is_looked_for() -> None:
+    """The arm may be told as a dish at first sight; with all actors found there is nothing to wait for."""
+    early = replace(mind_of({"guitar": 0.2}, {"satellite": 0.9}, {"dish": 0.8}), time=2.0)
+    assert unexplained(early, match(DOCK, early)) == ()
+    known = replace(mind_of({"arm": 0.9}, {"satellite": 0.9}, {"dish": 0.8}), time=2.0)
+    assert unexplained(known, match(DOCK, known)) == (3,)
+
+
+def test_what_is_hidden_is_not_one_too_many_in_view() -> None:
+    mind = mind_of({"arm": 0.9}, {"satellite": 0.9}).with_objects(
+        belief(3, {"dish": 0.8}, Presence.HIDDEN)
+    )
+    assert unexplained(mind, match(DOCK, mind)) == ()
 
 
 def test_stages_and_tasks_are_ranked_by_how_well_their_actors_are_matched() -> None:
