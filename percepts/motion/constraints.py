@@ -19,6 +19,7 @@ from visup.percepts.motion.image import Floats, WorkImage
 
 Ints = NDArray[np.int64]
 WINDOW = 11
+CORNER = 0.1  # least ratio of the eigenvalues of a corner's structure tensor
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
 
@@ -38,6 +39,12 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.xy)
+
+    def corners(self) -> NDArray[np.bool_]:
+        """(N,) bool, which have structure along both directions; the others are edges."""
+        xx, xy, yy = self.tensor.T.astype(np.float64)
+        mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+        return np.asarray(mean - half >= CORNER * (mean + half))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

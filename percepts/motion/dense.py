@@ -42,7 +42,7 @@ def gather(
         cells: The superpixels.
         points: N points.
         likelihood: (N, K) float32 log likelihood of each label.
-        has: (N,) bool, whether a point has a constraint.
+        has: (N,) bool, whether a point says what is seen there.
         prior: (count, K) float32 label shares before.
         more: (count, K) float32 dense log likelihood.
 
@@ -166,7 +166,7 @@ def label(
         cells: The superpixels.
         points: N points.
         likelihood: (N, K) float32 log likelihood of labels at the points.
-        has: (N,) bool, whether a point was measured.
+        has: (N,) bool, whether a point says what is seen there.
         prior: (count, K) float32 label shares expected.
         more: (count, K) float32 dense log likelihood.
         stay: (count,) bool, where an object rests: motion tells nothing there.

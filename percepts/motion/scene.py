@@ -211,8 +211,9 @@ def explain(
         settings: Gives the distance at which a motion no longer explains.
 
     Returns:
-        (N, K + 2) float32 for background, tracks and unknown motion; (N,) bool, whether anything
-        was measured at the point.
+        (N, K + 2) float32 for background, tracks and unknown motion; (N,) bool, which points say
+        what is seen there: corners whose motion was measured. An edge fits all motions that differ
+        along it only: it helps to fit a layer, but pins its cell to what was expected there.
     """
     n = len(scene.points)
     out = np.zeros((n, len(tracks) + 2), dtype=np.float32)
@@ -234,4 +235,4 @@ def explain(
             out[c.index, k] += fit
         out[c.index, 0] += np.maximum(zero, 3 * least)
         out[c.index, -1] += least
-    return out, has
+    return out, has & scene.points.corners()
