@@ -212,8 +212,8 @@ def explain(
 
     Returns:
         (N, K + 2) float32 for background, tracks and unknown motion; (N,) bool, which points say
-        what is seen there: corners whose motion was measured. An edge fits all motions that differ
-        along it only: it helps to fit a layer, but pins its cell to what was expected there.
+        what is seen there: corners whose motion was measured. Edges help to fit layers; as
+        evidence for labels they make silhouettes worse (docs/benchmarks.md).
     """
     n = len(scene.points)
     out = np.zeros((n, len(tracks) + 2), dtype=np.float32)
