@@ -1,10 +1,11 @@
 """Salient motion: whether a track goes somewhere by itself, or is a part of what surrounds it.
 
 Leaves, water and the errors of a background that is no plane move at every moment and get nowhere:
-over a longer baseline the background explains them again. Objects leave their place, and keep a
-course while they do (Wixson, Detecting salient motion by accumulating directionally-consistent
-flow, 2000). The ground near a moving camera drifts from any one model of the background, but not
-from its own surroundings: so a track is compared with a motion fitted to the ring around it.
+over a longer baseline the background explains them again, or their way step by step does not show.
+Objects leave their place, and keep a course while they do (Wixson, Detecting salient motion by
+accumulating directionally-consistent flow, 2000). The ground near a moving camera drifts from any
+one model of the background, but not from its own surroundings: so a track is compared with a motion
+fitted to the ring around it.
 """
 
 from __future__ import annotations
@@ -94,26 +95,42 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
 
 
 def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
-    explained = dict(t.explained)
+    explained, borne = dict(t.explained), dict(t.borne)
     # Points of its own outline may lie in the cells right beside it.
     beside = scene.cells.reach((winner == k)[:, None], 1)
     ring = scene.cells.reach(beside, RING_STEPS - 1)[:, 0] & ~beside[:, 0] & (winner == 0)
-    step: Doubles | None = None
     for m in scene.measured:
         at = scene.cell_of(m.constraints.xy)
         mine, around = winner[at] == k, ring[at]
         local = surroundings(m, around)
         if np.count_nonzero(mine) >= FEWEST:
             _note(explained, m, _misfit(m, local)[mine])
-        if step is None:
-            step = _step(t, m, local, scene.seconds)
-    assert step is not None
-    return replace(
-        t,
-        explained=MappingProxyType(explained),
-        gone=(t.gone[0] + float(step[0]), t.gone[1] + float(step[1])),
-        way=t.way + float(np.hypot(*step)),
-    )
+        if m is scene.measured[0]:
+            t = _gone_on(t, m, local, scene)
+        _note_course(borne, t, m, local, scene)
+    return replace(t, explained=MappingProxyType(explained), borne=MappingProxyType(borne))
+
+
+def _gone_on(t: Track, m: Measured, local: Affine | None, scene: Scene) -> Track:
+    """Add the step of a frame, if it was seen: what was not measured again has gone nowhere."""
+    if not any(rate.time == scene.time for rate in t.motions[0].rates.values()):
+        return t
+    step = _apart(t.brisk() * scene.seconds, t, m, local)
+    gone = t.gone[0] + float(step[0]), t.gone[1] + float(step[1])
+    return replace(t, gone=gone, way=t.way + float(np.hypot(*step)))
+
+
+def _note_course(
+    borne: dict[int, float], t: Track, m: Measured, local: Affine | None, scene: Scene
+) -> None:
+    """Note how much of the way gone step by step shows over a baseline longer than a swing."""
+    rate = t.motions[0].rates.get(m.constraints.lag)
+    if m.constraints.span_s < SWING_S or rate is None or rate.time != scene.time:
+        return
+    age = scene.time - t.born + scene.seconds
+    way = t.way * min(1.0, m.constraints.span_s / age)
+    net = _apart(rate.velocity(t.centre) * rate.span_s, t, m, local)
+    borne[_octave(m)] = float(np.hypot(*net)) / max(way, 1e-6)
 
 
 def _note(explained: dict[int, float], m: Measured, misfit: NDArray[np.float32]) -> None:
@@ -174,10 +191,21 @@ def is_salient(t: Track, scene: Scene, *, at_once: bool = False, need: float = 1
         return False
     gone = float(np.hypot(*t.gone))
     explained = min(t.explained.values(), default=0.0)
+    straight, borne = gone >= STRAIGHT * t.way, _is_borne_out(t)
     if at_once:
-        return explained < CLEAR / need and gone >= need * NEAR_GONE and not _runs_ahead(t, scene)
+        # Steps of slow things are half noise: a longer baseline tells better of their course.
+        course = straight if borne is None else borne
+        clear = explained < CLEAR / need and gone >= need * NEAR_GONE
+        return clear and course and not _runs_ahead(t, scene)
     least = LEAST_GONE if scene.time - t.born >= need * SWING_S else FAR_GONE
-    return explained < EXPLAINED / need and gone >= max(need * least, STRAIGHT * t.way)
+    # Leaves that happen to swing one way feed a track, step after step, and then others do.
+    course = straight and borne is not False
+    return explained < EXPLAINED / need and gone >= need * least and course
+
+
+def _is_borne_out(t: Track) -> bool | None:
+    """Whether the longest baseline shows the way gone step by step; None if none is long enough."""
+    return t.borne[max(t.borne)] >= STRAIGHT if t.borne else None
 
 
 def border_share(share: Floats, cells: Superpixels) -> float:
@@ -200,10 +228,9 @@ def _runs_ahead(t: Track, scene: Scene) -> bool:
     return along > 0 and across < along + AHEAD
 
 
-def _step(t: Track, m: Measured, local: Affine | None, seconds: float) -> Doubles:
-    """(x, y) pixels that a track moved in a frame against the background nearest to its motion."""
-    own = t.brisk() * seconds
+def _apart(moved: Doubles, t: Track, m: Measured, local: Affine | None) -> Doubles:
+    """(x, y) pixels that a track moved against the background nearest to its motion."""
     at = np.asarray([t.centre], dtype=np.float32)
     models = m.background.models if local is None else (*m.background.models, local)
-    ways = [own - b.at(at)[0] for b in models]
+    ways = [moved - b.at(at)[0] for b in models]
     return min(ways, key=lambda way: float(np.hypot(*way)))

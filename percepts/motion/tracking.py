@@ -125,6 +125,8 @@ class Track:
         alike: Votes that it is one with another track, by key.
         gone: (x, y) of its displacement since birth against the background, pixels.
         way: Length of the way it took to get there, pixels.
+        borne: Displacement over a longer baseline as a share of the way it took meanwhile, by
+            octave of the baseline.
         explained: Share of its points that the background explains, by octave of the baseline.
         moving_area: Its area when the background last did not explain it, working pixels.
     """
@@ -150,6 +152,7 @@ class Track:
     alike: Mapping[int, float] = field(default_factory=_nothing)
     gone: tuple[float, float] = (0.0, 0.0)
     way: float = 0.0
+    borne: Mapping[int, float] = field(default_factory=_nothing)
     explained: Mapping[int, float] = field(default_factory=_nothing)
     moving_area: float = 0.0
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import cv2
@@ -8,10 +9,13 @@ import pytest
 
 from tests.motion.clips import FPS, SIZE, texture
 from visup.agent import Frame
+from visup.percepts.motion.background import Background, bare_ground
 from visup.percepts.motion.constraints import find_points
+from visup.percepts.motion.constraints import track as follow
 from visup.percepts.motion.image import prepare
+from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.salience import is_salient
-from visup.percepts.motion.scene import Scene
+from visup.percepts.motion.scene import Measured, Scene
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.superpixels import superpixels
 from visup.percepts.motion.tracking import Track
@@ -24,6 +28,13 @@ def scene(time: float = 0.0) -> Scene:
     cells = superpixels(image, 8, 8.0)
     owner = np.zeros(cells.count, np.int64)
     return Scene(image, find_points(image, 8, 1.0), cells, owner, 1 / FPS, ())
+
+
+def still(at: Scene) -> Measured:
+    """Nothing has moved, over one frame."""
+    c = follow(at.points, at.points.xy, at.image, at.image, 1, 1.0)
+    rest = (Affine(np.zeros((2, 3))),)
+    return Measured(c, Background(rest, 1.0, None, bare_ground(at.image.shape), True))
 
 
 def track(
@@ -62,6 +73,30 @@ def test_a_young_track_must_go_further() -> None:
     assert is_salient(track(older, 2.0, 2.0, {1: 0.0}), older)
 
 
+@pytest.mark.parametrize(
+    ("way", "borne", "at_once", "salient"),
+    [
+        (10.5, {}, True, True),
+        (30.0, {}, True, False),  # far, but to and fro
+        (10.5, {4: 0.9}, False, True),
+        (10.5, {4: 0.3}, False, False),  # the steps were those of many things
+        (10.5, {4: 0.3}, True, False),
+        (10.5, {4: 0.3, 5: 0.9}, False, True),  # the longest baseline decides
+        (16.0, {4: 0.9}, True, True),  # steps as long as their noise, but gone it has
+        (16.0, {4: 0.9}, False, False),
+    ],
+)
+def test_a_longer_baseline_must_bear_out_the_way(
+    way: float, borne: dict[int, float], at_once: bool, salient: bool
+) -> None:
+    at = scene(time=2.0)
+    at = replace(at, measured=(still(at),))
+    t = track(at, 10.0, way, {1: 0.1})
+    inside = np.where(at.cells.centre[:, 0] > 12, t.share, 0).astype(np.float32)
+    t = replace(t, share=inside, borne=MappingProxyType(borne))
+    assert is_salient(t, at, at_once=at_once) is salient
+
+
 def test_what_fills_the_border_is_a_ground() -> None:
     at = scene()
     assert is_salient(track(at, 10.0, 10.0, {1: 0.0}), at)
@@ -78,8 +113,9 @@ def swaying(n: int, rng: np.random.Generator, phase: np.ndarray) -> Frame:
     return Frame(n, n / FPS, np.repeat(grey[..., None], 3, axis=2))
 
 
-def test_leaves_that_sway_are_no_objects() -> None:
-    rng = np.random.default_rng(5)
+@pytest.mark.parametrize("seed", [2, 4, 5])
+def test_leaves_that_sway_are_no_objects(seed: int) -> None:
+    rng = np.random.default_rng(seed)
     phase = cv2.GaussianBlur(rng.uniform(-40, 40, SIZE).astype(np.float32), (0, 0), 6.0)
     segmenter = MotionSegmenter()
     seen = [segmenter.step(swaying(n, rng, phase)) for n in range(60)]
