@@ -103,7 +103,7 @@ class AreaIndex:
     def __init__(self, maps: NDArray[np.uint8]) -> None:
         spectra, self._powers = _spectra(maps)
         # One matrix for each frequency: a query meets all views in one product.
-        self._spectra = np.ascontiguousarray(np.moveaxis(spectra, 2, 0))
+        self._spectra = np.ascontiguousarray(np.moveaxis(spectra.conj(), 2, 0))
 
     def __len__(self) -> int:
         return len(self._powers)
@@ -115,14 +115,26 @@ class AreaIndex:
             query: (RINGS, ANGLES) uint8.
             among: Numbers of the views to look at; all when None.
         """
+        return _best(*self._turned(query, among))
+
+    def similarities(
+        self, query: NDArray[np.uint8], among: NDArray[np.intp] | None = None
+    ) -> NDArray[np.float64]:
+        """The similarities of `overlaps` alone, (V, 2), in less time."""
+        turned, powers = self._turned(query, among)
+        return _shares(turned.max(axis=0), powers)
+
+    def _turned(
+        self, query: NDArray[np.uint8], among: NDArray[np.intp] | None
+    ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+        """What is covered by both at all rotations, (ANGLES, V, 2), and the sums of what each covers."""
         known, powers = self._spectra, self._powers
         if among is not None:
             known, powers = known[:, among], powers[among]
         spectrum, power = _spectra(query[None])
         own = spectrum[0].T[..., None]
-        products = known.conj() @ np.concatenate([own, own.conj()], axis=2)
-        turned = np.fft.irfft(products, ANGLES, axis=0)
-        return _best(turned, powers + power[0])
+        products = known @ np.concatenate([own, own.conj()], axis=2)
+        return np.fft.irfft(products, ANGLES, axis=0), powers + power[0]
 
 
 def area_overlaps(query: NDArray[np.uint8], others: NDArray[np.uint8]) -> Overlaps:
@@ -151,5 +163,9 @@ def _best(turned: NDArray[np.floating], powers: NDArray[np.float64]) -> Overlaps
     angle = (best + 0.5 * (after - before) / bend) * (2 * np.pi / ANGLES)
     # A mirror image left to right is one top to bottom, turned by half a turn.
     angle[:, 1] = np.pi - angle[:, 1]
-    similarity = np.clip(2 * chosen / np.maximum(powers, 1e-12)[:, None], 0.0, 1.0)
-    return Overlaps(similarity, np.angle(np.exp(1j * angle)))
+    return Overlaps(_shares(chosen, powers), np.angle(np.exp(1j * angle)))
+
+
+def _shares(common: NDArray[np.floating], powers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twice what both cover over the sum of what each covers, (V, 2)."""
+    return np.clip(2.0 * common.astype(np.float64) / np.maximum(powers, 1e-12)[:, None], 0.0, 1.0)

@@ -162,7 +162,7 @@ class ViewIndex:
         features = len(own) - SPECTRUM
         squares = ((self._roots[among, :features] - own[:features]) ** 2).sum(axis=1)
         outlines = sketch_distances(sketch(query.heights), self._summaries.sketches[among])
-        uncovered = 1.0 - self.overlaps(query, among).similarity.max(axis=1)
+        uncovered = 1.0 - self._covered(query, among)
         apart = (
             outlines / _SKETCH_SCALE
             + _ROOT_SHARE * np.sqrt(squares)
@@ -207,12 +207,16 @@ class ViewIndex:
             return self._areas.overlaps(query.areas, among)
         return area_overlaps(query.areas, self._summaries.areas[among])
 
+    def _covered(self, query: Shape, among: NDArray[np.intp]) -> NDArray[np.float64]:
+        """How well a shape's area lies on those of some views, mirrored or not, (V,)."""
+        index, rows = self._areas, among
+        if len(self) > KEPT:
+            index, rows = AreaIndex(self._summaries.areas[among]), np.arange(len(among))
+        return np.asarray(index.similarities(query.areas, rows).max(axis=1))
+
     def best_covered(self, query: Shape, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
         """The views whose areas lie best on a shape's: at most so many of the numbers, rising."""
-        covered = [
-            self.overlaps(query, among[k : k + KEPT]).similarity.max(axis=1)
-            for k in range(0, len(among), KEPT)
-        ]
+        covered = [self._covered(query, among[k : k + KEPT]) for k in range(0, len(among), KEPT)]
         return np.sort(among[np.argsort(-np.concatenate(covered), kind="stable")[:most]])
 
     @cached_property
