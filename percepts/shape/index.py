@@ -209,10 +209,11 @@ class ViewIndex:
 
     def _covered(self, query: Shape, among: NDArray[np.intp]) -> NDArray[np.float64]:
         """How well a shape's area lies on those of some views, mirrored or not, (V,)."""
-        index, rows = self._areas, among
-        if len(self) > KEPT:
-            index, rows = AreaIndex(self._summaries.areas[among]), np.arange(len(among))
-        return np.asarray(index.similarities(query.areas, rows).max(axis=1))
+        if len(self) <= KEPT:
+            similar = self._areas.similarities(query.areas, among)
+        else:
+            similar = AreaIndex(self._summaries.areas[among]).similarities(query.areas)
+        return np.asarray(similar.max(axis=1))
 
     def best_covered(self, query: Shape, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
         """The views whose areas lie best on a shape's: at most so many of the numbers, rising."""
