@@ -63,6 +63,7 @@ class Script:
     hidden: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     identities: Mapping[int, Mapping[str, float]] = field(default_factory=lambda: IDENTITIES)
     alerts: Sequence[tuple[str, float, float]] = ()
+    about: tuple[int, ...] = ()
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     known: Sequence[str] = (
         "converging",
@@ -101,7 +102,7 @@ def mind_at(script: Script, time: float, index: int, before: Mind) -> Mind:
             number, script.identities.get(number, {}), presence, seen=(enters, min(time, leaves))
         )
     alerts = tuple(
-        Alert(i, kind, Severity.WARNING, opened, time, (), f"There is a {kind}.")
+        Alert(i, kind, Severity.WARNING, opened, time, script.about, f"There is a {kind}.")
         for i, (kind, opened, closed) in enumerate(script.alerts, 1)
         if opened <= time < closed
     )

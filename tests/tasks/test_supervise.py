@@ -98,6 +98,25 @@ def test_what_is_unsafe_interrupts_for_good() -> None:
     assert task_of(played, 6.0).unexplained == ()
 
 
+@pytest.mark.parametrize(
+    ("kind", "about", "ends"),
+    [
+        ("unexpected_object", ARM, True),  # it was the arm all the time
+        ("unexpected_object", INTRUDER, False),
+        ("collision_course", ARM, False),  # whoever it was, it was unsafe
+    ],
+)
+def test_a_stranger_that_proves_to_be_an_actor_interrupts_no_longer(
+    kind: str, about: int, ends: bool
+) -> None:
+    script = Script(SUCCEEDS, objects=CROWDED, alerts=[(kind, 7.0, 9.0)], about=(about,))
+    played = watch(script, 26.0)
+    assert task_of(played, 8.0).verdict is Verdict.INTERRUPTED
+    after = Verdict.IN_PROGRESS if ends else Verdict.INTERRUPTED
+    assert task_of(played, 10.0).verdict is after
+    assert finish(task_of(played)) is (Verdict.SUCCEEDED if ends else Verdict.INTERRUPTED)
+
+
 @pytest.mark.parametrize("kind", ["stage_failing", "contact"])
 def test_other_alerts_do_not_interrupt(kind: str) -> None:
     played = watch(Script(SUCCEEDS, alerts=[(kind, 7.0, 9.0)]), 26.0)
