@@ -110,7 +110,10 @@ def normalise(
     if outline is None:
         return None
     unscaled = (outline + 0.5) / zoom - 0.5 - pad + np.asarray(inset)
-    contour, origin = _in_units((unscaled + 0.5) / shrink - 0.5 + np.asarray(corner))
+    placed = _in_units((unscaled + 0.5) / shrink - 0.5 + np.asarray(corner))
+    if placed is None:
+        return None
+    contour, origin = placed
     area /= shrink**2
     border = _border(mask, sides) if cut else None
     areas = area_map(part > 0)
@@ -210,11 +213,18 @@ def _on_level(
     return np.asarray(moved, dtype=np.float64)
 
 
-def _in_units(outline: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[float, float]]:
-    """An outline in pixels scaled to unit area around its centroid, and the centroid."""
+def _in_units(
+    outline: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], tuple[float, float]] | None:
+    """An outline in pixels scaled to unit area around its centroid, and the centroid.
+
+    None of an outline that encloses next to nothing: a line one pixel wide, which both sides share.
+    """
     outer, centroid = polygon_moments(outline)
     if outer < 0:
         outline, outer = outline[::-1], -outer
+    if outer < 1.0:
+        return None
     contour = resample_closed((outline - centroid) / outer**0.5)
     return contour, (float(centroid[0]), float(centroid[1]))
 

@@ -144,3 +144,14 @@ def test_a_mirror_image_is_told_apart_on_request(turn: float) -> None:
     assert strict.similarity < either.similarity - 0.1
     again = compare(own, shape(limbs(angles, turn=turn)), mirror=False)
     assert again.similarity > 0.9
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 600), st.integers(1, 2), st.booleans())
+def test_a_line_has_a_finite_outline_or_none(length: int, width: int, upright: bool) -> None:
+    mask = np.zeros((width + 2, length + 2), dtype=bool)
+    mask[1:-1, 1:-1] = True
+    found = normalise(mask.T if upright else mask)
+    if found is not None:
+        assert np.isfinite(found.contour).all()
+        assert np.ptp(found.contour, axis=0).min() > 0
