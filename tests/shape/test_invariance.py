@@ -147,7 +147,7 @@ def test_a_mirror_image_is_told_apart_on_request(turn: float) -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.integers(1, 600), st.integers(1, 2), st.booleans())
+@given(st.one_of(st.integers(1, 600), st.integers(4000, 8192)), st.integers(1, 2), st.booleans())
 def test_a_line_has_a_finite_outline_or_none(length: int, width: int, upright: bool) -> None:
     mask = np.zeros((width + 2, length + 2), dtype=bool)
     mask[1:-1, 1:-1] = True
