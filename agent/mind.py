@@ -65,6 +65,77 @@ class Candidate:
     share: float
 
 
+@dataclass(frozen=True, slots=True)
+class Spin:
+    """How fast an object turns about itself.
+
+    Attributes:
+        rate: Degrees per second, not negative.
+        sigma: Standard deviation of `rate`.
+        axis: Unit vector in the camera's frame (x right, y down, z forward), about which it turns by
+            the right-hand rule.
+    """
+
+    rate: float
+    sigma: float
+    axis: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Which way an object faces under its most likely identity (paper, section 5, figure 5).
+
+    Attributes:
+        name: The model.
+        view: Number of the view within the model.
+        direction: Unit vector from the object to the viewer in the model's frame.
+        rotation: In-plane rotation from view to region, radians, or None when it is not known.
+        since: Seconds since when this view is believed.
+        confidence: 0 to 1.
+        spin: How it turns, or None while that is not known.
+    """
+
+    name: str
+    view: int
+    direction: tuple[float, float, float]
+    rotation: float | None
+    since: float
+    confidence: float = 1.0
+    spin: Spin | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """A part of the scene that rules can name, as drawn in the settings.
+
+    Attributes:
+        name: What rules call it.
+        polygon: Corners (x, y), pixels of the image, at least three, in order.
+        depth: (nearest, farthest) relative depth, or None when the zone is drawn in the image alone.
+    """
+
+    name: str
+    polygon: tuple[tuple[float, float], ...]
+    depth: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What the operator is asked: which of some candidates an object is.
+
+    Attributes:
+        object_id: The object.
+        names: The candidates, most likely first.
+        asked: Seconds.
+        text: The sentence, with question mark.
+    """
+
+    object_id: int
+    names: tuple[str, ...]
+    asked: float
+    text: str
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectBelief:
     """What is believed about one object.
@@ -79,6 +150,7 @@ class ObjectBelief:
         candidates: Identities, most likely first; empty while nothing is known.
         depth: Relative depth in the units of the best candidate's model, or None when unknown.
         depth_sigma: Standard deviation of `depth`.
+        pose: Which way it faces and how it spins, or None while that is not known.
     """
 
     id: int
@@ -90,6 +162,7 @@ class ObjectBelief:
     candidates: tuple[Candidate, ...] = ()
     depth: float | None = None
     depth_sigma: float | None = None
+    pose: Pose | None = None
 
     @property
     def name(self) -> str:
@@ -231,6 +304,9 @@ class Mind:
         percepts: Latest percepts of plug-ins' own kinds, by kind.
         unknown: Kinds of percept that could not be observed in this step (a behaviour failed).
         actors: Actor name -> model names, as bound by the user or the task.
+        zones: Parts of the scene that rules can name.
+        questions: Those that wait for the operator's answer.
+        answers: Object id -> what the operator said it is.
         memory: What thinkers remember, by thinker; immutable values only.
     """
 
@@ -246,6 +322,9 @@ class Mind:
     percepts: Mapping[str, tuple[Percept, ...]] = field(default_factory=empty)
     unknown: frozenset[str] = frozenset()
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=empty)
+    zones: tuple[Zone, ...] = ()
+    questions: tuple[Question, ...] = ()
+    answers: Mapping[int, str] = field(default_factory=empty)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
     def remember(self, thinker: str, value: object) -> Mind:

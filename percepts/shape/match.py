@@ -185,32 +185,3 @@ def correspond(
         if broken[rows, columns].any():
             rows, columns = linear_sum_assignment(left, maximize=True)
     return pairs
-
-
-def in_plane_rotation(
-    a: ShockGraph, b: ShockGraph, matched: Match, *, mirrored: bool = False
-) -> float | None:
-    """Rotation that takes the first shape onto the second, by their corresponding nodes.
-
-    Args:
-        a: The first graph.
-        b: The second graph.
-        matched: Their match, with pairs (node of the second, node of the first, similarity).
-        mirrored: Whether the first is mirrored left to right before it is turned.
-
-    Returns:
-        Radians, from x towards y (clockwise in the image), in (-pi, pi]; None when the nodes lie too
-        close to the centroids to tell.
-    """
-    pairs = np.array([(u, v) for v, u, _ in matched.pairs[1:]], dtype=np.intp).reshape(-1, 2)
-    worth = np.array([s for _, _, s in matched.pairs[1:]])
-    p = a.positions[pairs[:, 0]].astype(np.float64)
-    q = b.positions[pairs[:, 1]].astype(np.float64)
-    if mirrored:
-        p = p * (-1.0, 1.0)
-    worth = worth * np.sqrt(a.weights[pairs[:, 0]] * b.weights[pairs[:, 1]])
-    sine = float((worth * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])).sum())
-    cosine = float((worth * (p * q).sum(axis=1)).sum())
-    if np.hypot(sine, cosine) < 1e-3:
-        return None
-    return float(np.arctan2(sine, cosine))

@@ -63,11 +63,6 @@ def _following() -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return following.astype(np.intp), stops
 
 
-def complexity(heights: NDArray[np.float32]) -> float:
-    """How much an outline varies: differences between plain outlines weigh more."""
-    return float(heights.std(axis=-2).mean())
-
-
 def outline_distances(
     first: NDArray[np.float32], second: NDArray[np.float32]
 ) -> NDArray[np.float64]:

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.shape.shapes import ZOO, shape
+from visup.percepts.shape.compare import compare
 from visup.percepts.shape.index import ViewIndex
-from visup.percepts.shape.match import BREAK, WEIGHTS, correspond, in_plane_rotation, match
+from visup.percepts.shape.match import BREAK, WEIGHTS, correspond, match
 from visup.percepts.shape.signature import adjacency, descendants, signatures
 
 PATH = np.array([[0, 1], [1, 2]], dtype=np.int16)
@@ -143,8 +144,7 @@ def test_the_index_finds_the_same_shape_first() -> None:
 @pytest.mark.parametrize("quarters", [0, 1, 2, 3])
 def test_rotation_in_the_plane_is_found(quarters: int) -> None:
     mask = ZOO["walker"]
-    a, b = shape(mask).graph, shape(np.rot90(mask, -quarters)).graph
-    turn = in_plane_rotation(a, b, match(b, a))
+    turn = compare(shape(np.rot90(mask, -quarters)), shape(mask)).rotation
     assert turn is not None
     # rot90 by -1 turns the picture clockwise, which is from x towards y with y down.
     off = (turn - quarters * np.pi / 2 + np.pi) % (2 * np.pi) - np.pi

@@ -37,7 +37,6 @@ from visup.supervisor import WatchSettings, build_agent, final_verdict, open_vid
 
 SMALLEST_SCORED_PX = 500
 COVERING_IOU = 0.5
-UNSAFE_ALERTS = ("unexpected_object", "collision_course", "workspace_violation")
 
 
 @dataclass(frozen=True, slots=True)
