@@ -15,6 +15,7 @@ from typing import Any
 from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
 
 NO_OBJECTS: Mapping[int, ObjectBelief] = MappingProxyType({})
+NO_ANSWERS: Mapping[int, str] = MappingProxyType({})
 HEALTHY = Health(HealthStatus.OK)
 UNKNOWN_OBJECT = "unknown object"
 
@@ -324,7 +325,7 @@ class Mind:
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=empty)
     zones: tuple[Zone, ...] = ()
     questions: tuple[Question, ...] = ()
-    answers: Mapping[int, str] = field(default_factory=empty)
+    answers: Mapping[int, str] = field(default_factory=lambda: NO_ANSWERS)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
     def remember(self, thinker: str, value: object) -> Mind:
