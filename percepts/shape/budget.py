@@ -7,13 +7,13 @@ budget loses the unlikely ones.
 
 from __future__ import annotations
 
-SHAPE_MS = 7.0
+SHAPE_MS = 3.0
 """From a mask to its shock graph."""
 
-SEARCH_MS = 3.0
+SEARCH_MS = 2.0
 """The sieves of the index, and what comes after the comparisons."""
 
-VIEW_MS = 0.25
+VIEW_MS = 0.35
 """A view compared in full."""
 
 
@@ -28,7 +28,7 @@ def share_within(milliseconds: float, views: int) -> float:
         Above 0, whatever the budget: something is always compared.
 
     Example:
-        >>> share_within(15.0, 1000), share_within(0.0, 1000)
+        >>> share_within(12.0, 1000), share_within(0.0, 1000)
         (0.02, 0.001)
     """
     left = milliseconds - SHAPE_MS - SEARCH_MS

@@ -141,7 +141,8 @@ class CutIndex:
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
         self._shapes = shapes
-        self._slots: dict[int, int] = {}
+        self._slots = np.full(len(shapes), -1, dtype=np.intp)
+        self._used = 0
         size = (min(len(shapes), KEPT), BEARINGS, len(SHARES))
         self._codes = np.zeros((*size, _basis().shape[1]), dtype=np.float32)
         self._powers = np.zeros(size, dtype=np.float32)
@@ -181,19 +182,21 @@ class CutIndex:
 
     def _prepared(self, among: NDArray[np.intp]) -> NDArray[np.intp] | slice:
         """Where views stand, prepared; neighbours as a slice, so that nothing is copied."""
-        missing = [int(k) for k in among if int(k) not in self._slots]
-        if len(self._slots) + len(missing) > len(self._codes):
-            self._slots.clear()
-            missing = among.tolist()
-        for number in missing:
+        missing = among[self._slots[among] < 0]
+        if self._used + len(missing) > len(self._codes):
+            self._slots[:] = -1
+            self._used = 0
+            missing = among
+        for number in missing.tolist():
             self._prepare(number)
-        slots = np.array([self._slots[int(k)] for k in among], dtype=np.intp)
+        slots = self._slots[among]
         if len(slots) and np.array_equal(slots, np.arange(slots[0], slots[0] + len(slots))):
             return slice(int(slots[0]), int(slots[0]) + len(slots))
         return slots
 
     def _prepare(self, number: int) -> None:
-        slot = self._slots[number] = len(self._slots)
+        slot = self._slots[number] = self._used
+        self._used += 1
         maps, offsets = _Picture(self._shapes[number].contour).cut()
         self._codes[slot] = maps @ _basis()
         self._powers[slot] = (self._codes[slot] ** 2).sum(axis=-1)

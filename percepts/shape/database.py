@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,17 @@ __all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_want
 
 CANDIDATES = 20
 """Views whose outlines are compared when no budget asks for fewer."""
+
+
+class Wishes(TypedDict, total=False):
+    """What may be asked of a ranking; `ModelDatabase.query` says what each means."""
+
+    top: int
+    per_name: int | None
+    threshold: float
+    restrict: Collection[str] | None
+    try_first: Collection[str]
+    mirror: bool
 
 
 class ModelDatabase:
@@ -93,12 +105,8 @@ class ModelDatabase:
         shapes: Sequence[NDArray[np.bool_] | Silhouette | Shape],
         *,
         budget_ms: float | None = None,
-        top: int = 10,
-        per_name: int | None = None,
-        threshold: float = 0.0,
-        restrict: Collection[str] | None = None,
-        try_first: Collection[str] = (),
         budget: float = 0.1,
+        **wishes: Unpack[Wishes],
     ) -> tuple[Ranking, ...]:
         """Rank the views that each of several shapes looks like, such as all regions of a frame.
 
@@ -106,30 +114,15 @@ class ModelDatabase:
             shapes: Masks (H, W) bool of what no border cuts, silhouettes or shapes.
             budget_ms: Milliseconds for all together on the machine of the benchmarks, shared evenly;
                 the likeliest views are compared first. See `budget.py`.
-            top: For each shape, as for `query`; so are the rest.
-            per_name: See `query`.
-            threshold: See `query`.
-            restrict: See `query`.
-            try_first: See `query`.
             budget: See `query`.
+            wishes: For each shape, as for `query`.
 
         Returns:
             A ranking for each shape.
         """
         if budget_ms is not None and shapes:
             budget = min(budget, share_within(budget_ms / len(shapes), len(self.views)))
-        return tuple(
-            self.query(
-                shape,
-                top=top,
-                per_name=per_name,
-                threshold=threshold,
-                restrict=restrict,
-                try_first=try_first,
-                budget=budget,
-            )
-            for shape in shapes
-        )
+        return tuple(self.query(shape, budget=budget, **wishes) for shape in shapes)
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
         """Add views, to names new or known; the database as it is then. See `build.py`.

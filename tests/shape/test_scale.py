@@ -13,6 +13,7 @@ from tests.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape, small_
 from visup.agent.errors import SettingsError
 from visup.evaluation.multiply import deformed, multiplied
 from visup.evaluation.scale import evaluate_scale, noisy
+from visup.percepts.shape.budget import SEARCH_MS, SHAPE_MS, VIEW_MS
 from visup.percepts.shape.compare import Shape, compare
 from visup.percepts.shape.database import CANDIDATES, ModelDatabase
 from visup.percepts.shape.index import Summaries, ViewIndex
@@ -106,7 +107,8 @@ def test_a_budget_in_time_is_kept_by_comparing_fewer_views_the_likeliest_first(
     many: ModelDatabase,
 ) -> None:
     asked = [shape(ZOO["walker"]), shape(ZOO["star"])]
-    budgets = (0.0, 24.0, 1000.0)
+    eight = SHAPE_MS + SEARCH_MS + 8 * VIEW_MS
+    budgets = (0.0, len(asked) * eight + 0.1, 1000.0)
     rankings = [many.query_all(asked, budget_ms=ms, top=3) for ms in budgets]
     assert [r[0].compared for r in rankings] == [4, 8, CANDIDATES]
     for few, more in zip(rankings[0], rankings[-1], strict=True):
