@@ -93,6 +93,8 @@ class Region:
         motion: (2, 3) float, affine motion of the region between the last frame and this one.
         cut: Whether the image border cuts the region.
         confidence: How sure the segmenter is that this is a moving object, 0 to 1.
+        visible_since: Seconds since when it has been in view, moving or not, as far as one can look
+            back; None when nobody looked.
     """
 
     id: int
@@ -106,6 +108,7 @@ class Region:
     motion: NDArray[np.float64] | None = None
     cut: bool = False
     confidence: float = 1.0
+    visible_since: float | None = None
 
     def full_mask(self, size: tuple[int, int]) -> NDArray[np.bool_]:
         """The mask in a whole image.
@@ -260,9 +263,9 @@ class Event:
     """Something that happened, told once.
 
     Attributes:
-        kind: 'entry', 'exit', 'occlusion', 'reappearance', 'coupled', 'decoupled', 'relation',
-            'identified', 'stage_started', 'stage_progressing', 'stage_failing', 'stage_done',
-            'verdict', 'health', 'fault', ...
+        kind: 'entry', 'noticed' (it was in view before it was seen to move), 'exit', 'occlusion',
+            'reappearance', 'coupled', 'decoupled', 'relation', 'identified', 'stage_started',
+            'stage_progressing', 'stage_failing', 'stage_done', 'verdict', 'health', 'fault', ...
         time: Seconds.
         frame_index: Frame at which it was told.
         text: The sentence for the narrative, complete, with full stop.

@@ -10,6 +10,9 @@ from visup.rules.fragments import in_place_of_hidden
 from visup.rules.tracks import at_border
 from visup.rules.work import Work
 
+RESTED_S = 1.0
+"""What was in view for so long before it was seen to move had come before."""
+
 
 def enter(work: Work, start: float) -> None:
     """Confirm new objects; `start` is the time of the first observation, seconds."""
@@ -30,8 +33,20 @@ def enter(work: Work, start: float) -> None:
         if grow_into(work, belief):
             continue
         work.put(replace(belief, confirmed=True), told="seen")
-        template = "{0} is in view." if early else "{0} enters the field of view."
-        work.tell("entry", template, belief.id, confidence=belief.region.confidence)
+        kind, template = _arrival(belief, start, early=early)
+        work.tell(kind, template, belief.id, confidence=belief.region.confidence)
+
+
+def _arrival(belief: ObjectBelief, start: float, *, early: bool) -> tuple[str, str]:
+    """Kind and sentence of the event: what rested in view before it moved does not enter."""
+    since = belief.region.visible_since
+    if early:
+        return "entry", "{0} is in view."
+    if since is None or belief.first_seen - since < RESTED_S:
+        return "entry", "{0} enters the field of view."
+    if since - start < RESTED_S:
+        return "noticed", "{0}, in view from the start, begins to move."
+    return "noticed", f"{{0}}, in view since {since:.1f} s, begins to move."
 
 
 def _negligible(work: Work, belief: ObjectBelief) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from visup.agent import Contract, Directive, Frame, HealthStatus, Observation, Percept
+from visup.percepts.motion.lookback import LookBack
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.settings import MotionSettings
 
@@ -23,6 +24,7 @@ class MotionBehaviour:
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
         self._segmenter = MotionSegmenter(settings)
+        self._back = LookBack()
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]
@@ -42,7 +44,7 @@ class MotionBehaviour:
         # Tracks live on over frames that are left out, but not over black ones taken for sight.
         if any(p.confidence < 1.0 or p.value.status in HARMED for p in health):
             return []
-        regions = self._segmenter.step(frame, directives)
+        regions = self._back.step(frame, self._segmenter.step(frame, directives))
         if any(p.value.status is not HealthStatus.OK for p in health):
             return []
         return [Percept("region", r, frame.time, self.contract.name, r.confidence) for r in regions]

@@ -1,6 +1,7 @@
 """Entry, exit, occlusion, reappearance: scripted boxes that come, go, hide and flicker."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -163,3 +164,24 @@ def test_the_number_of_remembered_objects_is_bounded() -> None:
     assert len(thoughts[-1].mind.memory["rules.objects"]) <= 256
     assert kinds(thoughts).count(("entry", 50)) == 1
     assert len(set(kinds(thoughts))) > 75
+
+
+@pytest.mark.parametrize(
+    ("since", "kind", "words"),
+    [
+        (0.0, "noticed", "in view from the start"),
+        (2.2, "noticed", "in view since 2.2 s"),
+        (3.9, "entry", "enters"),
+        (None, "entry", "enters"),
+    ],
+)
+def test_what_was_in_view_before_it_moved_does_not_enter(
+    since: float | None, kind: str, words: str
+) -> None:
+    def late(i: int) -> Region | None:
+        found = box_region(1, (100 + i, 100, 80, 60)) if i >= 100 else None
+        return found and replace(found, visible_since=since)
+
+    told = [e for t in run(seen(i, [late(i)]) for i in range(150)) for e in t.events]
+    assert [e.kind for e in told] == [kind]
+    assert words in told[0].text

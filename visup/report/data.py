@@ -60,6 +60,7 @@ KIND_WEIGHTS: Mapping[str, int] = {
     "coupled": 5,
     "decoupled": 5,
     "entry": 3,
+    "noticed": 3,
     "reappearance": 3,
     "exit": 2,
     "occlusion": 2,
