@@ -1,7 +1,7 @@
 """Views: silhouettes of a mesh as seen from directions spread evenly over the sphere.
 
 Conventions: a direction is the unit vector from the object to the viewer, in the mesh's own frame. The
-projection is parallel. Roll: the mesh's +z points up in the picture; looking along z, its +y does.
+projection is parallel. Roll: as in `agent/viewing.py`.
 Needs the extra ``visup[render]``.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.errors import DatabaseError, ExtraMissingError
+from visup.agent.viewing import picture_axes
 
 PICTURE = 200
 """Pixels along the longer side of a rendered silhouette."""
@@ -111,14 +112,6 @@ def _turn(seed: int) -> NDArray[np.float64]:
     """A rotation drawn at random."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     return np.asarray(q * np.sign(np.diag(r)))
-
-
-def picture_axes(direction: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Right and up of the picture seen from a direction, as unit vectors in the mesh frame."""
-    pole = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
-    right = np.cross(pole, direction)
-    right /= np.linalg.norm(right)
-    return right, np.cross(direction, right)
 
 
 def load_mesh(path: Path) -> Any:

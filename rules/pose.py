@@ -1,0 +1,302 @@
+"""Which way objects face and how they turn: the interpretation trees of each object, and what comes of them.
+
+Every object has a tree for each model that was hypothesised for it lately (`interpretation.py`). The cheapest
+path of the most likely model tells the view, since when, and the orientations from which the spin is
+measured (`spin.py`). How much dearer the paths of other models are tells who the object cannot be:
+`pose_support`, which the votes heed in the next step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import exp
+from types import MappingProxyType
+
+import numpy as np
+
+from visup.agent import Hypothesis, Mind, ObjectBelief, Observation, Outcome, Pose, Presence
+from visup.agent.viewing import views
+from visup.rules.interpretation import (
+    NONE,
+    Level,
+    Tree,
+    TreeSettings,
+    Turning,
+    grown,
+    level_of,
+    look_weight,
+    planted,
+    rival_gap,
+)
+from visup.rules.objects import owners
+from visup.rules.presence import visible_share
+from visup.rules.spin import Rate, SpinSettings, Turns, measured_rate, spin_of
+from visup.rules.turns import Floats
+
+POSES = "rules.pose"
+Look = tuple[tuple[str, int, float, float | None], ...]
+"""What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSettings:
+    """How poses are believed.
+
+    Attributes:
+        tree: Costs and bounds of the interpretation trees.
+        spin: How spin is measured.
+        every_s: Looks at one object are at least so far apart.
+        refit_s: Spin is measured so often.
+        least_visible: Below this share in sight an object's hypotheses are not heeded.
+        most_names: Models of an object that have trees.
+        memory_s: Costs of models are forgotten to 37 % in this time.
+        free_cost: A model's cost above that of the cheapest which costs no support.
+        support_cost: So much more lets its support fall to 37 %.
+        loosest: Radians per second; how fast objects of unknown spin may turn.
+        surest: Radians per second; least uncertainty of a believed spin for the tree.
+        stale_s: Without a look for so long, confidence falls to 37 %.
+        spin_stale_s: Without a look for so long, the spin is unknown.
+    """
+
+    tree: TreeSettings = field(default_factory=TreeSettings)
+    spin: SpinSettings = field(default_factory=SpinSettings)
+    every_s: float = 0.1
+    refit_s: float = 1.0
+    least_visible: float = 0.5
+    most_names: int = 6
+    memory_s: float = 3.0
+    free_cost: float = 6.0
+    support_cost: float = 6.0
+    loosest: float = 0.35
+    surest: float = 0.09
+    stale_s: float = 10.0
+    spin_stale_s: float = 8.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """What is remembered of one object's views.
+
+    Attributes:
+        time: Seconds of the last look, or minus infinity.
+        said: What was said then; when the same is said again nobody looked anew.
+        trees: Model name -> its tree.
+        levels: Model name -> its level, for each of the last looks.
+        strain: Model name -> cost of its cheapest path, forgotten over time.
+        untold: The same of a model that was never hypothesised.
+        name: The model whose orientations are in `settled`.
+        settled: (seconds, orientation) along its cheapest path, of looks older than the trees'.
+        rate: How it turns, or None when it is not known.
+        rated: Seconds when the rate was measured.
+    """
+
+    time: float = -np.inf
+    said: Look = ()
+    trees: Mapping[str, Tree] = field(default_factory=lambda: MappingProxyType({}))
+    levels: tuple[Mapping[str, Level], ...] = ()
+    strain: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    untold: float = 0.0
+    name: str = ""
+    settled: tuple[tuple[float, Floats], ...] = ()
+    rate: Rate | None = None
+    rated: float = -np.inf
+
+
+NO_TRACKS: Mapping[int, Track] = MappingProxyType({})
+
+
+def tracks(mind: Mind) -> Mapping[int, Track]:
+    """Object id -> what is remembered of its views."""
+    found: Mapping[int, Track] = mind.memory.get(POSES, NO_TRACKS)
+    return found
+
+
+def pose_support(
+    mind: Mind, object_id: int, name: str, settings: PoseSettings = PoseSettings()
+) -> float:
+    """How well an object's views over time hang together if it is of a model.
+
+    Args:
+        mind: After the last step.
+        object_id: The object.
+        name: The model.
+        settings: Of the poses.
+
+    Returns:
+        0 to 1: 1 for the model whose cheapest path costs least and for those that cost little more;
+        1 as well when nothing is known of the object's views.
+    """
+    track = tracks(mind).get(object_id)
+    if track is None or not track.strain:
+        return 1.0
+    own = track.strain.get(name, track.untold)
+    dearer = own - min(track.strain.values()) - settings.free_cost
+    return exp(-max(0.0, dearer) / settings.support_cost)
+
+
+@dataclass(frozen=True, slots=True)
+class BelievePose:
+    """Thinker of the cogitate phase: which way each object faces and how it turns. Runs after the votes."""
+
+    settings: PoseSettings = PoseSettings()
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Take in one step's view hypotheses; see `Thinker`."""
+        said = _by_object(mind, observation)
+        known, kept, beliefs = tracks(mind), {}, []
+        for object_id, belief in mind.objects.items():
+            track = known.get(object_id, Track())
+            looked = said.get(object_id, ())
+            if looked and self._in_sight(mind, belief):
+                track = self._looked(track, looked, belief.name, mind.time)
+            if track.trees:
+                kept[object_id] = track
+            pose = self._pose(track, belief.name, mind.time)
+            if pose != belief.pose:
+                beliefs.append(replace(belief, pose=pose))
+        mind = mind.with_objects(*beliefs) if beliefs else mind
+        return Outcome(mind.remember(POSES, MappingProxyType(kept)))
+
+    def _in_sight(self, mind: Mind, belief: ObjectBelief) -> bool:
+        seen = belief.presence is Presence.SEEN
+        return seen and visible_share(mind, belief.id) >= self.settings.least_visible
+
+    def _looked(
+        self, track: Track, hypotheses: Sequence[Hypothesis], name: str, now: float
+    ) -> Track:
+        """The track after a look, unless it is the same as before or comes too soon."""
+        said = tuple((h.name, h.view, h.similarity, h.rotation) for h in hypotheses)
+        if said == track.said or now - track.time < self.settings.every_s - 1e-9:
+            return track
+        levels = self._levels(hypotheses, now)
+        track = self._settled(track, name)
+        return self._rated(self._grown(replace(track, said=said), levels, now), name, now)
+
+    def _levels(self, hypotheses: Sequence[Hypothesis], now: float) -> dict[str, Level]:
+        best = max(h.similarity for h in hypotheses)
+        by_name: dict[str, list[Hypothesis]] = {}
+        for h in hypotheses:
+            by_name.setdefault(h.name, []).append(h)
+        return {n: level_of(hs, now, best, self.settings.tree) for n, hs in by_name.items()}
+
+    def _grown(self, track: Track, levels: dict[str, Level], now: float) -> Track:
+        """The trees with one more level, and what their models have cost."""
+        s = self.settings
+        turning = _turning(track.rate, s)
+        fade = exp(-min(now - track.time, 1e6) / s.memory_s)
+        untold = track.untold * fade + look_weight(now - track.time, s.tree) * s.tree.wrong
+        trees, strain = {}, {}
+        for name in track.trees.keys() | levels.keys():
+            before = track.trees.get(name) or planted(s.tree)
+            new = name not in track.trees
+            # A model that is hypothesised for the first time was wrong at all looks before.
+            before = replace(before, time=track.time) if new else before
+            tree = grown(before, levels.get(name), now, turning, s.tree)
+            past = track.untold if new else track.strain[name]
+            trees[name], strain[name] = tree, past * fade + tree.total - before.total
+        likeliest = sorted(trees, key=lambda n: (strain[n], n))[: s.most_names]
+        return replace(
+            track,
+            time=now,
+            trees=MappingProxyType({n: trees[n] for n in likeliest}),
+            levels=(*track.levels, MappingProxyType(levels))[-s.tree.lag :],
+            strain=MappingProxyType({n: strain[n] for n in likeliest}),
+            untold=untold,
+        )
+
+    def _settled(self, track: Track, name: str) -> Track:
+        """The track with the look that the trees are about to forget; another name begins anew."""
+        s = self.settings
+        if name != track.name:
+            return replace(track, name=name, settled=(), rate=None)
+        tree = track.trees.get(name)
+        if tree is None or len(track.levels) < s.tree.lag:
+            return track
+        seen = _orientation(track.levels[0].get(name), int(tree.path[tree.best, 0]))
+        if seen is None:
+            return track
+        oldest = track.levels[0][name].time - s.spin.windows_s[-1]
+        settled = (*track.settled, (track.levels[0][name].time, seen))
+        forgotten = settled[0][0] < oldest
+        return replace(track, settled=settled[1:] if forgotten else settled)
+
+    def _rated(self, track: Track, name: str, now: float) -> Track:
+        if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
+            return track
+        turns = _turns(track, name, self.settings.tree.lag)
+        return replace(track, rate=measured_rate(turns, now, self.settings.spin), rated=now)
+
+    def _pose(self, track: Track, name: str, now: float) -> Pose | None:
+        tree = track.trees.get(name)
+        if tree is None or not tree.begun:
+            return None
+        k = tree.best
+        orientation = _last(track, name, tree)
+        if np.isnan(orientation).any():
+            return None
+        direction, rotation = views(orientation)
+        age = max(0.0, now - float(tree.chosen[k]))
+        rate = track.rate if age < self.settings.spin_stale_s and track.name == name else None
+        x, y, z = direction.tolist()
+        return Pose(
+            name,
+            int(tree.view[k]),
+            (x, y, z),
+            float(rotation) if tree.rolled[k] else None,
+            since=float(tree.since[k]),
+            confidence=self._confidence(tree, age),
+            spin=spin_of(rate, self.settings.spin) if rate else None,
+        )
+
+    def _confidence(self, tree: Tree, age: float) -> float:
+        """Against the next best orientation, from the difference of costs, which are log-likelihoods."""
+        sure = 1.0 / (1.0 + exp(-rival_gap(tree, self.settings.tree)))
+        return sure * exp(-age / self.settings.stale_s)
+
+
+def _turning(rate: Rate | None, settings: PoseSettings) -> Turning:
+    if rate is None or rate.sigma > settings.loosest:
+        return Turning(sigma=settings.loosest)
+    x, y, z = rate.vector.tolist()
+    return Turning((x, y, z), max(rate.sigma, settings.surest))
+
+
+def _orientation(level: Level | None, number: int) -> Floats | None:
+    """What a level tells if a path chose this hypothesis of it."""
+    if level is None or number == NONE or not level.rolled[number]:
+        return None
+    seen = level.between[number]
+    return None if np.isnan(seen[0, 0]) else seen
+
+
+def _turns(track: Track, name: str, lag: int) -> Turns:
+    """Orientations along the cheapest path of a model."""
+    tree = track.trees[name]
+    path = tree.path[tree.best, lag - len(track.levels) :]
+    recent = [
+        (levels[name].time, seen)
+        for levels, number in zip(track.levels, path.tolist(), strict=True)
+        if (seen := _orientation(levels.get(name), number)) is not None
+    ]
+    every = [*track.settled, *recent]
+    times = np.array([t for t, _ in every])
+    return Turns(times, np.array([r for _, r in every]).reshape(-1, 3, 3))
+
+
+def _last(track: Track, name: str, tree: Tree) -> Floats:
+    """The orientation that the cheapest path tells of last."""
+    chosen = int(tree.path[tree.best, -1])
+    level = track.levels[-1].get(name) if track.levels else None
+    between = level.between[chosen] if level is not None and chosen != NONE else None
+    return tree.orientation[tree.best] if between is None else between
+
+
+def _by_object(mind: Mind, observation: Observation) -> dict[int, list[Hypothesis]]:
+    owner = owners(mind)
+    said: dict[int, list[Hypothesis]] = {}
+    for h in observation.of("hypothesis"):
+        object_id = owner.get(h.region_id)
+        if object_id is not None:
+            said.setdefault(object_id, []).append(h)
+    return said
