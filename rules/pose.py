@@ -89,6 +89,7 @@ class Track:
         settled: (seconds, orientation) along its cheapest path, of looks older than the trees'.
         rate: How it turns, or None when it is not known.
         rated: Seconds when the rate was measured.
+        pose: What is believed since the last look, or None when nothing is.
     """
 
     time: float = -np.inf
@@ -101,6 +102,7 @@ class Track:
     settled: tuple[tuple[float, Floats], ...] = ()
     rate: Rate | None = None
     rated: float = -np.inf
+    pose: Pose | None = None
 
 
 NO_TRACKS: Mapping[int, Track] = MappingProxyType({})
@@ -152,7 +154,7 @@ class BelievePose:
                 track = self._looked(track, looked, belief.name, mind.time)
             if track.trees:
                 kept[object_id] = track
-            pose = self._pose(track, belief.name, mind.time)
+            pose = self._now(track, belief.name, mind.time)
             if pose != belief.pose:
                 beliefs.append(replace(belief, pose=pose))
         mind = mind.with_objects(*beliefs) if beliefs else mind
@@ -171,7 +173,8 @@ class BelievePose:
             return track
         levels = self._levels(hypotheses, now)
         track = self._settled(track, name)
-        return self._rated(self._grown(replace(track, said=said), levels, now), name, now)
+        track = self._rated(self._grown(replace(track, said=said), levels, now), name, now)
+        return replace(track, pose=self._pose(track, name))
 
     def _levels(self, hypotheses: Sequence[Hypothesis], now: float) -> dict[str, Level]:
         best = max(h.similarity for h in hypotheses)
@@ -227,7 +230,8 @@ class BelievePose:
         turns = _turns(track, name, self.settings.tree.lag)
         return replace(track, rate=measured_rate(turns, now, self.settings.spin), rated=now)
 
-    def _pose(self, track: Track, name: str, now: float) -> Pose | None:
+    def _pose(self, track: Track, name: str) -> Pose | None:
+        """What the cheapest path of a model tells."""
         tree = track.trees.get(name)
         if tree is None or not tree.begun:
             return None
@@ -236,8 +240,6 @@ class BelievePose:
         if np.isnan(orientation).any():
             return None
         direction, rotation = views(orientation)
-        age = max(0.0, now - float(tree.chosen[k]))
-        rate = track.rate if age < self.settings.spin_stale_s and track.name == name else None
         x, y, z = direction.tolist()
         return Pose(
             name,
@@ -245,14 +247,24 @@ class BelievePose:
             (x, y, z),
             float(rotation) if tree.rolled[k] else None,
             since=float(tree.since[k]),
-            confidence=self._confidence(tree, age),
-            spin=spin_of(rate, self.settings.spin) if rate else None,
+            confidence=self._confidence(tree, track.time - float(tree.chosen[k])),
+            spin=spin_of(track.rate, self.settings.spin) if track.rate else None,
         )
+
+    def _now(self, track: Track, name: str, now: float) -> Pose | None:
+        """The pose believed at the last look, as far as it still holds."""
+        pose, age = track.pose, now - track.time
+        if pose is None or pose.name != name or age <= 0.0:
+            return pose if pose is None or pose.name == name else None
+        spin = pose.spin if age < self.settings.spin_stale_s else None
+        return replace(pose, confidence=pose.confidence * self._fading(age), spin=spin)
 
     def _confidence(self, tree: Tree, age: float) -> float:
         """Against the next best orientation, from the difference of costs, which are log-likelihoods."""
-        sure = 1.0 / (1.0 + exp(-rival_gap(tree, self.settings.tree)))
-        return sure * exp(-age / self.settings.stale_s)
+        return self._fading(age) / (1.0 + exp(-rival_gap(tree, self.settings.tree)))
+
+    def _fading(self, age: float) -> float:
+        return exp(-max(0.0, age) / self.settings.stale_s)
 
 
 def _turning(rate: Rate | None, settings: PoseSettings) -> Turning:

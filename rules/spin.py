@@ -39,7 +39,7 @@ class SpinSettings:
         robust: Residuals beyond so many standard deviations count little.
         jump_deg: A turn by more than this between two orientations begins a new piece.
         most_pieces: Pieces that are used; the longest.
-        steps: Gauss-Newton steps from a start that is near, and twice as many from one that is not.
+        steps: Gauss-Newton steps from a start that is near, and twice as many and one from no start.
         view_deg: What the discreteness of views leaves unknown of the turn over a window.
         agree: Rates agree when they differ by fewer standard deviations than this.
         known_deg_s: A rate is told when its standard deviation is below this ...
@@ -55,8 +55,8 @@ class SpinSettings:
     robust: float = 2.5
     jump_deg: float = 50.0
     most_pieces: int = 4
-    steps: int = 3
-    view_deg: float = 4.0
+    steps: int = 2
+    view_deg: float = 3.5
     agree: float = 2.0
     known_deg_s: float = 1.0
     known_share: float = 0.3
@@ -70,14 +70,14 @@ class Rate:
     Attributes:
         vector: (3,) rotation vector per second, camera frame, radians.
         covariance: (3, 3) of `vector`.
+        scatter: Share of its trace that is due to scatter, which makes `vector` longer than it is.
         window: Seconds over which it was fitted.
-        misfit: Share of the orientations that do not fit.
     """
 
     vector: Floats
     covariance: Floats
+    scatter: float
     window: float
-    misfit: float
 
     @property
     def sigma(self) -> float:
@@ -135,11 +135,11 @@ def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
     """A rate in the words of the mind, or None when it is too uncertain to be told."""
     length = float(np.linalg.norm(rate.vector))
     axis = rate.vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
-    noise = float(np.trace(rate.covariance))
-    # The length of an uncertain vector is too great by its scatter.
-    degrees = float(np.degrees(np.sqrt(max(0.0, length**2 - noise))))
+    # The length of a scattered vector is too great.
+    excess = rate.scatter * float(np.trace(rate.covariance))
+    degrees = float(np.degrees(np.sqrt(max(0.0, length**2 - excess))))
     along = float(axis @ rate.covariance @ axis)
-    sigma = float(np.degrees(np.sqrt(max(along, noise / 3 if length**2 < noise else along))))
+    sigma = float(np.degrees(np.sqrt(max(along, rate.sigma**2 if length**2 < excess else along))))
     if sigma > max(settings.known_deg_s, settings.known_share * degrees):
         return None
     x, y, z = axis.tolist()
@@ -164,7 +164,7 @@ def fitted_rate(turns: Turns, start: Floats | None, settings: SpinSettings) -> R
         return None
     turns, pieces = _thinned(turns, pieces, rate, settings)
     fit = _Fit(turns, pieces, rate, settings)
-    for _ in range(settings.steps * (1 if given else 2)):
+    for _ in range(settings.steps if given else 2 * settings.steps + 1):
         if not fit.step():
             return None
     return fit.result()
@@ -243,32 +243,37 @@ class _Fit:
         square = (residual**2).sum(axis=1) / 3
         return residual, derivatives, 1 / (1 + square / self._s.robust**2) ** 2
 
-    def _solved(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """The change that fits best, the scores (N, P), the inverse normal matrix, the weights."""
+    def _solved(self) -> tuple[Floats, Floats, Floats]:
+        """The change (P,) that fits best, the scores (N, P), the inverse normal matrix."""
         residual, derivatives, weight = self._equations()
         scores = ((weight[:, None] * residual)[:, None] @ derivatives)[:, 0]
         flat = derivatives.reshape(-1, derivatives.shape[2])
         normal = (flat * np.repeat(weight, 3)[:, None]).T @ flat
         inverse = np.linalg.pinv(normal, hermitian=True)
-        return inverse @ scores.sum(axis=0), scores, inverse, weight
+        return inverse @ scores.sum(axis=0), scores, inverse
 
     def step(self) -> bool:
         """One step of Gauss-Newton; false when the rate runs away."""
-        change, _, _, _ = self._solved()
+        change, _, _ = self._solved()
         self._rate = self._rate + change[:3]
         self._middle = turned(change[3:].reshape(-1, 3)) @ self._middle
         return bool(np.linalg.norm(self._rate) < np.radians(self._s.fastest_deg_s))
 
     def result(self) -> Rate:
         """The rate with its covariance."""
-        _, scores, inverse, weight = self._solved()
+        _, scores, inverse = self._solved()
         covariance = (inverse @ _long_run(scores) @ inverse)[:3, :3]
         t = self._turns.times
         window = float(t[-1] - t[0])
         # However still the views stand, the object may have turned a part of the way to the next.
         unseen = np.radians(self._s.view_deg) / max(window, 1e-6)
-        covariance = covariance + np.eye(3) * unseen**2
-        return Rate(self._rate, covariance, window, float((weight < 0.25).mean()))
+        scatter = float(np.trace(covariance))
+        return Rate(
+            self._rate,
+            covariance + np.eye(3) * unseen**2,
+            scatter / (scatter + 3 * unseen**2),
+            window,
+        )
 
 
 def _long_run(scores: Floats) -> Floats:
