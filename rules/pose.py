@@ -31,7 +31,8 @@ from visup.rules.interpretation import (
 )
 from visup.rules.objects import owners
 from visup.rules.presence import visible_share
-from visup.rules.spin import Rate, SpinSettings, Turns, measured_rate, spin_of
+from visup.rules.spin import Rate, SpinSettings, measured_rate, spin_of
+from visup.rules.spin_fit import Turns
 from visup.rules.turns import Floats
 
 POSES = "rules.pose"
@@ -219,7 +220,7 @@ class BelievePose:
         seen = _orientation(track.levels[0].get(name), int(tree.path[tree.best, 0]))
         if seen is None:
             return track
-        oldest = track.levels[0][name].time - s.spin.windows_s[-1]
+        oldest = track.levels[0][name].time - s.spin.window_s
         settled = (*track.settled, (track.levels[0][name].time, seen))
         forgotten = settled[0][0] < oldest
         return replace(track, settled=settled[1:] if forgotten else settled)
@@ -228,7 +229,7 @@ class BelievePose:
         if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
             return track
         turns = _turns(track, name, self.settings.tree.lag)
-        return replace(track, rate=measured_rate(turns, now, self.settings.spin), rated=now)
+        return replace(track, rate=measured_rate(turns, now, track.rate, self.settings.spin), rated=now)
 
     def _pose(self, track: Track, name: str) -> Pose | None:
         """What the cheapest path of a model tells."""
