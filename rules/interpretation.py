@@ -296,3 +296,25 @@ def rival_gap(tree: Tree, settings: TreeSettings) -> float:
     other = np.hypot(swing, roll) > np.radians(settings.interpolate_deg)
     other |= np.isnan(swing) & (tree.view != tree.view[best])
     return float(tree.cost[other].min()) if other.any() else settings.jump
+
+
+def lead(level: Level, chosen: int, settings: TreeSettings) -> float:
+    """By how much less a level's chosen hypothesis costs than the best of quite another orientation.
+
+    Args:
+        level: The hypotheses.
+        chosen: Number of the chosen one, or `NONE`.
+        settings: Of the tree; `wrong` bounds the lead, and is that over no other at all.
+
+    Returns:
+        -`wrong` to `wrong`; 0 when none is chosen.
+    """
+    if chosen == NONE:
+        return 0.0
+    swing, roll = swing_and_roll(level.orientation[chosen], level.orientation)
+    other = np.hypot(swing, roll) > np.radians(settings.interpolate_deg)
+    other |= np.isnan(swing) & (level.views != level.views[chosen])
+    if not other.any():
+        return settings.wrong
+    ahead = float(level.cost[other].min() - level.cost[chosen])
+    return min(max(ahead, -settings.wrong), settings.wrong)

@@ -24,6 +24,7 @@ from visup.rules.interpretation import (
     TreeSettings,
     Turning,
     grown,
+    lead,
     level_of,
     look_weight,
     planted,
@@ -54,6 +55,10 @@ class PoseSettings:
         memory_s: Costs of models are forgotten to 37 % in this time.
         free_cost: A model's cost above that of the cheapest which costs no support.
         support_cost: So much more lets its support fall to 37 %.
+        settle_s: Orientations remembered for the spin are at least so far apart.
+        lead: How much a lead of the chosen hypotheses over quite other ones, in units of their
+            cost, adds to the logarithm of the odds that the pose is right. Errors of similarity
+            last as long as the view: looks do not add up.
         loosest: Radians per second; how fast objects of unknown spin may turn.
         surest: Radians per second; least uncertainty of a believed spin for the tree.
         stale_s: Without a look for so long, confidence falls to 37 %.
@@ -69,6 +74,8 @@ class PoseSettings:
     memory_s: float = 3.0
     free_cost: float = 6.0
     support_cost: float = 6.0
+    settle_s: float = 0.2
+    lead: float = 3.0
     loosest: float = 0.35
     surest: float = 0.09
     stale_s: float = 10.0
@@ -86,7 +93,10 @@ class Track:
         levels: Model name -> its level, for each of the last looks.
         strain: Model name -> cost of its cheapest path, forgotten over time.
         untold: The same of a model that was never hypothesised.
+        support: Model name -> how far its strain lets it be the object, 0 to 1.
+        unsaid: The same of a model that was never hypothesised.
         name: The model whose orientations are in `settled`.
+        lead: By how much its chosen hypotheses cost less than quite other ones, over time.
         settled: (seconds, orientation) along its cheapest path, of looks older than the trees'.
         rate: How it turns, or None when it is not known.
         rated: Seconds when the rate was measured.
@@ -99,7 +109,10 @@ class Track:
     levels: tuple[Mapping[str, Level], ...] = ()
     strain: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     untold: float = 0.0
+    support: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    unsaid: float = 1.0
     name: str = ""
+    lead: float = 0.0
     settled: tuple[tuple[float, Floats], ...] = ()
     rate: Rate | None = None
     rated: float = -np.inf
@@ -115,27 +128,20 @@ def tracks(mind: Mind) -> Mapping[int, Track]:
     return found
 
 
-def pose_support(
-    mind: Mind, object_id: int, name: str, settings: PoseSettings = PoseSettings()
-) -> float:
+def pose_support(mind: Mind, object_id: int, name: str) -> float:
     """How well an object's views over time hang together if it is of a model.
 
     Args:
         mind: After the last step.
         object_id: The object.
         name: The model.
-        settings: Of the poses.
 
     Returns:
         0 to 1: 1 for the model whose cheapest path costs least and for those that cost little more;
         1 as well when nothing is known of the object's views.
     """
     track = tracks(mind).get(object_id)
-    if track is None or not track.strain:
-        return 1.0
-    own = track.strain.get(name, track.untold)
-    dearer = own - min(track.strain.values()) - settings.free_cost
-    return exp(-max(0.0, dearer) / settings.support_cost)
+    return 1.0 if track is None else track.support.get(name, track.unsaid)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +180,9 @@ class BelievePose:
             return track
         levels = self._levels(hypotheses, now)
         track = self._settled(track, name)
+        waited = now - track.time
         track = self._rated(self._grown(replace(track, said=said), levels, now), name, now)
+        track = self._led(track, name, waited)
         return replace(track, pose=self._pose(track, name))
 
     def _levels(self, hypotheses: Sequence[Hypothesis], now: float) -> dict[str, Level]:
@@ -199,6 +207,7 @@ class BelievePose:
             tree = grown(before, levels.get(name), now, turning, s.tree)
             past = track.untold if new else track.strain[name]
             trees[name], strain[name] = tree, past * fade + tree.total - before.total
+        least = min(strain.values())
         likeliest = sorted(trees, key=lambda n: (strain[n], n))[: s.most_names]
         return replace(
             track,
@@ -207,21 +216,29 @@ class BelievePose:
             levels=(*track.levels, MappingProxyType(levels))[-s.tree.lag :],
             strain=MappingProxyType({n: strain[n] for n in likeliest}),
             untold=untold,
+            support=MappingProxyType({n: self._support(strain[n] - least) for n in likeliest}),
+            unsaid=self._support(untold - least),
         )
+
+    def _support(self, dearer: float) -> float:
+        return exp(-max(0.0, dearer - self.settings.free_cost) / self.settings.support_cost)
 
     def _settled(self, track: Track, name: str) -> Track:
         """The track with the look that the trees are about to forget; another name begins anew."""
         s = self.settings
         if name != track.name:
-            return replace(track, name=name, settled=(), rate=None)
+            return replace(track, name=name, lead=0.0, settled=(), rate=None)
         tree = track.trees.get(name)
         if tree is None or len(track.levels) < s.tree.lag:
             return track
         seen = _orientation(track.levels[0].get(name), int(tree.path[tree.best, 0]))
         if seen is None:
             return track
-        oldest = track.levels[0][name].time - s.spin.window_s
-        settled = (*track.settled, (track.levels[0][name].time, seen))
+        then = track.levels[0][name].time
+        if track.settled and then - track.settled[-1][0] < s.settle_s - 1e-9:
+            return track
+        oldest = then - s.spin.window_s
+        settled = (*track.settled, (then, seen))
         forgotten = settled[0][0] < oldest
         return replace(track, settled=settled[1:] if forgotten else settled)
 
@@ -229,7 +246,18 @@ class BelievePose:
         if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
             return track
         turns = _turns(track, name, self.settings.tree.lag)
-        return replace(track, rate=measured_rate(turns, now, track.rate, self.settings.spin), rated=now)
+        return replace(
+            track, rate=measured_rate(turns, now, track.rate, self.settings.spin), rated=now
+        )
+
+    def _led(self, track: Track, name: str, waited: float) -> Track:
+        """The track with the lead of the chosen hypotheses renewed."""
+        level, tree = track.levels[-1].get(name), track.trees.get(name)
+        if level is None or tree is None:
+            return track
+        fade = exp(-min(waited, 1e6) / self.settings.memory_s)
+        now = lead(level, int(tree.path[tree.best, -1]), self.settings.tree)
+        return replace(track, lead=track.lead * fade + now * (1.0 - fade))
 
     def _pose(self, track: Track, name: str) -> Pose | None:
         """What the cheapest path of a model tells."""
@@ -248,7 +276,7 @@ class BelievePose:
             (x, y, z),
             float(rotation) if tree.rolled[k] else None,
             since=float(tree.since[k]),
-            confidence=self._confidence(tree, track.time - float(tree.chosen[k])),
+            confidence=self._confidence(track, tree),
             spin=spin_of(track.rate, self.settings.spin) if track.rate else None,
         )
 
@@ -260,9 +288,11 @@ class BelievePose:
         spin = pose.spin if age < self.settings.spin_stale_s else None
         return replace(pose, confidence=pose.confidence * self._fading(age), spin=spin)
 
-    def _confidence(self, tree: Tree, age: float) -> float:
-        """Against the next best orientation, from the difference of costs, which are log-likelihoods."""
-        return self._fading(age) / (1.0 + exp(-rival_gap(tree, self.settings.tree)))
+    def _confidence(self, track: Track, tree: Tree) -> float:
+        """Against the next best orientation: by paths' costs, which are log-likelihoods, and the lead."""
+        age = track.time - float(tree.chosen[tree.best])
+        odds = min(rival_gap(tree, self.settings.tree), self.settings.lead * track.lead)
+        return self._fading(age) / (1.0 + exp(-odds))
 
     def _fading(self, age: float) -> float:
         return exp(-max(0.0, age) / self.settings.stale_s)
@@ -299,10 +329,11 @@ def _turns(track: Track, name: str, lag: int) -> Turns:
 
 def _last(track: Track, name: str, tree: Tree) -> Floats:
     """The orientation that the cheapest path tells of last."""
-    chosen = int(tree.path[tree.best, -1])
-    level = track.levels[-1].get(name) if track.levels else None
-    between = level.between[chosen] if level is not None and chosen != NONE else None
-    return tree.orientation[tree.best] if between is None else between
+    path = tree.path[tree.best].tolist()
+    for levels, number in zip(reversed(track.levels), reversed(path), strict=False):
+        if number != NONE:
+            return np.asarray(levels[name].between[number])
+    return np.asarray(tree.orientation[tree.best])
 
 
 def _by_object(mind: Mind, observation: Observation) -> dict[int, list[Hypothesis]]:

@@ -37,10 +37,10 @@ class SpinSettings(FitSettings):
         known_share: ... or below this share of the rate.
     """
 
-    window_s: float = 24.0
+    window_s: float = 40.0
     recent_s: float = 4.0
-    changes_s: tuple[float, ...] = (3.0, 7.0, 13.0)
-    change: float = 25.0
+    changes_s: tuple[float, ...] = (3.0, 7.0, 14.0)
+    change: float = 8.0
     kept_s: float = 5.0
     least: int = 8
     known_deg_s: float = 1.0

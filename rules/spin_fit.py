@@ -92,7 +92,7 @@ def long_pieces(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
     number = np.full(len(sizes), -1, np.intp)
     kept = longest[sizes[longest] >= 4]
     number[kept] = np.arange(len(kept))
-    return number[piece]
+    return np.asarray(number[piece], np.intp)
 
 
 def thinned(turns: Turns, pieces: Numbers, settings: FitSettings) -> tuple[Turns, Numbers]:
@@ -100,8 +100,8 @@ def thinned(turns: Turns, pieces: Numbers, settings: FitSettings) -> tuple[Turns
     used = np.flatnonzero(pieces >= 0)
     if len(used) > settings.most:
         used = used[np.linspace(0, len(used) - 1, settings.most).round().astype(np.intp)]
-    kept, renumbered = np.unique(pieces[used], return_inverse=True)
-    del kept
+    # A short piece may have lost all its orientations: the others are numbered anew.
+    renumbered = np.unique(pieces[used], return_inverse=True)[1].astype(np.intp)
     return Turns(turns.times[used], turns.orientations[used]), renumbered
 
 
@@ -165,7 +165,7 @@ class Fit:
     def covariance(self, phase: int) -> Floats:
         """(3, 3) of the rate before (0) or after (-1) the change."""
         k = 3 * (phase % len(self.rates))
-        return self._covariance()[k : k + 3, k : k + 3]
+        return np.asarray(self._covariance()[k : k + 3, k : k + 3], np.float64)
 
     def contrast(self) -> float:
         """Squared difference of the rates before and after the change, in variances."""
@@ -237,11 +237,11 @@ class Fit:
         if self.change is not None and self._sought is not None:
             normal[-1, -1] += 1 / self._s.change_sigma_s**2
             total[-1] += (self._sought - self.change) / self._s.change_sigma_s**2
-        inverse = np.linalg.pinv(normal, hermitian=True)
+        inverse: Floats = np.asarray(np.linalg.pinv(normal, hermitian=True), np.float64)
         return inverse @ total, scores, inverse, float((square / soft).sum())
 
     def _covariance(self) -> Floats:
-        return np.asarray(self._inverse @ _long_run(self._scores) @ self._inverse)
+        return np.asarray(self._inverse @ _long_run(self._scores) @ self._inverse, np.float64)
 
 
 def _long_run(scores: Floats) -> Floats:

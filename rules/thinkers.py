@@ -12,6 +12,7 @@ from visup.rules.language import shipped_rules
 from visup.rules.measure import RelationSettings
 from visup.rules.narrative import NarrativeSettings, TellRelations
 from visup.rules.objects import ObjectSettings, UpdateObjects
+from visup.rules.pose import BelievePose, PoseSettings
 from visup.rules.presence import PresenceSettings, SeePresence
 from visup.rules.relations import Relations
 from visup.rules.safety import RuleThinker
@@ -24,6 +25,7 @@ class RuleSettings:
 
     objects: ObjectSettings = field(default_factory=ObjectSettings)
     votes: VoteSettings = field(default_factory=VoteSettings)
+    pose: PoseSettings = field(default_factory=PoseSettings)
     presence: PresenceSettings = field(default_factory=PresenceSettings)
     depth: DepthSettings = field(default_factory=DepthSettings)
     relations: RelationSettings = field(default_factory=RelationSettings)
@@ -37,7 +39,7 @@ class RuleSet:
 
     Attributes:
         update: Percepts enter the mind.
-        cogitate: Presence, votes, depth, relations, couplings, narrative, and rules.
+        cogitate: Presence, votes, poses, depth, relations, couplings, narrative, and rules.
     """
 
     update: tuple[Thinker, ...]
@@ -63,6 +65,7 @@ def default_thinkers(
         cogitate=(
             SeePresence(s.presence),
             Votes(s.votes),
+            BelievePose(s.pose),
             BelieveDepth(s.depth),
             Relations(s.relations),
             Couple(replace(s.coupling, relations=s.relations)),

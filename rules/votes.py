@@ -34,6 +34,7 @@ from visup.agent import (
     Presence,
 )
 from visup.rules.objects import owners
+from visup.rules.pose import pose_support
 from visup.rules.presence import visible_share
 from visup.rules.sentences import called, spaced
 
@@ -204,7 +205,10 @@ class Votes:
         blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
         if hidden or blind:
             return count(tally, {}, dt, s.tau_hidden_s, s.most_candidates)
-        return count(tally, weights(said, s), dt, s.tau_s, s.most_candidates, visible)
+        heard = weights(said, s)
+        # Views that do not hang together over time speak against a name (paper, figure 5).
+        likely = {n: w * pose_support(mind, belief.id, n) for n, w in heard.items()}
+        return count(tally, likely, dt, s.tau_s, s.most_candidates, visible)
 
     def _lead(self, ballot: Ballot, named: tuple[Candidate, ...], now: float) -> Ballot:
         s = self.settings

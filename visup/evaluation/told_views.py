@@ -129,6 +129,4 @@ def _twin(h: Hypothesis) -> Hypothesis:
     if h.direction is None:
         return h
     x, y, z = h.direction
-    return Hypothesis(
-        h.region_id, h.name, h.view, h.similarity, h.rotation, h.scale, (-x, -y, -z)
-    )
+    return Hypothesis(h.region_id, h.name, h.view, h.similarity, h.rotation, h.scale, (-x, -y, -z))
