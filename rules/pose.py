@@ -67,7 +67,7 @@ class PoseSettings:
 
     tree: TreeSettings = field(default_factory=TreeSettings)
     spin: SpinSettings = field(default_factory=SpinSettings)
-    every_s: float = 0.1
+    every_s: float = 0.2
     refit_s: float = 1.0
     least_visible: float = 0.5
     most_names: int = 6

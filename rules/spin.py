@@ -13,7 +13,7 @@ from then on what lies farther back is left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,10 @@ class SpinSettings(FitSettings):
         window_s: The longest stretch over which a rate is fitted.
         recent_s: The stretch from which a first guess of the rate now is made.
         changes_s: A change of rate is looked for about so many seconds ago.
-        change: A change is believed from this squared difference of rates on, in variances.
+        change: A change is believed from this squared difference of rates on, in variances, ...
+        gain: ... when each parameter more saves the cost of so many residuals.
+        unchanged: It is believed no longer below this squared difference.
+        doubt: A rate is doubted when that of the last seconds differs by this, squared, in variances.
         kept_s: So much of the time before a change is still heeded.
         least: Orientations that a window needs.
         known_deg_s: A rate is told when its standard deviation is below this ...
@@ -41,6 +44,9 @@ class SpinSettings(FitSettings):
     recent_s: float = 4.0
     changes_s: tuple[float, ...] = (3.0, 7.0, 14.0)
     change: float = 8.0
+    unchanged: float = 2.0
+    gain: float = 4.0
+    doubt: float = 12.0
     kept_s: float = 5.0
     least: int = 8
     known_deg_s: float = 1.0
@@ -56,12 +62,14 @@ class Rate:
         covariance: (3, 3) of `vector`.
         scatter: Share of its trace that is due to scatter, which makes `vector` longer than it is.
         since: Seconds since when the object turns at this rate, as far as is known.
+        before: (3,) the rate before a change at `since`, or None when no change is known.
     """
 
     vector: Floats
     covariance: Floats
     scatter: float
     since: float
+    before: Floats | None = None
 
     @property
     def sigma(self) -> float:
@@ -88,18 +96,40 @@ def measured_rate(
         begin = max(begin, before.since - settings.kept_s)
     turns = turns.since(begin - 1e-6)
     recent = _fitted(turns.since(now - settings.recent_s), None, settings)
-    if recent is None:
-        recent = _fitted(turns, None, settings)
+    recent = recent or _fitted(turns, None, settings)
     if recent is None:
         return None
-    start = before.vector if before is not None else recent.rates[0]
-    steady = _fitted(turns, start, settings)
+    known = _known(turns, before, settings) if before is not None else None
+    even = turns if known is None else turns.since(known.since)
+    steady = _fitted(even, recent.rates[0] if before is None else before.vector, settings)
     if steady is None:
-        return _rate_of(recent, settings)
-    changed = _changed(turns, now, start, recent.rates[0], settings)
-    if changed is not None and changed.cost < steady.cost:
-        return _rate_of(changed, settings)
-    return _rate_of(steady, settings)
+        return _rate_of(known or recent, settings)
+    changed = _changed(steady, even, now, recent.rates[0], settings)
+    return _doubted(_rate_of(changed or known or steady, settings), recent, settings)
+
+
+def _doubted(rate: Rate, recent: Fit, settings: SpinSettings) -> Rate:
+    """The same rate, less certain when the last seconds alone tell another: it may just be changing."""
+    lately = _rate_of(recent, settings)
+    apart = lately.vector - rate.vector
+    both = lately.covariance + rate.covariance
+    if apart @ np.linalg.solve(both, apart) < settings.doubt:
+        return rate
+    return replace(rate, covariance=rate.covariance + np.outer(apart, apart) / 4)
+
+
+def _known(turns: Turns, before: Rate, settings: SpinSettings) -> Fit | None:
+    """The fit with the change that was found before, or None when there is none (any more)."""
+    if before.before is None or len(turns.times) < 2 * settings.least:
+        return None
+    if not turns.times[0] + 0.5 < before.since < turns.times[-1] - 0.5:
+        return None
+    pieces = long_pieces(turns, before.vector, settings)
+    if (pieces >= 0).sum() < 2 * settings.least:
+        return None
+    rates = np.stack([before.before, before.vector])
+    fit = Fit(*thinned(turns, pieces, settings), rates, before.since, settings)
+    return fit if fit.run(settings.steps) and fit.contrast() > settings.unchanged else None
 
 
 def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
@@ -131,21 +161,30 @@ def _fitted(turns: Turns, start: Floats | None, settings: SpinSettings) -> Fit |
 
 
 def _changed(
-    turns: Turns, now: float, before: Floats, after: Floats, settings: SpinSettings
+    steady: Fit, turns: Turns, now: float, after: Floats, settings: SpinSettings
 ) -> Fit | None:
-    """The best of two rates with a change between them, or None when no change is to be believed."""
+    """The best fit of two rates with a change between them, or None when there is none to be believed."""
+    before = steady.rates[0]
     pieces = long_pieces(turns, before, settings)
     if (pieces >= 0).sum() < 2 * settings.least:
         return None
     turns, pieces = thinned(turns, pieces, settings)
-    best: Fit | None = None
-    for ago in settings.changes_s:
-        if not turns.times[0] + 1.0 < now - ago < turns.times[-1] - 1.0:
-            continue
-        fit = Fit(turns, pieces, np.stack([before, after]), now - ago, settings)
-        if fit.run(2 * settings.steps) and (best is None or fit.cost < best.cost):
-            best = fit
-    return best if best is not None and best.contrast() > settings.change else None
+    times = [now - ago for ago in settings.changes_s]
+    inside = [t for t in times if turns.times[0] + 1.0 < t < turns.times[-1] - 1.0]
+    same = [Fit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
+    promises = [fit.promise() for fit in same]
+    worth = settings.gain * 2 * steady.cost / steady.residuals
+    if not promises or max(promises) < worth:
+        return None
+    change = inside[int(np.argmax(promises))]
+    fit = Fit(turns, pieces, np.stack([before, after]), change, settings)
+    believed = fit.run(2 * settings.steps) and fit.contrast() > settings.change
+    return fit if believed and _gain(steady, fit) > settings.gain else None
+
+
+def _gain(steady: Fit, changed: Fit) -> float:
+    """How much better two rates fit: cost saved by each further parameter, in costs of a residual."""
+    return (steady.cost - changed.cost) / 4 / max(changed.cost / changed.residuals, 1e-12)
 
 
 def _rate_of(fit: Fit, settings: SpinSettings) -> Rate:
@@ -154,4 +193,5 @@ def _rate_of(fit: Fit, settings: SpinSettings) -> Rate:
     unseen = (np.radians(settings.view_deg) / max(fit.span, 1e-6)) ** 2
     scatter = float(np.trace(covariance))
     share = scatter / (scatter + 3 * unseen)
-    return Rate(fit.rates[-1], covariance + np.eye(3) * unseen, share, fit.since)
+    before = fit.rates[0] if fit.change is not None else None
+    return Rate(fit.rates[-1], covariance + np.eye(3) * unseen, share, fit.since, before)

@@ -28,6 +28,7 @@ class FitSettings:
         roll_deg: Standard deviation of turns in the plane.
         robust: Residuals beyond so many standard deviations count little.
         jump_deg: A turn by more than this between two orientations begins a new piece.
+        look_back: Orientations before it from which one may go on.
         most_pieces: Pieces that are used; the longest.
         steps: Gauss-Newton steps from a start that is near.
         view_deg: What the discreteness of views leaves unknown of the turn over a window.
@@ -35,11 +36,12 @@ class FitSettings:
         fastest_deg_s: Greatest rate that is looked for.
     """
 
-    most: int = 64
+    most: int = 96
     swing_deg: float = 6.0
     roll_deg: float = 5.0
     robust: float = 2.5
     jump_deg: float = 50.0
+    look_back: int = 4
     most_pieces: int = 4
     steps: int = 2
     view_deg: float = 3.5
@@ -81,18 +83,35 @@ def first_rate(turns: Turns, settings: FitSettings) -> Floats:
 
 
 def long_pieces(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
-    """Number of the piece to which each orientation belongs, or -1 when it is too short."""
-    t, r = turns.times, turns.orientations
-    ahead = turned(rate * np.diff(t)[:, None]) @ r[:-1]
-    turn = rotation_vectors(r[1:] @ np.swapaxes(ahead, 1, 2))
-    jumps = (turn**2).sum(axis=1) > np.radians(settings.jump_deg) ** 2
-    piece = np.concatenate([[0], np.cumsum(jumps)])
+    """Number of the piece to which each orientation belongs, or -1 when it is too short.
+
+    An orientation goes on from the latest of the few before it from which it is no jump, so that
+    what is wrong for a moment breaks no piece.
+    """
+    piece = _linked(turns, rate, settings)
     sizes = np.bincount(piece)
     longest = np.argsort(-sizes, kind="stable")[: settings.most_pieces]
     number = np.full(len(sizes), -1, np.intp)
     kept = longest[sizes[longest] >= 4]
     number[kept] = np.arange(len(kept))
     return np.asarray(number[piece], np.intp)
+
+
+def _linked(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
+    t, r = turns.times, turns.orientations
+    links = []
+    for back in range(1, min(settings.look_back, len(t) - 1) + 1):
+        ahead = turned(rate * (t[back:] - t[:-back])[:, None]) @ r[:-back]
+        turn = rotation_vectors(r[back:] @ np.swapaxes(ahead, 1, 2))
+        near = (turn**2).sum(axis=1) < np.radians(settings.jump_deg) ** 2
+        links.append([False] * back + near.tolist())
+    piece = [0] * len(t)
+    count = 1
+    for k in range(1, len(t)):
+        back = next((b for b, near in enumerate(links, 1) if near[k]), 0)
+        piece[k] = piece[k - back] if back else count
+        count += not back
+    return np.array(piece, np.intp)
 
 
 def thinned(turns: Turns, pieces: Numbers, settings: FitSettings) -> tuple[Turns, Numbers]:
@@ -137,6 +156,12 @@ class Fit:
         self.cost = np.inf
 
     @property
+    def residuals(self) -> int:
+        """How many residuals there are, less what is fitted."""
+        parameters = 3 * (len(self.rates) + self._count) + (self.change is not None)
+        return max(1, 3 * len(self._pieces) - parameters)
+
+    @property
     def span(self) -> float:
         """Seconds over which the last rate was fitted."""
         return float(self._turns.times[-1]) - self.since
@@ -161,6 +186,11 @@ class Fit:
                 return False
         _, self._scores, self._inverse, self.cost = self._solved()
         return True
+
+    def promise(self) -> float:
+        """How much cost one step would save, were residuals linear in it."""
+        step, scores, *_ = self._solved()
+        return float(step @ scores.sum(axis=0)) / 3
 
     def covariance(self, phase: int) -> Floats:
         """(3, 3) of the rate before (0) or after (-1) the change."""
@@ -237,7 +267,9 @@ class Fit:
         if self.change is not None and self._sought is not None:
             normal[-1, -1] += 1 / self._s.change_sigma_s**2
             total[-1] += (self._sought - self.change) / self._s.change_sigma_s**2
-        inverse: Floats = np.asarray(np.linalg.pinv(normal, hermitian=True), np.float64)
+        # What nothing tells of (such as when two equal rates change) stays as it is.
+        normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal)
+        inverse: Floats = np.asarray(np.linalg.inv(normal), np.float64)
         return inverse @ total, scores, inverse, float((square / soft).sum())
 
     def _covariance(self) -> Floats:

@@ -71,10 +71,9 @@ def nearest_rotations(matrices: Floats) -> Floats:
 
 def _series(vectors: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """sin(a)/a and (1 - cos(a))/a^2, each (..., 1, 1); the cross product matrix and its square."""
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    none = np.zeros_like(x)
-    rows = [none, -z, y, z, none, -x, -y, x, none]
-    k = np.stack(rows, axis=-1).reshape(*vectors.shape[:-1], 3, 3)
-    angle = np.sqrt(x * x + y * y + z * z)[..., None, None]
+    k = np.zeros((*vectors.shape, 3))
+    k[..., (2, 0, 1), (1, 2, 0)] = vectors
+    k[..., (1, 2, 0), (2, 0, 1)] = -vectors
+    angle = np.sqrt((vectors * vectors).sum(axis=-1))[..., None, None]
     half = np.sinc(angle / (2 * np.pi))
     return np.sinc(angle / np.pi), 0.5 * half * half, k, k @ k
