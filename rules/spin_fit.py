@@ -284,4 +284,4 @@ def _long_run(scores: Floats) -> Floats:
     for lag in range(1, reach + 1):
         both = scores[lag:].T @ scores[:-lag]
         total += (1 - lag / (reach + 1)) * (both + both.T)
-    return np.asarray(total) * count / max(1, count - scores.shape[1])
+    return np.asarray(total * (count / max(1, count - scores.shape[1])), np.float64)

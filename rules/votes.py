@@ -2,11 +2,12 @@
 
 For each object o and each model name n, in each step of length dt:
 
-    v(o, n) <- v(o, n) * exp(-dt / tau) + w,        w = visible(o) * rank^k * (s - 0.4) / (1 - 0.4)
+    v(o, n) <- v(o, n) * exp(-dt / tau) + w,    w = visible(o) * p(o, n) * rank^k * (s - 0.4) / (1 - 0.4)
 
 where s is the best similarity with which any view of n was hypothesised for o's region in this
 step (nothing at or below 0.4 counts; section 7.3), k the place of n among the names of this step
-(0 for the best), and visible(o) the share of o that is in sight. The three principles:
+(0 for the best), p(o, n) how well its views hang together over time (`pose_support`), and visible(o)
+the share of o that is in sight. The three principles:
 
 1. recurrent and temporally stable hypotheses are more likely: votes add up over steps;
 2. what has not been hypothesised lately is forgotten: votes decay with `tau_s`;

@@ -116,24 +116,31 @@ def test_the_direction_is_nearer_than_the_best_hypothesis_tells() -> None:
     assert np.mean(poses) < 0.6 * np.mean(raw)
 
 
+def hearing(told: ToldViews, orientations: Floats) -> Callable[[int], Said]:
+    return lambda k: told(orientations[k], 1)
+
+
 def angle(orientation: Floats, direction: tuple[float, float, float] | None) -> float:
     return float(np.degrees(np.arccos(np.clip(-orientation[2] @ np.array(direction), -1.0, 1.0))))
 
 
-def test_confidence_says_how_often_the_direction_is_right() -> None:
+def test_confidence_promises_no_more_than_it_holds() -> None:
     """Where an object's opposite sides look alike to matching at times, confidence is lower."""
-    sure, right = [], []
+    told_sure, told_right = [], []
     for seed, twin in enumerate([0.05, 0.3, 0.45, 0.5]):
         times, true = spinning((0.0, 4.0)[seed % 2], 14.0, seed)
         noise = ViewNoise(twin=twin, wrong=0.4)
         told = ToldViews("sat", half_sphere_directions(48), noise, np.random.default_rng(seed))
-        for k, (_, pose) in enumerate(believed(times, lambda k, t=told, o=true: t(o[k], 1))):
+        for k, (_, pose) in enumerate(believed(times, hearing(told, true))):
             if pose is not None and times[k] > 1.0:
-                sure.append(pose.confidence)
-                right.append(angle(true[k], pose.direction) < 25.0)
-    assert 0.0 <= min(sure) <= max(sure) <= 1.0
-    gap = np.mean(right) - np.mean(sure)
-    assert abs(gap) < 0.15
+                told_sure.append(pose.confidence)
+                told_right.append(angle(true[k], pose.direction) < 25.0)
+    sure, right = np.array(told_sure), np.array(told_right)
+    assert 0.0 <= sure.min() <= sure.max() <= 1.0
+    # It promises no more than it holds; looks that err alike for long make it promise less.
+    assert right.mean() > sure.mean() - 0.05
+    assert right[sure > 0.85].mean() > 0.97
+    assert right[sure < 0.6].mean() < right[sure > 0.85].mean()
 
 
 def test_a_model_whose_views_do_not_hang_together_loses_support() -> None:

@@ -45,6 +45,7 @@ MISSION_KEYS = (
     "verdicts",
     "verdict",
     "view_deg",
+    "spin_error",
     "fps",
 )
 

@@ -18,9 +18,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from visup.agent import Frame, Mind, Region, Severity, Status, TaskBelief, Verdict
+from visup.agent import Frame, Mind, Pose, Region, Severity, Status, TaskBelief, Verdict
 from visup.agent.agent import Step
 from visup.agent.errors import SettingsError
+from visup.evaluation.mission_poses import Poses, spin_error, view_error
 from visup.evaluation.mission_scores import (
     UNSCORED_START_S,
     StageSample,
@@ -46,7 +47,7 @@ class SeenObject:
     id: int
     name: str
     region: Region
-    direction: tuple[float, float, float] | None
+    pose: Pose | None
 
 
 @dataclass(slots=True)
@@ -62,9 +63,8 @@ class Record:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Take down one step; the agent calls it."""
-        directions = _directions(step)
         self.seen[step.frame_index] = tuple(
-            SeenObject(b.id, b.name, b.region, directions.get((b.region.id, b.name)))
+            SeenObject(b.id, b.name, b.region, b.pose)
             for b in step.mind.objects.values()
             if b.last_seen == step.time
         )
@@ -76,15 +76,6 @@ class Record:
         ]
         self.stages.append(_sample(step.mind))
         self.last = step.mind
-
-
-def _directions(step: Step) -> dict[tuple[int, str], tuple[float, float, float]]:
-    best: dict[tuple[int, str], tuple[float, Any]] = {}
-    for h in step.observation.of("hypothesis"):
-        key = (h.region_id, h.name)
-        if h.direction is not None and h.similarity > best.get(key, (-1.0, None))[0]:
-            best[key] = (h.similarity, h.direction)
-    return {key: direction for key, (_, direction) in best.items()}
 
 
 def _sample(mind: Mind) -> StageSample:
@@ -276,6 +267,7 @@ def _scores(
     hours = max(record.last.time, 1.0) / 3600 if record.last else 1.0
     verdict = final_verdict(record.last).value if record.last else Verdict.UNKNOWN.value
     identified, scored = _identity(truths, record, overlaps)
+    poses = _poses(truths, record, overlaps)
     scores: dict[str, Any] = {
         "identity": identified / scored if scored else None,
         "identity_counts": [identified, scored],
@@ -293,7 +285,8 @@ def _scores(
         "verdict": verdict,
         "verdicts_right": int(verdict == truths.verdict),
         "verdicts": 1,
-        "view_deg": _view_error(truth, truths, record, overlaps),
+        "view_deg": view_error(truth, poses),
+        "spin_error": spin_error(truth, poses),
         "fps": len(record.seen) / record.seconds if record.seconds else None,
     }
     return {k: v for k, v in scores.items() if v is not None}
@@ -322,45 +315,18 @@ def _identity(truths: Truths, record: Record, overlaps: Overlaps) -> tuple[int, 
     return right, scored
 
 
-def _view_error(
-    truth: Mapping[str, Any], truths: Truths, record: Record, overlaps: Overlaps
-) -> float | None:
-    """Median angle between the best view's direction and the true one, degrees.
-
-    The line of sight to an object is taken through the centre of its box, and symmetric views are not
-    forgiven, so the figure is an upper bound.
-    """
-    width, height = truth["size"]
-    fov = np.deg2rad(float(truth.get("fov_vertical_deg", 38.0)))
-    focal = height / 2 / np.tan(fov / 2)
-    angles = []
+def _poses(truths: Truths, record: Record, overlaps: Overlaps) -> Poses:
+    """Poses told of true objects that are seen and rightly named, by frame and object."""
+    found: dict[tuple[int, str], Pose] = {}
     for index, objects in overlaps.items():
         for name, (visible, ious) in objects.items():
-            true = truth["frames"][index].get(name, {})
             number = max(ious, key=lambda i: ious[i], default=None)
-            if visible < SMALLEST_SCORED_PX or number is None or "quat_xyzw" not in true:
+            if visible < SMALLEST_SCORED_PX or number is None:
                 continue
             it = next(s for s in record.seen[index] if s.id == number)
-            if it.direction is None or it.name != truths.names.get(name) or "bbox" not in true:
-                continue
-            angles.append(_angle(true, it.direction, width, height, focal))
-    return float(np.median(angles)) if angles else None
-
-
-def _angle(
-    true: Mapping[str, Any],
-    direction: tuple[float, float, float],
-    width: int,
-    height: int,
-    focal: float,
-) -> float:
-    from scipy.spatial.transform import Rotation
-
-    x, y, w, h = true["bbox"]
-    ray = np.array([x + w / 2 - width / 2, y + h / 2 - height / 2, focal])
-    to_viewer = Rotation.from_quat(true["quat_xyzw"]).inv().apply(-ray / np.linalg.norm(ray))
-    cosine = float(np.clip(np.dot(to_viewer, direction), -1, 1))
-    return float(np.rad2deg(np.arccos(cosine)))
+            if it.pose is not None and it.name == it.pose.name == truths.names.get(name):
+                found[index, name] = it.pose
+    return found
 
 
 def _total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -379,6 +345,7 @@ def _total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             (i["failing_latency_s"] for i in items if "failing_latency_s" in i), default=None
         ),
         "view_deg": _mean([i["view_deg"] for i in items if "view_deg" in i]),
+        "spin_error": _mean([i["spin_error"] for i in items if "spin_error" in i]),
         "fps": _mean([i["fps"] for i in items if "fps" in i]),
         "false_alerts_per_hour": sum(i["false_alerts"] for i in items) / hours if hours else None,
     }

@@ -1,0 +1,82 @@
+"""Poses that were told against the true ones: errors of view and of spin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from visup.agent import Pose
+
+Poses = Mapping[tuple[int, str], Pose]
+"""(frame, true object) -> the pose told of it."""
+
+SPIN_HALF_S = 0.5
+"""The true spin at a frame is that between so long before and after it."""
+
+
+def view_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
+    """Median angle between the direction told and the true one, degrees; None when none was told.
+
+    The line of sight to an object is taken through the centre of its box, and symmetric views are not
+    forgiven, so the figure is an upper bound.
+
+    Args:
+        truth: What `truth.json` holds.
+        poses: What was told.
+    """
+    width, height = truth["size"]
+    fov = np.deg2rad(float(truth.get("fov_vertical_deg", 38.0)))
+    focal = height / 2 / np.tan(fov / 2)
+    angles = []
+    for (index, name), pose in poses.items():
+        true = truth["frames"][index].get(name, {})
+        if "quat_xyzw" in true and "bbox" in true:
+            angles.append(_angle(true, pose.direction, width, height, focal))
+    return float(np.median(angles)) if angles else None
+
+
+def spin_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
+    """Median difference between the spin told and the true one, degrees per second, or None.
+
+    Args:
+        truth: What `truth.json` holds.
+        poses: What was told.
+    """
+    errors = []
+    for (index, name), pose in poses.items():
+        true = _true_spin(truth, index, name)
+        if pose.spin is not None and true is not None:
+            errors.append(abs(pose.spin.rate - true))
+    return float(np.median(errors)) if errors else None
+
+
+def _true_spin(truth: Mapping[str, Any], index: int, name: str) -> float | None:
+    from scipy.spatial.transform import Rotation
+
+    frames = truth["frames"]
+    reach = round(SPIN_HALF_S * float(truth["fps"]))
+    first, last = max(0, index - reach), min(len(frames) - 1, index + reach)
+    ends = [frames[k].get(name, {}).get("quat_xyzw") for k in (first, last)]
+    if None in ends or first == last:
+        return None
+    before, after = Rotation.from_quat(ends[0]), Rotation.from_quat(ends[1])
+    seconds = (last - first) / float(truth["fps"])
+    return float(np.degrees((after * before.inv()).magnitude()) / seconds)
+
+
+def _angle(
+    true: Mapping[str, Any],
+    direction: tuple[float, float, float],
+    width: int,
+    height: int,
+    focal: float,
+) -> float:
+    from scipy.spatial.transform import Rotation
+
+    x, y, w, h = true["bbox"]
+    ray = np.array([x + w / 2 - width / 2, y + h / 2 - height / 2, focal])
+    to_viewer = Rotation.from_quat(true["quat_xyzw"]).inv().apply(-ray / np.linalg.norm(ray))
+    cosine = float(np.clip(np.dot(to_viewer, direction), -1, 1))
+    return float(np.rad2deg(np.arccos(cosine)))
