@@ -45,7 +45,9 @@ def test_so_many_are_missing_and_wrong_as_asked_for() -> None:
 def test_errors_of_poses_are_measured_against_the_truth() -> None:
     turns = Rotation.from_rotvec(np.radians(4.0) * np.arange(50)[:, None] / 25 * [[0, 1, 0]])
     box = {"bbox": [300, 220, 40, 40]}
-    frames = [{"index": k, "sat": {"quat_xyzw": q, **box}} for k, q in enumerate(turns.as_quat())]
+    frames = [
+        {"index": k, "sat": {"quat_xyzw": q, **box}} for k, q in enumerate(turns.as_quat().tolist())
+    ]
     truth = {"size": [640, 480], "fps": 25, "frames": frames}
     true = -turns[20].as_matrix()[2]
     aside = Rotation.from_rotvec([0, np.radians(30), 0]).apply(true)
