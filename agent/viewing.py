@@ -28,8 +28,8 @@ def picture_axes(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.
 
     Example:
         >>> right, up = picture_axes([0.0, -1.0, 0.0])
-        >>> right.tolist(), up.tolist()
-        ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+        >>> right.astype(int).tolist(), up.astype(int).tolist()
+        ([1, 0, 0], [0, 0, 1])
     """
     d = np.asarray(direction, np.float64)
     x, y, z = d[..., 0], d[..., 1], d[..., 2]
