@@ -1,6 +1,7 @@
 """The agent: the cogitation-action cycle, the mental model, behaviours, the journal.
 
-Read in this order: `records.py` (what flows), `mind.py` (what is believed), `behaviour.py` (what
+Read in this order: `records.py` (what flows), `mind.py` (what is believed),
+`relations.py` (what holds between objects), `behaviour.py` (what
 may be plugged in), `agent.py` (the cycle on one screen), `registry.py`, `journal.py`.
 """
 
@@ -16,7 +17,6 @@ from visup.agent.mind import (
     Pose,
     Presence,
     Question,
-    Relation,
     Spin,
     StageBelief,
     Status,
@@ -42,12 +42,14 @@ from visup.agent.records import (
     Severity,
     Truth,
 )
+from visup.agent.relations import Column, Relation, RelationTable
 
 __all__ = [
     "Alert",
     "Behaviour",
     "Binding",
     "Candidate",
+    "Column",
     "Concern",
     "Contract",
     "Coupling",
@@ -69,6 +71,7 @@ __all__ = [
     "Question",
     "Region",
     "Relation",
+    "RelationTable",
     "Report",
     "ReportState",
     "Severity",

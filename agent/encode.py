@@ -11,6 +11,7 @@ import numpy as np
 
 from visup.agent.mind import Mind, ObjectBelief
 from visup.agent.records import Event, Region
+from visup.agent.relations import RelationTable
 
 
 def plain(value: Any) -> Any:
@@ -38,7 +39,7 @@ def plain(value: Any) -> Any:
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, frozenset | set):
         return sorted(plain(v) for v in value)
-    if isinstance(value, tuple | list):
+    if isinstance(value, tuple | list | RelationTable):
         return [plain(v) for v in value]
     if is_dataclass(value) and not isinstance(value, type):
         hidden = _HIDDEN.get(type(value), frozenset())

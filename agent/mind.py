@@ -12,7 +12,8 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Any
 
-from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
+from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, empty
+from visup.agent.relations import Relation, RelationTable
 
 NO_OBJECTS: Mapping[int, ObjectBelief] = MappingProxyType({})
 NO_ANSWERS: Mapping[int, str] = MappingProxyType({})
@@ -177,29 +178,6 @@ class ObjectBelief:
 
 
 @dataclass(frozen=True, slots=True)
-class Relation:
-    """What holds between objects now.
-
-    Attributes:
-        name: 'converging', 'diverging', 'keeping_distance', 'touching', 'coupled', ...
-        objects: Ids; order matters only for relations that are not symmetric.
-        truth: True, false or unknown.
-        since: Seconds since when it has this truth.
-        confidence: 0 to 1.
-        value: The quantity behind it (such as pixels per second), or None.
-        sigma: Standard deviation of `value`.
-    """
-
-    name: str
-    objects: tuple[int, ...]
-    truth: Truth
-    since: float
-    confidence: float = 1.0
-    value: float | None = None
-    sigma: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Coupling:
     """Two objects believed to be rigidly connected.
 
@@ -315,7 +293,7 @@ class Mind:
     frame_index: int = -1
     frame_size: tuple[int, int] = (0, 0)
     objects: Mapping[int, ObjectBelief] = field(default_factory=lambda: NO_OBJECTS)
-    relations: tuple[Relation, ...] = ()
+    relations: RelationTable | tuple[Relation, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     tasks: tuple[TaskBelief, ...] = ()
     alerts: tuple[Alert, ...] = ()
@@ -350,9 +328,17 @@ class Mind:
         return any(c.objects == (min(a, b), max(a, b)) for c in self.couplings)
 
     def relation(self, name: str, *objects: int) -> Relation | None:
-        """The relation of that name between exactly these objects in any order, or None."""
-        wanted = frozenset(objects)
-        for r in self.relations:
-            if r.name == name and frozenset(r.objects) == wanted:
-                return r
-        return None
+        """The relation of that name between exactly these objects, or None when it is not judged.
+
+        The order of the objects matters only for relations that are not symmetric.
+        """
+        return self._table.find(name, *objects)
+
+    def holding(self, *names: str) -> tuple[Relation, ...]:
+        """The relations of some names that are true, by their objects."""
+        return self._table.true(*names)
+
+    @property
+    def _table(self) -> RelationTable:
+        given = self.relations
+        return given if isinstance(given, RelationTable) else RelationTable(extra=given)

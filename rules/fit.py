@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.rules.geometry import DIRECTIONS
+from visup.rules.pairs import pairs
 
 Floats = NDArray[np.float64]
 
@@ -24,25 +25,36 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
         samples stand. The deviation comes from the spread of the residuals (their median absolute
         deviation) as if they were independent, so that it is too small for slow wobbles.
     """
-    count = np.isfinite(values).sum(axis=0)
+    valid = np.isfinite(values)
+    if len(times) >= 4 and valid.all():
+        lever = np.sqrt(((times - times.mean()) ** 2).sum())
+        return _line(times, values, len(times), np.full(values.shape[1], lever))
+    count = valid.sum(axis=0)
     enough = count >= 4
     slope = np.full(values.shape[1], np.nan)
     sigma = np.full(values.shape[1], np.nan)
     if not enough.any():
         return slope, sigma
-    kept = values[:, enough]
-    first, second = np.triu_indices(len(times), 1)
-    rises = (kept[second] - kept[first]) / (times[second] - times[first])[:, None]
-    slope[enough] = nanmedian(rises)
-    residual = kept - slope[enough] * times[:, None]
-    residual -= nanmedian(residual)
-    spread = 1.4826 * nanmedian(np.abs(residual)) * np.sqrt(count[enough] / (count[enough] - 2))
-    valid = np.isfinite(kept)
-    middle = (valid * times[:, None]).sum(axis=0) / count[enough]
+    count, valid = count[enough], valid[:, enough]
+    middle = (valid * times[:, None]).sum(axis=0) / count
     lever = np.sqrt((valid * (times[:, None] - middle) ** 2).sum(axis=0))
-    # Medians need pi/2 times as many samples as means for the same variance of their result.
-    sigma[enough] = np.sqrt(np.pi / 2) * spread / np.maximum(lever, 1e-9)
+    slope[enough], sigma[enough] = _line(times, values[:, enough], count, lever)
     return slope, sigma
+
+
+def _line(
+    times: Floats, values: Floats, count: int | NDArray[np.intp], lever: Floats
+) -> tuple[Floats, Floats]:
+    first, second = pairs(len(times))
+    rises = values[second]
+    rises -= values[first]
+    rises /= (times[second] - times[first])[:, None]
+    slope = nanmedian(rises)
+    residual = values - slope * times[:, None]
+    residual -= nanmedian(residual)
+    spread = 1.4826 * nanmedian(np.abs(residual)) * np.sqrt(count / (count - 2))
+    # Medians need pi/2 times as many samples as means for the same variance of their result.
+    return slope, np.sqrt(np.pi / 2) * spread / np.maximum(lever, 1e-9)
 
 
 def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
@@ -62,11 +74,14 @@ def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
         return times, values
     edges = np.arange(len(times) % size if len(times) % size else size, len(times), size)
     edges = np.concatenate([[0], edges])
+    sizes = np.diff(np.append(edges, len(times)))
     known = np.isfinite(values)
+    if known.all():
+        means = np.add.reduceat(values, edges, axis=0) / sizes[:, None]
+        return np.add.reduceat(times, edges) / sizes, means
     count = np.add.reduceat(known, edges, axis=0, dtype=float)
     total = np.add.reduceat(np.where(known, values, 0.0), edges, axis=0)
     means = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
-    sizes = np.diff(np.append(edges, len(times)))
     return np.add.reduceat(times, edges) / sizes, means
 
 
@@ -80,6 +95,10 @@ def nanmedian(values: Floats) -> Floats:
         (N,) float; NaN for columns without a value.
     """
     ordered = np.sort(values, axis=0)  # NaN goes last
+    if len(values) and not np.isnan(ordered[-1]).any():
+        middle: Floats = ordered[(len(values) - 1) // 2] + ordered[len(values) // 2]
+        middle *= 0.5
+        return middle
     count = np.isfinite(ordered).sum(axis=0)
     column = np.arange(values.shape[1])
     low = ordered[np.maximum((count - 1) // 2, 0), column]

@@ -2,7 +2,8 @@
 
 One latch holds many states at once (such as the trend of every pair of objects), as arrays. The
 noise thresholds of entering and leaving a state are the caller's, who knows the quantity behind
-it; the latch adds the least duration.
+it (`hold_sign` serves for quantities that are compared with zero); the latch adds the least
+duration.
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Codes = NDArray[np.int8]
+Floats = NDArray[np.float64]
 UNKNOWN = -1
 """The code of a state of which nothing is known; every latch starts there."""
+BELOW, WITHIN, ABOVE = 0, 1, 2
+"""Codes of a sign."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,30 +33,30 @@ class Latch:
     """
 
     state: Codes
-    since: NDArray[np.float64]
+    since: Floats
     pending: Codes
-    pending_since: NDArray[np.float64]
+    pending_since: Floats
 
-    def select(self, rows: NDArray[np.intp], now: float) -> Latch:
-        """The latch of pairs of other objects.
+    def select(self, places: NDArray[np.intp], now: float) -> Latch:
+        """The latch of other pairs.
 
         Args:
-            rows: (N,) where each of the new objects stood before, -1 for new ones.
+            places: (N,) where each of the new pairs stood before along the last axis, -1 for new
+                ones.
             now: Seconds.
 
         Returns:
-            A latch of shape (N, N); pairs with a new object start unknown.
+            A latch whose last axis has length N; new pairs start unknown.
         """
-        blank = unknown_latch((len(rows), len(rows)), now)
-        if not (rows >= 0).any() or self.state.size == 0:
+        blank = unknown_latch((*self.state.shape[:-1], len(places)), now)
+        known = places >= 0
+        if not known.any():
             return blank
-        at = np.ix_(rows, rows)
-        known = (rows >= 0)[:, None] & (rows >= 0)[None, :]
         return Latch(
-            np.where(known, self.state[at], blank.state),
-            np.where(known, self.since[at], blank.since),
-            np.where(known, self.pending[at], blank.pending),
-            np.where(known, self.pending_since[at], blank.pending_since),
+            np.where(known, self.state[..., places], blank.state),
+            np.where(known, self.since[..., places], blank.since),
+            np.where(known, self.pending[..., places], blank.pending),
+            np.where(known, self.pending_since[..., places], blank.pending_since),
         )
 
 
@@ -62,7 +66,7 @@ def unknown_latch(shape: tuple[int, ...], now: float) -> Latch:
     return Latch(codes, np.full(shape, now), codes, np.full(shape, now))
 
 
-def step(latch: Latch, wanted: Codes, now: float, minimum_s: float) -> Latch:
+def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> Latch:
     """Move every state towards what the latest measurement wants.
 
     A known state wants to be believed for `minimum_s` without a break before it is; to become
@@ -72,11 +76,13 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float) -> Latch:
         latch: The states before.
         wanted: Codes of the same shape, what the measurement says now.
         now: Seconds.
-        minimum_s: Least duration, seconds.
+        minimum_s: Least duration, seconds; one for all, or an array that can be broadcast.
 
     Returns:
         The states after; `since` is when the believed state began to show.
     """
+    if np.array_equal(wanted, latch.pending) and np.array_equal(wanted, latch.state):
+        return latch  # Nothing wants to change, as nearly always.
     same = wanted == latch.pending
     pending_since = np.where(same, latch.pending_since, now)
     ripe = (now - pending_since >= minimum_s - 1e-9) | (wanted == UNKNOWN)
@@ -87,3 +93,30 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float) -> Latch:
         wanted.astype(np.int8),
         pending_since,
     )
+
+
+def hold_sign(values: Floats, before: Codes, enter: float | Floats, leave: float | Floats) -> Codes:
+    """The signs of quantities, with hysteresis (a Schmitt trigger on either side of zero).
+
+    A sign begins beyond `enter` and ends within `leave`. One that is not known yet is judged by the
+    middle of the two, so that noise must cross half of the band to change it, wherever in the band
+    the quantity may lie.
+
+    Args:
+        values: Any shape; NaN unknown.
+        before: Same shape: signs so far, `BELOW`, `WITHIN`, `ABOVE` or `UNKNOWN`.
+        enter: Magnitude beyond which a quantity has a sign.
+        leave: Magnitude within which it has none; at most `enter`.
+
+    Returns:
+        Signs of the same shape; `UNKNOWN` for NaN.
+    """
+    sign = (values > 0.0).astype(np.int8) * np.int8(2)
+    size = np.abs(values)
+    held = np.where(before == UNKNOWN, size > 0.5 * (enter + leave), before == sign)
+    apart = (size > enter) | (held & ~(size <= leave))
+    # What is in the band but was on the other side of zero has crossed it: no sign.
+    code = np.where(apart, sign, np.int8(WITHIN))
+    if np.isnan(size).any():
+        code = np.where(np.isnan(size), np.int8(UNKNOWN), code)
+    return code

@@ -1,0 +1,222 @@
+"""All that holds between objects at one moment: a table by columns that gives records on demand.
+
+Fifty objects are 1225 pairs of a dozen relations each: too many records to make in every step, of
+which a few are ever read. So a step keeps its relations as arrays, a column for each question that
+has one answer for a pair (such as: do the two converge, keep their distance, or diverge?), and a
+`Relation` is made when somebody asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, overload
+
+from visup.agent.records import Truth
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+UNKNOWN_CODE = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """What holds between objects now.
+
+    Attributes:
+        name: 'converging', 'diverging', 'keeping_distance', 'touching', 'coupled', ...
+        objects: Ids; order matters only for relations that are not symmetric.
+        truth: True, false or unknown.
+        since: Seconds since when it has this truth.
+        confidence: 0 to 1.
+        value: The quantity behind it (such as pixels per second), or None.
+        sigma: Standard deviation of `value`.
+    """
+
+    name: str
+    objects: tuple[int, ...]
+    truth: Truth
+    since: float
+    confidence: float = 1.0
+    value: float | None = None
+    sigma: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """One question about every pair of objects, and its answers.
+
+    Pairs (a, b) with a < b stand in the order (0, 1), (0, 2), ..., (1, 2), ... of the table's ids.
+    Arrays have one row where the question is symmetric; else row 0 says what a is to b, row 1 what
+    b is to a.
+
+    Attributes:
+        names: The relation that each code stands for; '' for a code that has no name of its own.
+        state: (R, P) int8 codes, -1 unknown.
+        since: (R, P) seconds since when each pair has its code.
+        confidence: (R, P) 0 to 1.
+        value: (R, P) the quantity behind it, NaN unknown; or None.
+        sigma: (R, P) its standard deviation, NaN unknown; or None.
+        listed: Which of its relations are told when a mind's relations are gone through: 'each'
+            (true or false), 'one' (the one that holds), or 'none' (they are there to be asked for).
+    """
+
+    names: tuple[str, ...]
+    state: NDArray[np.int8]
+    since: NDArray[np.float64]
+    confidence: NDArray[np.float64]
+    value: NDArray[np.float64] | None = None
+    sigma: NDArray[np.float64] | None = None
+    listed: str = "each"
+
+    def relation(self, code: int, pair: tuple[int, int], row: int, k: int) -> Relation:
+        """The relation of one code for pair number k, in row `row`."""
+        row = min(row, len(self.state) - 1)
+        state = int(self.state[row, k])
+        unknown = state == UNKNOWN_CODE
+        held = Truth.TRUE if state == code else Truth.FALSE
+        return Relation(
+            self.names[code],
+            pair,
+            Truth.UNKNOWN if unknown else held,
+            float(self.since[row, k]),
+            0.0 if unknown else float(self.confidence[row, k]),
+            _number(self.value, row, k),
+            _number(self.sigma, row, k),
+        )
+
+    def told(self, pair: tuple[int, int], k: int) -> Iterator[Relation]:
+        """What is listed of one pair; what is not symmetric is told in both orders."""
+        for row in range(len(self.state)):
+            ordered = pair if row == 0 else pair[::-1]
+            codes: Iterable[int] = range(len(self.names))
+            if self.listed == "one":
+                codes = (max(0, int(self.state[row, k])),)
+            for code in codes:
+                yield self.relation(code, ordered, row, k)
+
+    @property
+    def count(self) -> int:
+        """How many relations are listed of each pair."""
+        each = {"each": len(self.names), "one": 1, "none": 0}[self.listed]
+        return each * len(self.state)
+
+
+@dataclass(frozen=True, eq=False)
+class RelationTable(Sequence[Relation]):
+    """The relations of one step; immutable. As a sequence it gives those that are listed.
+
+    Attributes:
+        ids: (M,) object ids, increasing.
+        columns: Questions about all pairs of them.
+        extra: RelationTable given one by one (`coupled`, those of plug-ins).
+    """
+
+    ids: tuple[int, ...] = ()
+    columns: tuple[Column, ...] = ()
+    extra: tuple[Relation, ...] = field(default=())
+
+    def find(self, name: str, *objects: int) -> Relation | None:
+        """The relation of that name between exactly these objects, or None when it is not judged.
+
+        Args:
+            name: Any relation, listed or not.
+            objects: Ids; their order matters for relations that are not symmetric.
+        """
+        at = self._named.get(name)
+        if at is not None and len(objects) == 2:
+            column, code = at
+            k, row = self.pair(*objects)
+            if k >= 0:
+                return column.relation(code, (objects[0], objects[1]), row, k)
+        return self._given.get((name, frozenset(objects)))
+
+    def true(self, *names: str) -> tuple[Relation, ...]:
+        """The relations of some names that are true, by their objects."""
+        found = [r for r in self.extra if r.name in names and r.truth is Truth.TRUE]
+        for name in names:
+            if name in self._named:
+                column, code = self._named[name]
+                pairs = list(self._pairs) if (column.state == code).any() else []
+                for row, k in zip(*(column.state == code).nonzero(), strict=True):
+                    pair = pairs[k] if row == 0 else pairs[k][::-1]
+                    found.append(column.relation(code, pair, int(row), int(k)))
+        return tuple(sorted(found, key=lambda r: r.objects))
+
+    def all(self) -> Iterator[Relation]:
+        """Everything that is judged, listed or not: of each question the relation that holds."""
+        for k, pair in enumerate(self._pairs):
+            for column in self.columns:
+                for row in range(len(column.state)):
+                    code = max(0, int(column.state[row, k]))
+                    if column.names[code]:
+                        yield column.relation(code, pair if row == 0 else pair[::-1], row, k)
+        yield from self.extra
+
+    def pair(self, a: int, b: int) -> tuple[int, int]:
+        """Number of a pair and its row: 0 as it stands, 1 turned round; number -1 when not there."""
+        i, j = self._place.get(a, -1), self._place.get(b, -1)
+        if i < 0 or j < 0 or i == j:
+            return -1, 0
+        low, high, row = (i, j, 0) if i < j else (j, i, 1)
+        m = len(self.ids)
+        return low * m - low * (low + 1) // 2 + high - low - 1, row
+
+    def __iter__(self) -> Iterator[Relation]:
+        listed = [c for c in self.columns if c.listed != "none"]
+        for k, pair in enumerate(self._pairs):
+            for column in listed:
+                yield from column.told(pair, k)
+        yield from self.extra
+
+    def __len__(self) -> int:
+        m = len(self.ids)
+        return m * (m - 1) // 2 * sum(c.count for c in self.columns) + len(self.extra)
+
+    @overload
+    def __getitem__(self, index: int) -> Relation: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Relation, ...]: ...
+    def __getitem__(self, index: int | slice) -> Relation | tuple[Relation, ...]:
+        return self._listed[index]
+
+    def __add__(self, more: Iterable[Relation]) -> RelationTable:
+        return RelationTable(self.ids, self.columns, (*self.extra, *more))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RelationTable | tuple):
+            return NotImplemented
+        return tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(self._listed)
+
+    @property
+    def _pairs(self) -> Iterator[tuple[int, int]]:
+        return ((a, b) for i, a in enumerate(self.ids) for b in self.ids[i + 1 :])
+
+    @cached_property
+    def _listed(self) -> tuple[Relation, ...]:
+        return tuple(self)
+
+    @cached_property
+    def _place(self) -> Mapping[int, int]:
+        return {object_id: i for i, object_id in enumerate(self.ids)}
+
+    @cached_property
+    def _named(self) -> Mapping[str, tuple[Column, int]]:
+        return {n: (c, code) for c in self.columns for code, n in enumerate(c.names) if n}
+
+    @cached_property
+    def _given(self) -> Mapping[tuple[str, frozenset[int]], Relation]:
+        return {(r.name, frozenset(r.objects)): r for r in reversed(self.extra)}
+
+
+def _number(table: Any, row: int, k: int) -> float | None:
+    if table is None:
+        return None
+    value = float(table[row, k])
+    return value if value == value else None  # NaN is not equal to itself

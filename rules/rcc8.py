@@ -1,0 +1,80 @@
+"""RCC-8, the region connection calculus (Randell, Cui and Cohn 1992), on boxes and on outlines.
+
+Two boxes relate along each axis by the order of their edges (Allen 1983); RCC-8 follows from the
+signs of four differences on each axis. These signs are what carries noise thresholds, so that the
+relation of boxes whose edges are level in truth does not flicker.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.rules.geometry import RCC8, Floats
+from visup.rules.latch import ABOVE, BELOW, UNKNOWN, WITHIN, Codes
+from visup.rules.pairs import pairs
+
+DC, EC, PO, EQ, TPP, NTPP, TPPI, NTPPI = range(8)
+CONVERSE: Codes = np.array(
+    [RCC8.index(n) for n in RCC8[:4]] + [TPPI, NTPPI, TPP, NTPP, UNKNOWN], dtype=np.int8
+)
+"""Code of (a, b) -> code of (b, a); the last one stands for `UNKNOWN` = -1."""
+
+
+def edge_differences(boxes: Floats) -> Floats:
+    """How the edges of all pairs of boxes stand to each other.
+
+    Args:
+        boxes: (M, 4) float: x, y, width, height, pixels.
+
+    Returns:
+        (8, P) pixels, for each pair (a, b) and each axis x, y: start of a after that of b; end of b
+        after that of a; end of b after the start of a; end of a after the start of b.
+    """
+    i, j = pairs(len(boxes))
+    edges = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1).T
+    low, high = edges[:2], edges[2:]
+    low_a, low_b, high_a, high_b = low[:, i], low[:, j], high[:, i], high[:, j]
+    return np.concatenate([low_a - low_b, high_b - high_a, high_b - low_a, high_a - low_b])
+
+
+def from_signs(signs: Codes) -> Codes:
+    """RCC-8 from the signs of `edge_differences`.
+
+    Args:
+        signs: (8, P) codes `BELOW`, `WITHIN` (edges level), `ABOVE`, `UNKNOWN`.
+
+    Returns:
+        (P,) codes into `RCC8`: what a is to b.
+    """
+    nested, overlap = signs[:4], signs[4:].min(axis=0)
+    least, most = nested.min(axis=0), nested.max(axis=0)
+    code = np.full(signs.shape[1], PO, dtype=np.int8)
+    code[least >= WITHIN] = TPP
+    code[least == ABOVE] = NTPP
+    code[most <= WITHIN] = TPPI
+    code[most == BELOW] = NTPPI
+    code[(least == WITHIN) & (most == WITHIN)] = EQ
+    code[(overlap == WITHIN) & (code != EQ)] = EC
+    code[overlap == BELOW] = DC
+    code[np.minimum(overlap, least) == UNKNOWN] = UNKNOWN
+    return code
+
+
+def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:
+    """RCC-8 relation of all pairs of boxes, without memory.
+
+    Args:
+        boxes: (M, 4) float, x, y, width, height, pixels; boxes are closed regions of the plane.
+        tolerance: Edges closer than this count as level, pixels.
+
+    Returns:
+        (M, M) int8 codes into `RCC8`; [a, b] says what a is to b.
+    """
+    apart = edge_differences(boxes)
+    signs = (np.sign(apart) * (np.abs(apart) > tolerance)).astype(np.int8) + np.int8(WITHIN)
+    code = from_signs(signs)
+    table = np.full((len(boxes), len(boxes)), EQ, dtype=np.int8)
+    i, j = pairs(len(boxes))
+    table[i, j], table[j, i] = code, CONVERSE[code]
+    return table
