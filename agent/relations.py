@@ -54,7 +54,8 @@ class Column:
     b is to a.
 
     Attributes:
-        names: The relation that each code stands for; '' for a code that has no name of its own.
+        names: The relation that each code stands for; '' for a code that has no name of its own (not
+            where only the one that holds is listed).
         state: (R, P) int8 codes, -1 unknown.
         since: (R, P) seconds since when each pair has its code.
         confidence: (R, P) 0 to 1.
@@ -89,20 +90,16 @@ class Column:
         )
 
     def told(self, pair: tuple[int, int], k: int) -> Iterator[Relation]:
-        """What is listed of one pair; what is not symmetric is told in both orders."""
-        for row in range(len(self.state)):
-            ordered = pair if row == 0 else pair[::-1]
-            codes: Iterable[int] = range(len(self.names))
-            if self.listed == "one":
-                codes = (max(0, int(self.state[row, k])),)
-            for code in codes:
-                yield self.relation(code, ordered, row, k)
+        """What is listed of one pair, as it stands; the converse can be asked for."""
+        codes: Iterable[int] = range(len(self.names))
+        if self.listed == "one":
+            codes = (max(0, int(self.state[0, k])),)
+        return (self.relation(code, pair, 0, k) for code in codes if self.names[code])
 
     @property
     def count(self) -> int:
         """How many relations are listed of each pair."""
-        each = {"each": len(self.names), "one": 1, "none": 0}[self.listed]
-        return each * len(self.state)
+        return {"each": sum(map(bool, self.names)), "one": 1, "none": 0}[self.listed]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ so far, and gives what is believed now. It is the same judgement, with the same 
 an agent makes of its objects, whose motion is measured on outlines instead.
 
 >>> kept = Boxes()
->>> for t in range(60):
-...     boxes = np.array([[100.0, 100, 40, 40], [300 - 3.0 * t, 100, 40, 40]])
+>>> for t in range(75):
+...     boxes = np.array([[100.0, 100, 40, 40], [300 - 2.5 * t, 100, 40, 40]])
 ...     kept = watch_boxes(kept, (1, 2), boxes, t / 25)
 >>> kept.rcc8_of(1, 2), kept.qtc_of(1, 2), kept.approach_of(1, 2)
 ('partially_overlapping', '0-', 'converging')
@@ -20,8 +20,8 @@ import numpy as np
 
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
-from visup.rules.distance import CLASS_NAMES
-from visup.rules.fit import binned, theil_sen
+from visup.rules.distance import CLASS_NAMES, signed_gap
+from visup.rules.fit import binned, slope_noise, theil_sen
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.judge import (
     AWAY,
@@ -40,7 +40,6 @@ from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
 from visup.rules.pairs import carried, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import CONVERSE, edge_differences, from_signs
-from visup.rules.distance import signed_gap
 
 APPROACH = JUDGED
 APPROACH_NAMES = ("converging", "keeping_distance", "diverging")
@@ -130,7 +129,11 @@ class Boxes:
 
 
 def watch_boxes(
-    before: Boxes, ids: tuple[int, ...], boxes: Floats, now: float, settings: BoxSettings | None = None
+    before: Boxes,
+    ids: tuple[int, ...],
+    boxes: Floats,
+    now: float,
+    settings: BoxSettings | None = None,
 ) -> Boxes:
     """One frame.
 
@@ -196,17 +199,13 @@ def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats
     return slope, np.maximum(sigma, slope_noise(times, s.judge.noise_px * np.sqrt(2.0)))
 
 
-def slope_noise(times: Floats, noise: float) -> float:
-    """Standard deviation of the slope of a line through samples of that noise at these times."""
-    lever = times - times.mean()
-    return float(noise / np.sqrt((lever * lever).sum()))
-
-
 def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
     """The same of other objects: what is new has no samples and no states."""
     rows, numbers = carried(before.ids, ids)
     p, m = len(before.gap), len(before.ids)
-    at = np.concatenate([numbers, np.where(rows < 0, -1, p + rows), np.where(rows < 0, -1, p + m + rows)])
+    at = np.concatenate(
+        [numbers, np.where(rows < 0, -1, p + rows), np.where(rows < 0, -1, p + m + rows)]
+    )
     samples = tuple(np.where(at < 0, np.nan, np.append(row, np.nan)[at]) for row in before.samples)
     return Boxes(ids, before.times, samples, before.latch.select(numbers, now))
 

@@ -95,7 +95,12 @@ class Couple:
         coupled = {c.objects: c for c in mind.couplings}
         objects = mind.present()
         pairs = [(a.id, b.id) for i, a in enumerate(objects) for b in objects[i + 1 :]]
-        held = {(r.name, r.objects): r.truth for r in mind.relations}
+        held: Held = {
+            (name, pair): r.truth
+            for pair in pairs
+            for name in ("touching", "converging", "diverging")
+            if (r := mind.relation(name, *pair)) is not None
+        }
         now = measured(mind)
         kept: dict[Pair, Pending] = {}
         events: list[Event] = []

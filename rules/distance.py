@@ -29,14 +29,17 @@ def signed_gap(differences: Floats) -> Floats:
     """
     along = -np.minimum(differences[4:6], differences[6:8])
     dx, dy = np.maximum(along, 0.0)
-    return np.where(along.max(axis=0) > 0.0, np.sqrt(dx * dx + dy * dy), along.max(axis=0))
+    most = along.max(axis=0)
+    gap: Floats = np.where(most > 0.0, np.sqrt(dx * dx + dy * dy), most)
+    return gap
 
 
 def sizes(boxes: Floats) -> Floats:
     """(P,) pixels: size of each pair of boxes (M, 4), at least one pixel."""
     root = np.maximum(boxes[:, 2] * boxes[:, 3], 1.0) ** 0.25
     i, j = pairs(len(boxes))
-    return root[i] * root[j]
+    size: Floats = root[i] * root[j]
+    return size
 
 
 def classes(gap: Floats, size: Floats, before: Codes, slack: float, noise: float) -> Codes:

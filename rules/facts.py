@@ -49,27 +49,17 @@ class Facts:
         self.objects: dict[int, ObjectBelief] = {b.id: b for b in mind.present()}
 
     @cached_property
-    def relations(self) -> dict[tuple[str, frozenset[int]], Relation]:
-        """Relations by name and objects."""
-        return {(r.name, frozenset(r.objects)): r for r in self.mind.relations}
-
-    @cached_property
     def measured(self) -> Measured:
         """Quantities of all pairs."""
         return measured(self.mind)
 
     def relation(self, name: str, a: int, b: int) -> Relation | None:
         """A relation between two objects, or None when it was not judged."""
-        return self.relations.get((name, frozenset((a, b))))
+        return self.mind.relation(name, a, b)
 
     def time_to_contact(self, a: int, b: int) -> float:
         """Seconds until two outlines meet if they go on so; infinite when they do not close in."""
-        gap, rate = self.measured.pair("gap", a, b), self.measured.pair("rate", a, b)
-        if isnan(gap) or isnan(rate):
-            return nan
-        if gap == 0.0:
-            return 0.0
-        return gap / -rate if rate < 0 else inf
+        return self.measured.pair("time_to_contact", a, b)
 
     @cached_property
     def first_contacts(self) -> dict[int, tuple[float, int]]:
@@ -95,14 +85,8 @@ def truth(value: bool) -> Truth:
 
 def related(facts: Facts, name: str, a: int, b: int) -> Truth:
     """Whether a relation holds; the box relations in the order of their objects."""
-    if name not in RCC8:
-        found = facts.relation(name, a, b)
-        return Truth.UNKNOWN if found is None else found.truth
-    held = {n: r for n in RCC8 if (r := facts.relation(n, a, b)) is not None}
-    if not held or any(r.truth is Truth.UNKNOWN for r in held.values()):
-        return Truth.UNKNOWN
-    wanted = name if a < b else _INVERSE.get(name, name)
-    return truth(wanted in held)
+    found = facts.relation(name, a, b)
+    return Truth.UNKNOWN if found is None else found.truth
 
 
 def expected(facts: Facts, name: str, *ids: int) -> Truth:
@@ -264,11 +248,6 @@ QUANTITIES: MappingProxyType[str, Quantity] = MappingProxyType(
 """Every quantity that a rule may compare."""
 
 KINDS = ("region", "hypothesis", "depth", "health")
-_INVERSE = {
-    a + b: a + c
-    for a in ("tangential_proper_part", "non_tangential_proper_part")
-    for b, c in (("", "_inverse"), ("_inverse", ""))
-}
 
 
 def all_true(values: Iterable[Truth]) -> Truth:

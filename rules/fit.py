@@ -57,6 +57,20 @@ def _line(
     return slope, np.sqrt(np.pi / 2) * spread / np.maximum(lever, 1e-9)
 
 
+def slope_noise(times: Floats, noise: float) -> float:
+    """Standard deviation of the slope of a line through samples of that noise at these times.
+
+    Args:
+        times: (T,) seconds, at least two.
+        noise: Standard deviation of a sample, any unit.
+
+    Returns:
+        In units per second.
+    """
+    lever = times - times.mean()
+    return float(noise / np.sqrt((lever * lever).sum()))
+
+
 def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     """Means of neighbouring samples, so that a fit over all pairs of them stays cheap.
 

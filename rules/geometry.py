@@ -225,29 +225,36 @@ def moved(region: Region, dx: float, dy: float) -> Region:
     )
 
 
-def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:
-    """RCC-8 relation of all ordered pairs of boxes (Randell, Cui and Cohn 1992).
+def signed_distances(a: Region, b: Region, most: int = 200) -> tuple[float, float]:
+    """How far the outline of one region lies outside another, nearest and farthest point.
 
     Args:
-        boxes: (M, 4) float, x, y, width, height, pixels; boxes are closed regions of the plane.
-        tolerance: Edges closer than this count as the same edge, pixels.
+        a: A region; of its outline at most `most` points are looked at.
+        b: Another.
+        most: Bound on points.
 
     Returns:
-        (M, M) int8 codes into `RCC8`; [a, b] says what a is to b.
+        The least and the greatest distance of a's points to b's outline, pixels, negative within b.
     """
-    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
-    over = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
-    start = low[:, None] - low[None]
-    end = high[None] - high[:, None]
-    same = (np.abs(start) <= tolerance).all(2) & (np.abs(end) <= tolerance).all(2)
-    inside = (start >= -tolerance).all(2) & (end >= -tolerance).all(2)
-    strictly = (start > tolerance).all(2) & (end > tolerance).all(2)
-    code = np.full(same.shape, RCC8.index("partially_overlapping"), dtype=np.int8)
-    code[inside] = RCC8.index("tangential_proper_part")
-    code[strictly] = RCC8.index("non_tangential_proper_part")
-    code[inside.T] = RCC8.index("tangential_proper_part_inverse")
-    code[strictly.T] = RCC8.index("non_tangential_proper_part_inverse")
-    code[same] = RCC8.index("equal")
-    code[(over <= tolerance).any(2) & ~same] = RCC8.index("externally_connected")
-    code[(over < -tolerance).any(2)] = RCC8.index("disconnected")
-    return code
+    points, other = outline(a), dense(outline(b))
+    points = dense(points)
+    points = points[:: -(-len(points) // most)]
+    distance = np.asarray(cKDTree(other).query(points)[0], dtype=float)
+    x, y, w, h = b.bbox
+    at = np.rint(points).astype(int) - (x, y)
+    within = (at >= 0).all(axis=1) & (at[:, 0] < w) & (at[:, 1] < h)
+    within[within] = b.mask[at[within, 1], at[within, 0]]
+    signed = np.where(within, -distance, distance)
+    return float(signed.min()), float(signed.max())
+
+
+def dense(points: Floats, step: float = 2.0) -> Floats:
+    """A closed outline with points at most `step` pixels apart; unchanged where it has them."""
+    to = np.roll(points, -1, axis=0)
+    length = np.hypot(*(to - points).T)
+    if length.max() <= step:
+        return points
+    parts = np.ceil(np.maximum(length, 1e-9) / step).astype(int)
+    start = np.repeat(np.arange(len(points)), parts)
+    share = (np.arange(len(start)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[start]
+    return np.asarray(points[start] + share[:, None] * (to - points)[start])

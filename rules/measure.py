@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief
-from visup.rules.fit import binned, theil_sen, velocity
+from visup.rules.fit import binned, slope_noise, theil_sen, velocity
 from visup.rules.geometry import Floats, outline_gap
 from visup.rules.history import History, covered
+from visup.rules.judge import JudgeSettings
 from visup.rules.parting import parting_speed
 
 
@@ -42,6 +43,11 @@ class RelationSettings:
         misfit: How unevenly an outline may move and still have a velocity, image diagonals/s.
         apart_depth: Share of depth by which touching outlines belong to bodies apart in depth.
         image_only_confidence: Most that a relation judged without depth is believed.
+        apart_exit: Share of depth below which touching outlines are no longer apart in depth.
+        together_exit: By how much relative motion may exceed its limit before two that move
+            together no longer do.
+        moving_exit: Share of the speed that moving together asks for at which it still goes on.
+        judge: Thresholds of RCC-8, QTC, direction and distance class.
     """
 
     window_s: float = 1.5
@@ -65,6 +71,12 @@ class RelationSettings:
     misfit: float = 0.0075
     apart_depth: float = 0.25
     image_only_confidence: float = 0.8
+    apart_exit: float = 0.2
+    together_exit: float = 1.5
+    moving_exit: float = 0.7
+    judge: JudgeSettings = field(
+        default_factory=lambda: JudgeSettings(speed_enter=0.002, speed_exit=0.001)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +93,11 @@ class Measured:
         early: (M, 2) velocity in the first half of the window, pixels per second.
         late: (M, 2) velocity in the second half.
         depth: (M,) in the objects' units.
+        velocity: (M, 2) pixels per second in the image.
+        velocity_sigma: (M,) standard deviation of a component that noise of the outlines makes.
+        time_to_contact: (M, M) seconds until the outlines meet if they go on so; 0 where they meet,
+            infinite where they do not close in.
+        noise_px: Standard deviation of an outline, pixels.
     """
 
     ids: tuple[int, ...] = ()
@@ -92,19 +109,61 @@ class Measured:
     early: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     late: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
+    velocity: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    velocity_sigma: Floats = field(default_factory=lambda: np.zeros(0))
+    time_to_contact: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    noise_px: float = 0.0
 
     def pair(self, quantity: str, a: int, b: int) -> float:
-        """One quantity of one pair, NaN when unknown."""
+        """One quantity of one pair ('gap', 'rate', 'time_to_contact', ...), NaN when unknown."""
         if a not in self.ids or b not in self.ids:
             return float("nan")
         table: Floats = getattr(self, quantity)
         return float(table[self.ids.index(a), self.ids.index(b)])
 
     def one(self, quantity: str, a: int) -> float:
-        """One quantity of one object, NaN when unknown."""
+        """One quantity of one object ('speed', 'depth'), NaN when unknown."""
         if a not in self.ids:
             return float("nan")
         return float(getattr(self, quantity)[self.ids.index(a)])
+
+    def interval(self, quantity: str, a: int, b: int, sigmas: float = 2.0) -> tuple[float, float]:
+        """Where one quantity of one pair lies in view of its noise.
+
+        Args:
+            quantity: 'gap', 'rate', 'relative_speed' or 'time_to_contact'.
+            a: An object.
+            b: Another.
+            sigmas: How many standard deviations to either side.
+
+        Returns:
+            (low, high) in the quantity's unit; both NaN when unknown. A time to contact lies
+            between those of the highest and the lowest closing speed.
+        """
+        value = self.pair(quantity, a, b)
+        if quantity == "time_to_contact":
+            gap, rate = self.interval("gap", a, b, sigmas), self.interval("rate", a, b, sigmas)
+            if value == 0.0 or np.isnan(value):
+                return value, value
+            return tuple(sorted(contact_time(np.array(gap), np.array(rate)).tolist()))
+        wide = sigmas * self._sigma(quantity, a, b)
+        low = value - wide
+        return (low if quantity == "rate" else max(0.0, low)) if low == low else low, value + wide
+
+    def _sigma(self, quantity: str, a: int, b: int) -> float:
+        if quantity == "rate":
+            return self.pair("rate_sigma", a, b)
+        if quantity == "relative_speed":
+            return float(np.hypot(self.one("velocity_sigma", a), self.one("velocity_sigma", b)))
+        return self.noise_px * float(np.sqrt(2.0))
+
+
+def contact_time(gap: Floats, rate: Floats) -> Floats:
+    """Seconds until gaps are closed at these rates; see `Measured.time_to_contact`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        closing = np.where(rate < 0.0, gap / -rate, np.inf)
+    closing = np.where(gap <= 0.0, 0.0, closing)
+    return np.where(np.isnan(gap) | np.isnan(rate), np.nan, closing)
 
 
 def scale(frame_size: tuple[int, int]) -> float:
@@ -145,6 +204,7 @@ class Measuring:
         if m:
             slope[stale, :] = slope[:, stale] = np.nan
         whole, early, late = self._velocities(h, mind)
+        spread = self._velocity_noise(h, mind)
         apart = np.linalg.norm(whole[:, None] - whole[None], axis=2)
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
         return Measured(
@@ -157,14 +217,21 @@ class Measuring:
             early,
             late,
             depth,
+            whole,
+            np.full(m, spread),
+            contact_time(gaps, slope),
+            self.settings.judge.noise_px,
         )
 
     def _trend(self, times: Floats, distance: Floats, mind: Mind) -> tuple[Floats, Floats]:
         """Slope over the window, or over its last part where that is strong and of another sign."""
         s = self.settings
         slope, sigma = theil_sen(*binned(times, distance, s.bins))
+        noise = np.sqrt(2.0) * s.judge.noise_px
+        sigma = np.maximum(sigma, slope_noise(times, noise))
         recent = times > times[-1] - s.quick_window_s
         quick, spread = theil_sen(*binned(times[recent], distance[recent], s.bins))
+        spread = np.maximum(spread, slope_noise(times[recent], noise))
         least = 2.0 * s.rate_enter * scale(mind.frame_size)
         with np.errstate(invalid="ignore"):
             turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
@@ -187,6 +254,12 @@ class Measuring:
             sure = speed > np.maximum(2.0 * s.rate_enter * diagonal, s.quick_sigmas * spread)
             sure &= (gaps <= s.parting_gap * diagonal) & (slope < speed)
         return np.where(sure, speed, slope), np.where(sure, spread, sigma)
+
+    def _velocity_noise(self, h: History, mind: Mind) -> float:
+        recent = h.times > mind.time - self.settings.motion_window_s
+        if np.count_nonzero(recent) < 2:
+            return float("nan")
+        return slope_noise(h.times[recent], self.settings.judge.noise_px)
 
     def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
         """Over the window of motion, and over its two halves."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Event, Mind, Observation, Outcome, Relation, Truth
+from visup.agent import Event, Mind, Observation, Outcome, Relation
 from visup.rules.sentences import sentence
 
 NARRATIVE = "rules.narrative"
@@ -47,7 +47,7 @@ class TellRelations:
         """Judge one step; see `Thinker`."""
         told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
         events = []
-        for relation in mind.relations:
+        for relation in mind.holding(*TEMPLATES):
             if not self._worth_telling(relation, told.get(relation.objects), mind):
                 continue
             told[relation.objects] = (relation.name, mind.time)
@@ -60,8 +60,6 @@ class TellRelations:
 
     def _worth_telling(self, relation: Relation, last: Told | None, mind: Mind) -> bool:
         s = self.settings
-        if relation.name not in TEMPLATES or relation.truth is not Truth.TRUE:
-            return False
         if relation.confidence < s.least_confidence or mind.time - relation.since < s.lasting_s:
             return False
         if len(relation.objects) == 2 and mind.coupled(*relation.objects):

@@ -3,14 +3,23 @@
 Two boxes relate along each axis by the order of their edges (Allen 1983); RCC-8 follows from the
 signs of four differences on each axis. These signs are what carries noise thresholds, so that the
 relation of boxes whose edges are level in truth does not flicker.
+
+Two outlines relate by how far the points of each lie outside the other (negative: within it):
+nearest point and farthest point. Where boxes are apart by more than the threshold, or the gap of
+the outlines is, no such distance is looked up: the two are disconnected. Else it costs a nearest
+neighbour search of at most 200 points of each outline among the other's, about 0.5 ms for a pair.
+Holes within an outline count as outside.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.rules.geometry import RCC8, Floats
+from visup.agent import Region
+from visup.rules.geometry import RCC8, Floats, signed_distances
 from visup.rules.latch import ABOVE, BELOW, UNKNOWN, WITHIN, Codes
 from visup.rules.pairs import pairs
 
@@ -78,3 +87,51 @@ def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:
     i, j = pairs(len(boxes))
     table[i, j], table[j, i] = code, CONVERSE[code]
     return table
+
+
+def outline_differences(
+    regions: Sequence[Region], near: NDArray[np.bool_], known: NDArray[np.bool_], far: float
+) -> Floats:
+    """How the outlines of all pairs of regions stand to each other.
+
+    Args:
+        regions: (M) regions.
+        near: (P,) bool: pairs that may meet; the others are taken to be apart.
+        known: (P,) bool: pairs of which both are seen.
+        far: Distance that stands for pairs that are apart, pixels.
+
+    Returns:
+        (3, P) pixels: nearest point of either outside the other; farthest point of a outside b;
+        farthest of b outside a. Negative is within; NaN where not known.
+    """
+    found = np.full((3, len(near)), far)
+    found[:, ~known] = np.nan
+    i, j = pairs(len(regions))
+    for k in np.flatnonzero(near & known):
+        a, b = regions[i[k]], regions[j[k]]
+        least_a, most_a = signed_distances(a, b)
+        least_b, most_b = signed_distances(b, a)
+        found[:, k] = min(least_a, least_b), most_a, most_b
+    return found
+
+
+def from_outline_signs(signs: Codes) -> Codes:
+    """RCC-8 from the signs of `outline_differences`.
+
+    Args:
+        signs: (3, P) codes.
+
+    Returns:
+        (P,) codes into `RCC8`: what a is to b.
+    """
+    apart, a_out, b_out = signs
+    code = np.full(len(apart), PO, dtype=np.int8)
+    code[apart == WITHIN] = EC
+    code[b_out == WITHIN] = TPPI
+    code[a_out == WITHIN] = TPP
+    code[b_out == BELOW] = NTPPI
+    code[a_out == BELOW] = NTPP
+    code[(a_out <= WITHIN) & (b_out <= WITHIN)] = EQ
+    code[apart == ABOVE] = DC
+    code[signs.min(axis=0) == UNKNOWN] = UNKNOWN
+    return code

@@ -10,43 +10,148 @@ for an image diagonal of 800 px (640 x 480) and scale with the diagonal.
 An image distance that shrinks does not mean that bodies come closer in space. Where the depth of
 both is known, its trend is judged too, and a relation that the two contradict is unknown; where it
 is not known the image alone is judged and the confidence is capped at `image_only_confidence`.
+What is said of depth itself (`nearing_in_depth`, ...) is unknown without depth.
+
+How to read them off a mind:
+
+- `related(mind, name, a, b) -> Truth`: any relation of two objects, those of `NAMES` among them;
+- `relation_of(mind, name, a, b) -> Relation | None`: the same with confidence, value, since;
+- `qtc(mind, a, b) -> str | None`: QTC-C such as '-0+0'; its first two signs are QTC-B;
+- `measured(mind).pair(quantity, a, b) -> float`: 'gap', 'rate', 'relative_speed', 'rate_sigma',
+  'time_to_contact'; NaN unknown; `measured(mind).interval(quantity, a, b) -> (low, high)`;
+- `measured(mind).one(quantity, a) -> float`: 'speed', 'depth';
+- `zones.inside(mind, object_id, zone_name) -> Truth`, and more in `zones.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from visup.agent import Mind, ObjectBelief, Observation, Outcome, Relation, Truth
+from visup.agent import (
+    Column,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Relation,
+    RelationTable,
+    Truth,
+)
+from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
+from visup.rules.direction import DIRECTION_NAMES
+from visup.rules.distance import CLASS_NAMES, signed_gap
 from visup.rules.fit import binned, theil_sen
-from visup.rules.geometry import RCC8, Floats, rcc8
+from visup.rules.geometry import RCC8, Floats
 from visup.rules.history import History, covered, sample
-from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
+from visup.rules.judge import (
+    AWAY,
+    DIRECTION,
+    DISTANCE,
+    JUDGED,
+    ORDER,
+    SIDE,
+    Quantities,
+    least_durations,
+    quantities,
+    wanted,
+)
+from visup.rules.latch import UNKNOWN, Codes, Latch, hold_sign, step, unknown_latch
 from visup.rules.measure import Measured, Measuring, RelationSettings, at_rest, scale
+from visup.rules.pairs import carried, pairs
+from visup.rules.qtc import text
+from visup.rules.rcc8 import (
+    CONVERSE,
+    edge_differences,
+    from_outline_signs,
+    from_signs,
+    outline_differences,
+)
 from visup.rules.tracks import merged_pairs
 
 RELATIONS = "rules.relations"
 CONVERGING, KEEPING, DIVERGING = 0, 1, 2
 TREND_NAMES = ("converging", "keeping_distance", "diverging")
+DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
+TOWARDS_NAMES = ("moving_towards", "steady_to", "moving_away_from")
+SIDE_NAMES = ("moving_left_of", "", "moving_right_of")
+OUTLINE_NAMES = tuple(f"outlines_{name}" for name in RCC8)
+NAMES = tuple(
+    name
+    for names in (
+        TREND_NAMES,
+        ("touching", "moving_together"),
+        DEPTH_NAMES,
+        RCC8,
+        OUTLINE_NAMES,
+        TOWARDS_NAMES,
+        SIDE_NAMES,
+        DIRECTION_NAMES,
+        CLASS_NAMES,
+    )
+    for name in names
+    if name
+)
+"""Every relation of two objects that is judged here; `coupled` is judged by `coupling.py`."""
+
+TREND, TOUCH, TOGETHER, DEPTH = range(JUDGED, JUDGED + 4)
+OUTLINE = slice(JUDGED + 4, JUDGED + 7)
+ROWS = JUDGED + 7
+"""Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kept:
-    """What the relations remember from step to step."""
+    """What the relations remember from step to step.
+
+    Attributes:
+        history: Samples that lines are fitted to.
+        measured: Quantities of the last step.
+        latch: (ROWS, P) states of the pairs of the history's objects.
+        rcc8: (2, P) RCC-8 of boxes and of outlines, which follow from some of these states.
+    """
 
     history: History = field(default_factory=History)
     measured: Measured = field(default_factory=Measured)
-    latches: Mapping[str, Latch] = field(default_factory=lambda: MappingProxyType({}))
+    latch: Latch = field(default_factory=lambda: unknown_latch((ROWS, 0), 0.0))
+    rcc8: Latch = field(default_factory=lambda: unknown_latch((2, 0), 0.0))
 
 
 def measured(mind: Mind) -> Measured:
     """The quantities of the last step, as `Relations` left them in the mind."""
     kept: Kept = mind.memory.get(RELATIONS, Kept())
     return kept.measured
+
+
+def relation_of(mind: Mind, name: str, a: int, b: int) -> Relation | None:
+    """A relation of two objects as the mind holds it, in this order, or None if it is not judged."""
+    return mind.relation(name, a, b)
+
+
+def related(mind: Mind, name: str, a: int, b: int) -> Truth:
+    """Whether a relation holds from a to b; unknown when it is not judged.
+
+    Args:
+        mind: The mind after this step's relations.
+        name: One of `NAMES`, `coupled`, or a plug-in's own.
+        a: An object.
+        b: Another; the order matters for RCC-8's proper parts, movements and directions.
+    """
+    found = mind.relation(name, a, b)
+    return Truth.UNKNOWN if found is None else found.truth
+
+
+def qtc(mind: Mind, a: int, b: int) -> str | None:
+    """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
+    kept: Kept = mind.memory.get(RELATIONS, Kept())
+    k, turned = RelationTable(kept.history.ids).pair(a, b)
+    if k < 0:
+        return None
+    order = slice(None, None, -1) if turned else slice(None)
+    state = kept.latch.state
+    return text(*(int(c) for rows in (AWAY, SIDE) for c in state[rows, k][order]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,163 +162,197 @@ class Relations:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
+        s = self.settings
         kept: Kept = mind.memory.get(RELATIONS, Kept())
         objects = mind.present()
-        ids = tuple(b.id for b in objects)
-        history = sample(
-            kept.history,
-            objects,
-            mind,
-            observation,
-            self.settings.window_s,
-            self.settings.samples,
-        )
-        now = Measuring(self.settings)(history, objects, mind, kept.measured)
-        rows = np.array([kept.measured.ids.index(i) if i in kept.measured.ids else -1 for i in ids])
-        latches = {
-            name: step(
-                self._before(kept, name, rows.astype(np.intp), mind.time), wanted, mind.time, lasts
-            )
-            for name, wanted, lasts in self._wanted(kept, history, now, rows, objects, mind)
-        }
-        mind = mind.remember(RELATIONS, Kept(history, now, MappingProxyType(latches)))
-        return Outcome(replace(mind, relations=self._tell(latches, now, objects, mind)))
+        before = _of_these(kept, tuple(b.id for b in objects), mind.time)
+        history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
+        now = Measuring(s)(history, objects, mind, kept.measured)
+        wants = self._wanted(before.latch.state, history, now, objects, mind)
+        latch = step(before.latch, wants, mind.time, self._durations())
+        held = np.stack([from_signs(latch.state[ORDER]), from_outline_signs(latch.state[OUTLINE])])
+        rcc8 = step(before.rcc8, held, mind.time, 0.0)
+        kept = Kept(history, now, latch, rcc8)
+        table = RelationTable(now.ids, self._columns(kept, mind))
+        return Outcome(replace(mind, relations=table).remember(RELATIONS, kept))
 
-    def _before(self, kept: Kept, name: str, rows: NDArray[np.intp], now: float) -> Latch:
-        old = kept.latches.get(name)
-        blank = unknown_latch((len(rows), len(rows)), now)
-        return blank if old is None or len(rows) == 0 else old.select(rows, now)
+    def _durations(self) -> Floats:
+        s = self.settings
+        lasts = np.full((ROWS, 1), s.touch_minimum_s)
+        lasts[:JUDGED] = least_durations(s.judge)
+        lasts[[TREND, TOGETHER, DEPTH]] = s.trend_minimum_s
+        return lasts
 
     def _wanted(
         self,
-        kept: Kept,
+        before: Codes,
         h: History,
         now: Measured,
-        rows: NDArray[np.intp],
         objects: tuple[ObjectBelief, ...],
         mind: Mind,
-    ) -> tuple[tuple[str, Codes, float], ...]:
+    ) -> Codes:
         s, diagonal = self.settings, scale(mind.frame_size)
-        trend = self._before(kept, "trend", rows.astype(np.intp), mind.time).state
-        touching = self._before(kept, "touching", rows.astype(np.intp), mind.time).state
+        i, j = pairs(len(objects))
+        codes = np.empty((ROWS, len(i)), dtype=np.int8)
+        codes[:JUDGED] = wanted(
+            before[:JUDGED], self._quantities(now, objects, mind), s.judge, diagonal
+        )
         image = wanted_trend(
-            now.rate,
-            now.rate_sigma,
-            trend,
+            now.rate[i, j],
+            now.rate_sigma[i, j],
+            before[TREND],
             s.rate_enter * diagonal,
             s.rate_exit * diagonal,
             s.sigmas,
         )
-        boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
-        trends = with_depth(image, self._depth_trend(h))
-        touch = self._wanted_touch(now, touching, diagonal)
-        for i, j in index_pairs(h.ids, (c.objects for c in mind.couplings)):
+        codes[DEPTH] = self._depth_trend(h)
+        codes[TREND] = with_depth(image, codes[DEPTH])
+        codes[TOUCH] = self._wanted_touch(now, before[TOUCH], diagonal)
+        codes[TOGETHER] = self._wanted_together(now, before[TOGETHER], diagonal)
+        codes[OUTLINE] = self._wanted_outlines(now, before[OUTLINE], objects, mind)
+        for k in _numbers(h.ids, (c.objects for c in mind.couplings)):
             # One body that turns changes its outline; it comes apart when its parts no longer touch.
-            if touch[i, j] == 1 and trends[i, j] == DIVERGING:
-                trends[i, j] = trends[j, i] = KEEPING
-        for i, j in index_pairs(h.ids, merged_pairs(mind)):
-            touch[i, j] = touch[j, i] = 1
-            trends[i, j] = trends[j, i] = UNKNOWN
-        return (
-            ("trend", trends, s.trend_minimum_s),
-            ("touching", touch, s.touch_minimum_s),
-            ("moving_together", self._wanted_together(now, diagonal), s.trend_minimum_s),
-            ("rcc8", rcc8(boxes, 0.002 * diagonal), s.touch_minimum_s),
-        )
+            if codes[TOUCH, k] == 1 and codes[TREND, k] == DIVERGING:
+                codes[TREND, k] = KEEPING
+        for k in _numbers(h.ids, merged_pairs(mind)):
+            codes[TOUCH, k], codes[TREND, k] = 1, UNKNOWN
+        return codes
+
+    def _quantities(
+        self, now: Measured, objects: tuple[ObjectBelief, ...], mind: Mind
+    ) -> Quantities:
+        """Boxes as they are, or were until a moment ago; outlines' velocities."""
+        boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
+        boxes[[mind.time - b.last_seen > self.settings.hold_s for b in objects]] = np.nan
+        differences = edge_differences(boxes)
+        gap = signed_gap(differences)
+        noise = self.settings.judge.noise_px
+        return quantities(boxes, differences, gap, now.velocity, now.velocity_sigma, noise)
 
     def _depth_trend(self, h: History) -> Codes:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
-        m = len(h.ids)
-        codes = np.full((m, m), UNKNOWN, dtype=np.int8)
-        i, j = np.triu_indices(m, 1)
-        known = np.isfinite(h.depth).mean(axis=0) >= 0.6 if len(h.times) else np.zeros(m, bool)
-        both = known[i] & known[j]
-        i, j = i[both], j[both]
+        i, j = pairs(len(h.ids))
+        codes = np.full(len(i), UNKNOWN, dtype=np.int8)
         if len(i) == 0 or not covered(h, self.settings.window_s):
             return codes
-        apart = np.abs(h.depth[:, i] - h.depth[:, j])
-        slope, sigma = theil_sen(*binned(h.times, apart, self.settings.bins))
-        typical = 0.5 * np.nanmean(h.depth[:, i] + h.depth[:, j], axis=0)
+        known = np.isfinite(h.depth).mean(axis=0) >= 0.6
+        at = np.flatnonzero(known[i] & known[j])
+        if len(at) == 0:
+            return codes
+        first, second = h.depth[:, i[at]], h.depth[:, j[at]]
+        slope, sigma = theil_sen(*binned(h.times, np.abs(first - second), self.settings.bins))
+        typical = 0.5 * np.nanmean(first + second, axis=0)
         least = np.maximum(self.settings.depth_rate * typical, 3.0 * sigma)
-        found = np.full(len(i), KEEPING, dtype=np.int8)
+        found = np.full(len(at), KEEPING, dtype=np.int8)
         found[slope < -least] = CONVERGING
         found[slope > least] = DIVERGING
-        codes[i, j] = codes[j, i] = found
+        codes[at] = found
         return codes
 
     def _wanted_touch(self, now: Measured, before: Codes, diagonal: float) -> Codes:
+        """By the gap, and not where depth tells the two apart."""
         s = self.settings
-        limit = np.where(before == 1, s.touch_exit, s.touch_enter) * diagonal
-        with np.errstate(invalid="ignore"):
-            wanted = np.where(now.gap <= limit, 1, 0).astype(np.int8)
-            d = now.depth
-            apart = np.abs(d[:, None] - d[None]) / np.minimum(d[:, None], d[None])
-            wanted[apart > s.apart_depth] = 0
-        wanted[~np.isfinite(now.gap)] = UNKNOWN
+        i, j = pairs(len(now.ids))
+        gap = now.gap[i, j]
+        wanted = (gap <= _limit(before, s.touch_enter, s.touch_exit) * diagonal).astype(np.int8)
+        first, second = now.depth[i], now.depth[j]
+        apart = np.abs(first - second) / np.minimum(first, second)
+        wanted[apart > _limit(before, s.apart_exit, s.apart_depth)] = 0
+        wanted[np.isnan(gap)] = UNKNOWN
         return wanted
 
-    def _wanted_together(self, now: Measured, diagonal: float) -> Codes:
+    def _wanted_together(self, now: Measured, before: Codes, diagonal: float) -> Codes:
         """Both move and neither moves relative to the other."""
-        with np.errstate(invalid="ignore"):
-            moves = now.speed > 2 * self.settings.still_speed * diagonal
-        rest = at_rest(now, self.settings, diagonal)
-        wanted: Codes = (rest & moves[:, None] & moves[None]).astype(np.int8)
-        wanted[~np.isfinite(now.relative_speed)] = UNKNOWN
+        s = self.settings
+        i, j = pairs(len(now.ids))
+        held = before == 1
+        least = 2 * s.still_speed * diagonal * np.where(held, s.moving_exit, 1.0)
+        moves = np.minimum(now.speed[i], now.speed[j]) > least
+        rest = at_rest(now, s, diagonal)[i, j]
+        rest |= held & at_rest(now, s, diagonal * s.together_exit)[i, j]
+        wanted = (rest & moves).astype(np.int8)
+        wanted[np.isnan(now.relative_speed[i, j])] = UNKNOWN
         return wanted
 
-    def _tell(
-        self,
-        latches: dict[str, Latch],
-        now: Measured,
-        objects: tuple[ObjectBelief, ...],
-        mind: Mind,
-    ) -> tuple[Relation, ...]:
-        told: list[Relation] = []
-        sure = self._trend_confidence(now, objects, mind)
-        for i, a in enumerate(objects):
-            for j in range(i + 1, len(objects)):
-                pair = (a.id, objects[j].id)
-                told += self._trends(latches["trend"], now, sure, i, j, pair)
-                for name in ("touching", "moving_together"):
-                    told.append(self._two_valued(name, latches[name], now, i, j, pair))
-                told.append(_box_relation(latches["rcc8"], i, j, pair))
-                told.append(_distance(now, i, j, pair, mind.time))
-        return tuple(told)
+    def _wanted_outlines(
+        self, now: Measured, before: Codes, objects: tuple[ObjectBelief, ...], mind: Mind
+    ) -> Codes:
+        s, diagonal = self.settings.judge, scale(mind.frame_size)
+        i, j = pairs(len(objects))
+        enter, leave = s.level_enter * diagonal, s.level_exit * diagonal
+        gap = now.gap[i, j]
+        regions = [b.region for b in objects]
+        apart = outline_differences(regions, gap <= enter, ~np.isnan(gap), 0.05 * diagonal)
+        return hold_sign(apart, before, enter, leave)
 
-    def _trend_confidence(
-        self, now: Measured, objects: tuple[ObjectBelief, ...], mind: Mind
-    ) -> Floats:
-        floor = self.settings.rate_enter * scale(mind.frame_size) / 3.0
-        z = now.rate / np.hypot(now.rate_sigma, floor)
-        sure = 1.0 - 0.5 * np.exp(-np.abs(z) / 3.0)
+    def _columns(self, kept: Kept, mind: Mind) -> tuple[Column, ...]:
+        now, latch = kept.measured, kept.latch
+        i, j = pairs(len(now.ids))
         known = np.isfinite(now.depth)
-        return np.minimum(
-            sure, np.where(known[:, None] & known[None], 1.0, self.settings.image_only_confidence)
+        cap = np.where(known[i] & known[j], 1.0, self.settings.image_only_confidence)[None]
+        gap, rate = now.gap[i, j][None], now.rate[i, j][None]
+        sigma = now.rate_sigma[i, j][None]
+        relative = now.relative_speed[i, j][None]
+        sure, certain = np.ones((2, len(i))), np.minimum(cap, 0.9)
+        trend = np.minimum(cap, self._trend_confidence(rate, sigma, mind))
+        there = np.where(np.isnan(gap), UNKNOWN, 0).astype(np.int8)
+
+        def column(
+            names: tuple[str, ...],
+            row: int | slice,
+            confidence: Floats,
+            value: Floats | None = None,
+            sigma: Floats | None = None,
+            listed: str = "none",
+        ) -> Column:
+            rows = row if isinstance(row, slice) else slice(row, row + 1)
+            return Column(
+                names, latch.state[rows], latch.since[rows], confidence, value, sigma, listed
+            )
+
+        def boxes(names: tuple[str, ...], row: int, listed: str) -> Column:
+            code, since = kept.rcc8.state[row], kept.rcc8.since[row]
+            state, since = np.stack([code, CONVERSE[code]]), np.stack([since, since])
+            return Column(names, state, since, sure, listed=listed)
+
+        cardinal, since = latch.state[DIRECTION], latch.since[DIRECTION]
+        return (
+            column(TREND_NAMES, TREND, trend, rate, sigma, "each"),
+            column(("", "touching"), TOUCH, certain, gap, listed="each"),
+            column(("", "moving_together"), TOGETHER, certain, relative, listed="each"),
+            boxes(RCC8, 0, "one"),
+            Column(("distance",), there, np.full_like(gap, mind.time), sure, gap, listed="each"),
+            boxes(OUTLINE_NAMES, 1, "none"),
+            column(DEPTH_NAMES, DEPTH, certain),
+            column(TOWARDS_NAMES, AWAY, np.repeat(certain, 2, axis=0)),
+            column(SIDE_NAMES, SIDE, np.repeat(certain, 2, axis=0)),
+            column(CLASS_NAMES, DISTANCE, sure, gap),
+            Column(
+                DIRECTION_NAMES,
+                np.stack([cardinal, DIRECTION_CONVERSE[cardinal]]),
+                np.stack([since, since]),
+                sure,
+            ),
         )
 
-    def _trends(
-        self, latch: Latch, now: Measured, sure: Floats, i: int, j: int, pair: tuple[int, int]
-    ) -> list[Relation]:
-        state, since = int(latch.state[i, j]), float(latch.since[i, j])
-        rate, sigma = _number(now.rate[i, j]), _number(now.rate_sigma[i, j])
-        confidence = _number(sure[i, j]) or 0.0
-        told = []
-        for code, name in enumerate(TREND_NAMES):
-            truth = Truth.UNKNOWN if state == UNKNOWN else _truth(state == code)
-            c = 0.0 if state == UNKNOWN else confidence
-            told.append(Relation(name, pair, truth, since, c, rate, sigma))
-        return told
+    def _trend_confidence(self, rate: Floats, sigma: Floats, mind: Mind) -> Floats:
+        floor = self.settings.rate_enter * scale(mind.frame_size) / 3.0
+        z = rate / np.hypot(sigma, floor)
+        return np.where(np.isnan(z), 0.0, 1.0 - 0.5 * np.exp(-np.abs(z) / 3.0))
 
-    def _two_valued(
-        self, name: str, latch: Latch, now: Measured, i: int, j: int, pair: tuple[int, int]
-    ) -> Relation:
-        state = int(latch.state[i, j])
-        known = np.isfinite(now.depth[i]) and np.isfinite(now.depth[j])
-        confidence = 0.9 if known else self.settings.image_only_confidence
-        value = now.gap[i, j] if name == "touching" else now.relative_speed[i, j]
-        truth = Truth.UNKNOWN if state == UNKNOWN else _truth(state == 1)
-        c = 0.0 if state == UNKNOWN else confidence
-        return Relation(name, pair, truth, float(latch.since[i, j]), c, _number(value))
+
+def _of_these(kept: Kept, ids: tuple[int, ...], now: float) -> Kept:
+    """What was kept, of other objects."""
+    if kept.history.ids == ids:
+        return kept
+    numbers = carried(kept.history.ids, ids)[1]
+    return replace(kept, latch=kept.latch.select(numbers, now), rcc8=kept.rcc8.select(numbers, now))
+
+
+def _limit(before: Codes, enter: float, leave: float) -> Floats:
+    """Up to which value a state is begun or kept; by the middle while it is not known yet."""
+    middle = 0.5 * (enter + leave)
+    return np.where(before == 1, leave, np.where(before == UNKNOWN, middle, enter))
 
 
 def wanted_trend(
@@ -222,19 +361,18 @@ def wanted_trend(
     """Which trend a rate of change stands for, with hysteresis.
 
     Args:
-        rate: (M, M) pixels per second; NaN unknown.
-        sigma: (M, M) its standard deviation.
-        before: (M, M) the trend believed so far.
+        rate: (P,) pixels per second; NaN unknown.
+        sigma: (P,) its standard deviation.
+        before: (P,) the trend believed so far.
         enter: Rate that must be exceeded to enter a trend, pixels per second.
         leave: Rate below which it ends.
         sigmas: How many deviations the rate must also exceed to enter.
 
     Returns:
-        (M, M) codes; a rate between the thresholds leaves things as they are.
+        (P,) codes; a rate between the thresholds leaves things as they are.
     """
-    with np.errstate(invalid="ignore"):
-        strong = np.abs(rate) > np.maximum(enter, sigmas * sigma)
-        weak = np.abs(rate) < leave
+    strong = np.abs(rate) > np.maximum(enter, sigmas * sigma)
+    weak = np.abs(rate) < leave
     wanted = before.copy()
     moving = (before == CONVERGING) | (before == DIVERGING)
     turned = ((before == CONVERGING) & (rate > 0)) | ((before == DIVERGING) & (rate < 0))
@@ -265,30 +403,7 @@ def with_depth(image: Codes, depth: Codes) -> Codes:
     return joined
 
 
-def index_pairs(
-    ids: tuple[int, ...], pairs: Iterable[tuple[int, int]]
-) -> tuple[tuple[int, int], ...]:
-    """Where pairs of object ids stand in `ids`; pairs with an object that is not there are left out."""
-    known = {object_id: i for i, object_id in enumerate(ids)}
-    return tuple((known[a], known[b]) for a, b in pairs if a in known and b in known)
-
-
-def _truth(value: bool) -> Truth:
-    return Truth.TRUE if value else Truth.FALSE
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _box_relation(latch: Latch, i: int, j: int, pair: tuple[int, int]) -> Relation:
-    state = int(latch.state[i, j])
-    name = RCC8[state] if state != UNKNOWN else "disconnected"
-    truth = Truth.UNKNOWN if state == UNKNOWN else Truth.TRUE
-    return Relation(name, pair, truth, float(latch.since[i, j]))
-
-
-def _distance(now: Measured, i: int, j: int, pair: tuple[int, int], time: float) -> Relation:
-    gap = _number(now.gap[i, j])
-    truth = Truth.UNKNOWN if gap is None else Truth.TRUE
-    return Relation("distance", pair, truth, time, 1.0, gap)
+def _numbers(ids: tuple[int, ...], of: Iterable[tuple[int, int]]) -> tuple[int, ...]:
+    """Numbers of pairs of object ids; pairs with an object that is not there are left out."""
+    table = RelationTable(ids)
+    return tuple(k for a, b in of if (k := table.pair(a, b)[0]) >= 0)

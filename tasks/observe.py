@@ -39,9 +39,6 @@ class Relations:
 
     def __init__(self, mind: Mind) -> None:
         self._mind = mind
-        self._table: Mapping[tuple[str, frozenset[int]], Relation] = {
-            (r.name, frozenset(r.objects)): r for r in reversed(mind.relations)
-        }
 
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
         """The relation of that name between these objects; one of unknown truth when there is none.
@@ -49,7 +46,7 @@ class Relations:
         `decoupled`, `apart`, `present` and `gone` follow from what else is believed unless some
         rule gives them itself.
         """
-        found = self._table.get((name, frozenset(objects)))
+        found = self._mind.relation(name, *objects)
         if found is not None and found.truth is not Truth.UNKNOWN:
             return found
         derive = DERIVED.get(name)
@@ -70,7 +67,7 @@ class Relations:
         Two objects that are not coupled yet are `decoupled` in the derived sense, and no failure.
         """
         for name in names:
-            relation = self._table.get((name, frozenset(objects)))
+            relation = self._mind.relation(name, *objects)
             if relation is not None and relation.truth is Truth.TRUE:
                 return relation
         return None

@@ -175,9 +175,13 @@ def candidates_table(belief: ObjectBelief) -> Table:
 
 
 def relations_table(mind: Mind, object_id: int | None) -> Table:
-    """What holds between objects, or between one and the others."""
+    """What holds between objects; of one object and the others also what is seldom asked for."""
     table = Table("relation", "objects", "truth", "since", "value", "confidence")
-    for r in mind.relations:
+    held = mind.relations
+    told: Iterable[Relation] = held
+    if object_id is not None and isinstance(held, RelationTable):
+        told = held.all()
+    for r in told:
         if object_id is None or object_id in r.objects:
             value = "" if r.value is None else f"{r.value:.1f}"
             objects = " ".join(map(str, r.objects))

@@ -13,10 +13,10 @@ from visup.rules.geometry import (
     moved,
     outline_gap,
     pixels_in,
-    rcc8,
     reach,
     shared_pixels,
 )
+from visup.rules.rcc8 import rcc8
 
 some = settings(max_examples=80, deadline=None)
 rect = st.tuples(st.integers(0, 60), st.integers(0, 60), st.integers(2, 40), st.integers(2, 40))

@@ -42,8 +42,9 @@ def test_states_of_less_than_the_least_duration_never_show(wanted: list[int]) ->
 
 
 def test_selection_keeps_old_pairs_and_starts_new_ones_unknown() -> None:
-    latch = unknown_latch((2, 2), 0.0)
-    latch = step(latch, np.array([[0, 1], [1, 0]], dtype=np.int8), 1.0, 0.0)
-    chosen = latch.select(np.array([1, -1, 0]), 2.0)
-    assert chosen.state.tolist() == [[0, -1, 1], [-1, -1, -1], [1, -1, 0]]
-    assert chosen.since[0, 2] == latch.since[1, 0]
+    latch = unknown_latch((2, 3), 0.0)
+    latch = step(latch, np.array([[0, 1, 2], [2, 0, 1]], dtype=np.int8), 1.0, 0.0)
+    chosen = latch.select(np.array([2, -1, 0, -1]), 2.0)
+    assert chosen.state.tolist() == [[2, -1, 0, -1], [1, -1, 2, -1]]
+    assert chosen.since[:, 0].tolist() == [1.0, 1.0]
+    assert chosen.since[:, 1].tolist() == [2.0, 2.0]

@@ -21,7 +21,6 @@ from visup.agent import (
     ObjectBelief,
     Presence,
     ReportState,
-    Truth,
     Verdict,
 )
 from visup.agent.agent import Step
@@ -291,8 +290,8 @@ def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
         now |= {("stage", task.task, s.stage): s.status.value for s in task.stages}
     for belief in mind.present():
         now["presence", str(belief.id)] = belief.presence.value
-    for relation in mind.relations:
-        if relation.name in MOVES and relation.truth is Truth.TRUE and len(relation.objects) == 2:
+    for relation in mind.holding(*MOVES):
+        if len(relation.objects) == 2:
             low, high = sorted(relation.objects)
             now["relation", str(low), str(high)] = relation.name
     for coupling in mind.couplings:
