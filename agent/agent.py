@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from visup.agent.act import alert_events, faults, update_alerts
 from visup.agent.behaviour import Behaviour, Outcome, Thinker
-from visup.agent.mind import Mind
+from visup.agent.mind import Mind, Zone
 from visup.agent.perceive import Slot, in_order, perceive
 from visup.agent.records import (
     Alert,
@@ -80,6 +80,7 @@ class Agent:
         behaviours: What perceives.
         thinkers: What reasons.
         actors: Actor name -> model names, known before the first frame.
+        zones: Parts of the scene that rules can name.
         observers: Told of each step.
         mind: The mental model now.
     """
@@ -88,13 +89,14 @@ class Agent:
     thinkers: Thinkers = field(default_factory=Thinkers)
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     observers: Sequence[Observer] = ()
+    zones: Sequence[Zone] = ()
     mind: Mind = field(init=False)
     directives: tuple[Directive, ...] = field(default=(), init=False)
     _slots: list[Slot] = field(init=False, repr=False)
     _alerts_opened: int = field(default=0, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.mind = Mind(actors=MappingProxyType(dict(self.actors)))
+        self.mind = Mind(actors=MappingProxyType(dict(self.actors)), zones=tuple(self.zones))
         self._slots = in_order(self.behaviours)
 
     def step(self, frame: Frame) -> Step:

@@ -55,6 +55,9 @@ class BoxSettings:
         window_s: Length of the window over which lines are fitted.
         samples: Most samples kept in the window.
         bins: Most means of neighbouring samples to which lines are fitted.
+        fit_share: How much of a fit's own deviation counts where it exceeds what `noise_px` makes:
+            from so few means it is known to a third or so only. With 5 sigmas to enter, a trend
+            must exceed 5 deviations of the noise and 3 of its own fit.
     """
 
     judge: JudgeSettings = field(default_factory=JudgeSettings)
@@ -62,6 +65,7 @@ class BoxSettings:
     window_s: float = 1.5
     samples: int = 64
     bins: int = 8
+    fit_share: float = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,15 +158,18 @@ def watch_boxes(
     gap = signed_gap(differences)
     places = boxes[:, :2] + 0.5 * boxes[:, 2:]
     times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
-    slope, sigma = _fit(np.array(times), np.stack(samples), s)
+    seconds = np.array(times)
+    slope, sigma = _fit(seconds, np.stack(samples), s)
+    # What the noise of edges makes of a trend of one coordinate, and of a gap between two edges.
+    noise = slope_noise(seconds, s.judge.noise_px)
     velocity = slope[p:].reshape(2, m).T
-    spread = sigma[p:].reshape(2, m).max(axis=0)
+    spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
     judge = s.judge
     q = quantities(boxes, differences, gap, velocity, spread, judge.noise_px)
-    state = kept.latch.state
+    state = kept.latch.leaning
     codes = np.empty((JUDGED + 1, p), dtype=np.int8)
     codes[:JUDGED] = wanted(state[:JUDGED], q, judge, s.diagonal)
-    rate, rate_sigma = slope[:p], sigma[:p]
+    rate, rate_sigma = slope[:p], np.maximum(np.sqrt(2.0) * noise, s.fit_share * sigma[:p])
     codes[APPROACH] = moving_sign(
         rate,
         state[APPROACH],
@@ -191,12 +198,11 @@ def _window(
 
 
 def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats]:
-    """Trends and their deviations, at least what the noise of boxes makes; NaN while too short."""
+    """Trends and the deviations of their fits; NaN while the window is too short."""
     if len(times) < 6 or times[-1] - times[0] < 0.6 * s.window_s:
         unknown = np.full(samples.shape[1], np.nan)
         return unknown, unknown
-    slope, sigma = theil_sen(*binned(times, samples, s.bins))
-    return slope, np.maximum(sigma, slope_noise(times, s.judge.noise_px * np.sqrt(2.0)))
+    return theil_sen(*binned(times, samples, s.bins))
 
 
 def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:

@@ -61,12 +61,14 @@ def slope_noise(times: Floats, noise: float) -> float:
     """Standard deviation of the slope of a line through samples of that noise at these times.
 
     Args:
-        times: (T,) seconds, at least two.
+        times: (T,) seconds.
         noise: Standard deviation of a sample, any unit.
 
     Returns:
-        In units per second.
+        In units per second; NaN for fewer than two samples.
     """
+    if len(times) < 2:
+        return float("nan")
     lever = times - times.mean()
     return float(noise / np.sqrt((lever * lever).sum()))
 

@@ -257,8 +257,6 @@ class Measuring:
 
     def _velocity_noise(self, h: History, mind: Mind) -> float:
         recent = h.times > mind.time - self.settings.motion_window_s
-        if np.count_nonzero(recent) < 2:
-            return float("nan")
         return slope_noise(h.times[recent], self.settings.judge.noise_px)
 
     def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:

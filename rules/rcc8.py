@@ -111,7 +111,8 @@ def outline_differences(
         a, b = regions[i[k]], regions[j[k]]
         least_a, most_a = signed_distances(a, b)
         least_b, most_b = signed_distances(b, a)
-        found[:, k] = min(least_a, least_b), most_a, most_b
+        # Outlines run through the centres of pixels: neighbours meet, though they are 1 px apart.
+        found[:, k] = min(least_a, least_b) - 1.0, most_a, most_b
     return found
 
 

@@ -168,7 +168,7 @@ class Relations:
         before = _of_these(kept, tuple(b.id for b in objects), mind.time)
         history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
         now = Measuring(s)(history, objects, mind, kept.measured)
-        wants = self._wanted(before.latch.state, history, now, objects, mind)
+        wants = self._wanted(before.latch.leaning, history, now, objects, mind)
         latch = step(before.latch, wants, mind.time, self._durations())
         held = np.stack([from_signs(latch.state[ORDER]), from_outline_signs(latch.state[OUTLINE])])
         rcc8 = step(before.rcc8, held, mind.time, 0.0)

@@ -17,6 +17,7 @@ from visup.rules.presence import PresenceSettings, SeePresence
 from visup.rules.relations import Relations
 from visup.rules.safety import RuleThinker
 from visup.rules.votes import Votes, VoteSettings
+from visup.rules.zones import SeeZones, ZoneSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,7 @@ class RuleSettings:
     presence: PresenceSettings = field(default_factory=PresenceSettings)
     depth: DepthSettings = field(default_factory=DepthSettings)
     relations: RelationSettings = field(default_factory=RelationSettings)
+    zones: ZoneSettings = field(default_factory=ZoneSettings)
     coupling: CouplingSettings = field(default_factory=CouplingSettings)
     narrative: NarrativeSettings = field(default_factory=NarrativeSettings)
 
@@ -39,7 +41,8 @@ class RuleSet:
 
     Attributes:
         update: Percepts enter the mind.
-        cogitate: Presence, votes, poses, depth, relations, couplings, narrative, and rules.
+        cogitate: Presence, votes, poses, depth, relations, zones,
+            couplings, narrative, and rules.
     """
 
     update: tuple[Thinker, ...]
@@ -68,6 +71,7 @@ def default_thinkers(
             BelievePose(s.pose),
             BelieveDepth(s.depth),
             Relations(s.relations),
+            SeeZones(s.zones),
             Couple(replace(s.coupling, relations=s.relations)),
             TellRelations(s.narrative),
             RuleThinker(shipped_rules() if rules is None else rules),

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from visup.agent import Frame, Mind, ObjectBelief
+from visup.agent import Frame, Mind, ObjectBelief, Relation, RelationTable
 from visup.agent.agent import Agent, Step
 from visup.narrative import line
 from visup.wording import worded_once

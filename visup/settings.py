@@ -24,6 +24,7 @@ class WatchSettings:
         every: Use every n-th frame.
         fps: Frame rate to assume where the source has none, or None.
         fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
+        zones: Settings file with zones that rules can name, or None.
     """
 
     source: str
@@ -36,6 +37,7 @@ class WatchSettings:
     every: int = 1
     fps: float | None = None
     fov_vertical_deg: float | None = None
+    zones: Path | None = None
 
     def __post_init__(self) -> None:
         if self.every < 1:

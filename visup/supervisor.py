@@ -21,6 +21,7 @@ from visup.settings import WatchSettings
 from visup.tasks import load_task
 from visup.tasks.structure import task_actors
 from visup.tasks.supervise import finish, task_thinker
+from visup.zones import load_zones
 
 if TYPE_CHECKING:
     from visup.tasks.tree import Task
@@ -41,7 +42,7 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
     """An agent that supervises as the settings say.
 
     Raises:
-        VisupError: A task, rules file, model database or behaviour is not as it should be, or an actor is
+        VisupError: A task, rules file, zones file, model database or behaviour is not as it should be, or an actor is
             bound that no task has or to a model that the database lacks.
     """
     tasks = [load_task(name) for name in settings.tasks]
@@ -51,6 +52,7 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
         behaviours=_behaviours(settings, database),
         thinkers=_thinkers(settings, tasks),
         actors=settings.actors,
+        zones=load_zones(settings.zones) if settings.zones else (),
         observers=observers,
     )
 

@@ -15,6 +15,7 @@ from visup.commands.watch import (
     Rules,
     Source,
     Tasks,
+    Zones,
     settings_of,
 )
 
@@ -30,12 +31,15 @@ def step(
     plugin: Plugins = None,
     fps: Fps = None,
     fov: Fov = None,
+    zones: Zones = None,
 ) -> None:
     """Step through a video and look into the agent's mind."""
     from visup.session import Session, read_commands
     from visup.supervisor import build_agent, open_video
 
-    settings = settings_of(source, task, models, rules, actor, every, behaviour, plugin, fps, fov)
+    settings = settings_of(
+        source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
+    )
     with open_video(settings) as video:
         session = Session(build_agent(settings), video)
         code = session.run(read_commands(session.words()))

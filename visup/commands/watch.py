@@ -44,6 +44,11 @@ Plugins = Annotated[
 Fps = Annotated[float | None, typer.Option(help="Frame rate, where the source has none.")]
 Fov = Annotated[float | None, typer.Option(help="Vertical field of view of the camera, degrees.")]
 
+Zones = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="File with zones that rules can name (see docs/formats.md)."),
+]
+
 
 def settings_of(
     source: str,
@@ -56,6 +61,7 @@ def settings_of(
     plugin: list[str] | None,
     fps: float | None,
     fov: float | None,
+    zones: Path | None = None,
 ) -> WatchSettings:
     """The settings of a run, from the command's options."""
     from visup.settings import WatchSettings, parse_actors
@@ -71,6 +77,7 @@ def settings_of(
         every=every,
         fps=fps,
         fov_vertical_deg=fov,
+        zones=zones,
     )
 
 
@@ -88,6 +95,7 @@ def watch(
     plugin: Plugins = None,
     fps: Fps = None,
     fov: Fov = None,
+    zones: Zones = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only the verdict.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Events as JSON, one a line.")] = False,
     video: Annotated[bool, typer.Option(help="Write the annotated video.")] = True,
@@ -96,7 +104,9 @@ def watch(
 
     Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
     """
-    settings = settings_of(source, task, models, rules, actor, every, behaviour, plugin, fps, fov)
+    settings = settings_of(
+        source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
+    )
     result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, video=video)
     raise typer.Exit(result.exit_code)
 
