@@ -112,14 +112,10 @@ class SeeZones:
     def _before(self, old: Kept, ids: tuple[int, ...], names: tuple[str, ...], now: float) -> Latch:
         if old.ids == ids and old.names == names:
             return old.latch
-        place = {
-            (z, i): n * len(old.ids) + k
-            for n, z in enumerate(old.names)
-            for k, i in enumerate(old.ids)
-        }
-        return old.latch.select(
-            np.array([place.get((z, i), -1) for z in names for i in ids], dtype=np.intp), now
-        )
+        known = ((z, i) for z in old.names for i in old.ids)
+        place = {which: k for k, which in enumerate(known)}
+        places = [place.get((z, i), -1) for z in names for i in ids]
+        return old.latch.select(np.array(places, dtype=np.intp), now)
 
     def _apart(self, zone: Zone, belief: ObjectBelief, mind: Mind) -> tuple[float, ...]:
         """Outside the zone: centre, nearest part, farthest part, depth; NaN unknown."""

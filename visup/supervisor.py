@@ -42,8 +42,8 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
     """An agent that supervises as the settings say.
 
     Raises:
-        VisupError: A task, rules file, zones file, model database or behaviour is not as it should be, or an actor is
-            bound that no task has or to a model that the database lacks.
+        VisupError: A task, rules file, zones file, model database or behaviour is not as it should
+            be, or an actor is bound that no task has or to a model that the database lacks.
     """
     tasks = [load_task(name) for name in settings.tasks]
     database = ModelDatabase.open(settings.models) if settings.models else None

@@ -76,7 +76,7 @@ SCENES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
 """Pairs of boxes at rest: one easy, the others where a relation is about to be another."""
 
 
-def speed(count: int, seed: int, frames: int = 300, rounds: int = 5) -> dict[str, float]:
+def speed(count: int, seed: int, frames: int = 160, rounds: int = 20) -> dict[str, float]:
     """Frames per second with thresholds and without, the best of several rounds in turn."""
     boxes = moving_boxes(count, frames, seed)
     ids = tuple(range(count))
