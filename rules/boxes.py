@@ -40,6 +40,7 @@ from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
 from visup.rules.pairs import carried, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import CONVERSE, edge_differences, from_signs
+from visup.rules.smooth import smoothed
 
 APPROACH = JUDGED
 APPROACH_NAMES = ("converging", "keeping_distance", "diverging")
@@ -74,8 +75,10 @@ class Boxes:
 
     Attributes:
         ids: (M,) increasing.
+        time: Seconds of the last frame.
         times: Seconds of the samples.
         samples: One row for each: gaps of the P pairs, then x and y of the M centres, pixels.
+        smooth: (M, 4) the boxes, smoothed; what states are judged by.
         latch: (JUDGED + 1, P) states; the last row is the approach.
         gap: (P,) pixels, negative the depth of overlap.
         rate: (P,) approach rate: trend of the gap, pixels per second, negative when closing.
@@ -84,8 +87,10 @@ class Boxes:
     """
 
     ids: tuple[int, ...] = ()
+    time: float = 0.0
     times: tuple[float, ...] = ()
     samples: tuple[Floats, ...] = ()
+    smooth: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     latch: Latch = field(default_factory=lambda: unknown_latch((JUDGED + 1, 0), 0.0))
     gap: Floats = field(default_factory=lambda: np.zeros(0))
     rate: Floats = field(default_factory=lambda: np.zeros(0))
@@ -156,6 +161,7 @@ def watch_boxes(
     m, p = len(ids), len(pairs(len(ids))[0])
     differences = edge_differences(boxes)
     gap = signed_gap(differences)
+    smooth = smoothed(kept.smooth, boxes, now - kept.time, 6.0 * s.judge.noise_px)
     places = boxes[:, :2] + 0.5 * boxes[:, 2:]
     times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
     seconds = np.array(times)
@@ -165,8 +171,8 @@ def watch_boxes(
     velocity = slope[p:].reshape(2, m).T
     spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
     judge = s.judge
-    q = quantities(boxes, differences, gap, velocity, spread, judge.noise_px)
-    state = kept.latch.leaning
+    q = quantities(smooth, velocity, spread, judge.noise_px)
+    state = kept.latch.state
     codes = np.empty((JUDGED + 1, p), dtype=np.int8)
     codes[:JUDGED] = wanted(state[:JUDGED], q, judge, s.diagonal)
     rate, rate_sigma = slope[:p], np.maximum(np.sqrt(2.0) * noise, s.fit_share * sigma[:p])
@@ -178,7 +184,7 @@ def watch_boxes(
     )
     lasts = np.append(least_durations(judge), [[judge.motion_minimum_s]], axis=0)
     latch = step(kept.latch, codes, now, lasts)
-    return Boxes(ids, times, samples, latch, gap, rate, rate_sigma, velocity)
+    return Boxes(ids, now, times, samples, smooth, latch, gap, rate, rate_sigma, velocity)
 
 
 DEFAULT = BoxSettings()
@@ -213,7 +219,9 @@ def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
         [numbers, np.where(rows < 0, -1, p + rows), np.where(rows < 0, -1, p + m + rows)]
     )
     samples = tuple(np.where(at < 0, np.nan, np.append(row, np.nan)[at]) for row in before.samples)
-    return Boxes(ids, before.times, samples, before.latch.select(numbers, now))
+    smooth = np.append(before.smooth, np.full((1, 4), np.nan), axis=0)[rows]
+    latch = before.latch.select(numbers, now)
+    return Boxes(ids, before.time, before.times, samples, smooth, latch)
 
 
 def _name(names: tuple[str, ...], code: int) -> str | None:

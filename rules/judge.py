@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from visup.rules.direction import directions
-from visup.rules.distance import classes, sizes
+from visup.rules.distance import classes, signed_gap, sizes
 from visup.rules.latch import UNKNOWN, WITHIN, Codes, Floats, hold_sign
 from visup.rules.pairs import pairs
 from visup.rules.qtc import components
+from visup.rules.rcc8 import edge_differences
 
 ORDER, DIRECTION, DISTANCE = slice(0, 8), 8, 9
 AWAY, SIDE = slice(10, 12), slice(12, 14)
@@ -82,8 +83,6 @@ class Quantities:
 
 def quantities(
     boxes: Floats,
-    differences: Floats,
-    gap: Floats,
     velocities: Floats,
     spread: Floats,
     noise_px: float,
@@ -92,12 +91,11 @@ def quantities(
 
     Args:
         boxes: (M, 4) x, y, width, height, pixels; NaN for what is not seen.
-        differences: (8, P) of their edges, pixels; see `edge_differences`.
-        gap: (P,) of the boxes, pixels; see `signed_gap`.
         velocities: (M, 2) pixels per second; NaN unknown.
         spread: (M,) standard deviation of a component.
         noise_px: Of an edge, pixels.
     """
+    differences = edge_differences(boxes)
     places = boxes[:, :2] + 0.5 * boxes[:, 2:]
     speeds, length = components(places, velocities)
     # The line between the places is noisy too, the more so the shorter it is.
@@ -105,7 +103,7 @@ def quantities(
     speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
     both = np.array(pairs(len(boxes)) * 2)
     sigma = np.sqrt((spread * spread)[both] + speed[both] * turn)
-    return Quantities(differences, places, gap, sizes(boxes), speeds, sigma)
+    return Quantities(differences, places, signed_gap(differences), sizes(boxes), speeds, sigma)
 
 
 def wanted(before: Codes, q: Quantities, s: JudgeSettings, diagonal: float) -> Codes:

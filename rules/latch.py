@@ -37,15 +37,6 @@ class Latch:
     pending: Codes
     pending_since: Floats
 
-    @property
-    def leaning(self) -> Codes:
-        """The states, and where they are unknown those that want to be believed.
-
-        Thresholds with hysteresis look at these: else noise about the threshold could keep a state
-        from ever being known.
-        """
-        return np.where(self.state == UNKNOWN, self.pending, self.state)
-
     def select(self, places: NDArray[np.intp], now: float) -> Latch:
         """The latch of other pairs.
 

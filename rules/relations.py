@@ -42,7 +42,7 @@ from visup.agent import (
 )
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
-from visup.rules.distance import CLASS_NAMES, signed_gap
+from visup.rules.distance import CLASS_NAMES
 from visup.rules.fit import binned, theil_sen
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.history import History, covered, sample
@@ -53,7 +53,6 @@ from visup.rules.judge import (
     JUDGED,
     ORDER,
     SIDE,
-    Quantities,
     least_durations,
     quantities,
     wanted,
@@ -64,11 +63,11 @@ from visup.rules.pairs import carried, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import (
     CONVERSE,
-    edge_differences,
     from_outline_signs,
     from_signs,
     outline_differences,
 )
+from visup.rules.smooth import smoothed
 from visup.rules.tracks import merged_pairs
 
 RELATIONS = "rules.relations"
@@ -103,6 +102,27 @@ ROWS = JUDGED + 7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Smooth:
+    """Places of objects, smoothed a little; see `smooth.py`.
+
+    Attributes:
+        time: Seconds of the last step.
+        boxes: (M, 4) x, y, width, height, pixels.
+        gap: (P,) of the outlines, pixels.
+        outlines: (3, P) pixels; see `outline_differences`.
+    """
+
+    time: float
+    boxes: Floats
+    gap: Floats
+    outlines: Floats
+
+
+def _no_smooth() -> Smooth:
+    return Smooth(0.0, np.zeros((0, 4)), np.zeros(0), np.zeros((3, 0)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Kept:
     """What the relations remember from step to step.
 
@@ -111,12 +131,14 @@ class Kept:
         measured: Quantities of the last step.
         latch: (ROWS, P) states of the pairs of the history's objects.
         rcc8: (2, P) RCC-8 of boxes and of outlines, which follow from some of these states.
+        smooth: What states of place are judged by.
     """
 
     history: History = field(default_factory=History)
     measured: Measured = field(default_factory=Measured)
     latch: Latch = field(default_factory=lambda: unknown_latch((ROWS, 0), 0.0))
     rcc8: Latch = field(default_factory=lambda: unknown_latch((2, 0), 0.0))
+    smooth: Smooth = field(default_factory=lambda: _no_smooth())
 
 
 def measured(mind: Mind) -> Measured:
@@ -168,11 +190,12 @@ class Relations:
         before = _of_these(kept, tuple(b.id for b in objects), mind.time)
         history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
         now = Measuring(s)(history, objects, mind, kept.measured)
-        wants = self._wanted(before.latch.leaning, history, now, objects, mind)
+        smooth = self._smooth(before.smooth, now, objects, mind)
+        wants = self._wanted(before.latch.state, history, now, smooth, mind)
         latch = step(before.latch, wants, mind.time, self._durations())
         held = np.stack([from_signs(latch.state[ORDER]), from_outline_signs(latch.state[OUTLINE])])
         rcc8 = step(before.rcc8, held, mind.time, 0.0)
-        kept = Kept(history, now, latch, rcc8)
+        kept = Kept(history, now, latch, rcc8, smooth)
         table = RelationTable(now.ids, self._columns(kept, mind))
         return Outcome(replace(mind, relations=table).remember(RELATIONS, kept))
 
@@ -188,15 +211,14 @@ class Relations:
         before: Codes,
         h: History,
         now: Measured,
-        objects: tuple[ObjectBelief, ...],
+        smooth: Smooth,
         mind: Mind,
     ) -> Codes:
         s, diagonal = self.settings, scale(mind.frame_size)
-        i, j = pairs(len(objects))
+        i, j = pairs(len(now.ids))
         codes = np.empty((ROWS, len(i)), dtype=np.int8)
-        codes[:JUDGED] = wanted(
-            before[:JUDGED], self._quantities(now, objects, mind), s.judge, diagonal
-        )
+        q = quantities(smooth.boxes, now.velocity, now.velocity_sigma, s.judge.noise_px)
+        codes[:JUDGED] = wanted(before[:JUDGED], q, s.judge, diagonal)
         image = wanted_trend(
             now.rate[i, j],
             now.rate_sigma[i, j],
@@ -207,9 +229,10 @@ class Relations:
         )
         codes[DEPTH] = self._depth_trend(h)
         codes[TREND] = with_depth(image, codes[DEPTH])
-        codes[TOUCH] = self._wanted_touch(now, before[TOUCH], diagonal)
+        codes[TOUCH] = self._wanted_touch(now, smooth.gap, before[TOUCH], diagonal)
         codes[TOGETHER] = self._wanted_together(now, before[TOGETHER], diagonal)
-        codes[OUTLINE] = self._wanted_outlines(now, before[OUTLINE], objects, mind)
+        level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
+        codes[OUTLINE] = hold_sign(smooth.outlines, before[OUTLINE], *level)
         for k in _numbers(h.ids, (c.objects for c in mind.couplings)):
             # One body that turns changes its outline; it comes apart when its parts no longer touch.
             if codes[TOUCH, k] == 1 and codes[TREND, k] == DIVERGING:
@@ -218,16 +241,26 @@ class Relations:
             codes[TOUCH, k], codes[TREND, k] = 1, UNKNOWN
         return codes
 
-    def _quantities(
-        self, now: Measured, objects: tuple[ObjectBelief, ...], mind: Mind
-    ) -> Quantities:
-        """Boxes as they are, or were until a moment ago; outlines' velocities."""
+    def _smooth(
+        self, before: Smooth, now: Measured, objects: tuple[ObjectBelief, ...], mind: Mind
+    ) -> Smooth:
+        """Boxes as they are, or were until a moment ago; gaps; outlines that may meet."""
+        s, seconds = self.settings, mind.time - before.time
         boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
-        boxes[[mind.time - b.last_seen > self.settings.hold_s for b in objects]] = np.nan
-        differences = edge_differences(boxes)
-        gap = signed_gap(differences)
-        noise = self.settings.judge.noise_px
-        return quantities(boxes, differences, gap, now.velocity, now.velocity_sigma, noise)
+        boxes[[mind.time - b.last_seen > s.hold_s for b in objects]] = np.nan
+        jump = 6.0 * s.judge.noise_px
+        i, j = pairs(len(objects))
+        gap = smoothed(before.gap, now.gap[i, j], seconds, jump * np.sqrt(2.0))
+        diagonal = scale(mind.frame_size)
+        near = gap <= 2.0 * s.judge.level_enter * diagonal
+        regions = [b.region for b in objects]
+        apart = outline_differences(regions, near, ~np.isnan(gap), 0.05 * diagonal)
+        return Smooth(
+            mind.time,
+            smoothed(before.boxes, boxes, seconds, jump),
+            gap,
+            smoothed(before.outlines, apart, seconds, jump * np.sqrt(2.0)),
+        )
 
     def _depth_trend(self, h: History) -> Codes:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
@@ -249,11 +282,10 @@ class Relations:
         codes[at] = found
         return codes
 
-    def _wanted_touch(self, now: Measured, before: Codes, diagonal: float) -> Codes:
+    def _wanted_touch(self, now: Measured, gap: Floats, before: Codes, diagonal: float) -> Codes:
         """By the gap, and not where depth tells the two apart."""
         s = self.settings
         i, j = pairs(len(now.ids))
-        gap = now.gap[i, j]
         wanted = (gap <= _limit(before, s.touch_enter, s.touch_exit) * diagonal).astype(np.int8)
         first, second = now.depth[i], now.depth[j]
         apart = np.abs(first - second) / np.minimum(first, second)
@@ -273,17 +305,6 @@ class Relations:
         wanted = (rest & moves).astype(np.int8)
         wanted[np.isnan(now.relative_speed[i, j])] = UNKNOWN
         return wanted
-
-    def _wanted_outlines(
-        self, now: Measured, before: Codes, objects: tuple[ObjectBelief, ...], mind: Mind
-    ) -> Codes:
-        s, diagonal = self.settings.judge, scale(mind.frame_size)
-        i, j = pairs(len(objects))
-        enter, leave = s.level_enter * diagonal, s.level_exit * diagonal
-        gap = now.gap[i, j]
-        regions = [b.region for b in objects]
-        apart = outline_differences(regions, gap <= enter, ~np.isnan(gap), 0.05 * diagonal)
-        return hold_sign(apart, before, enter, leave)
 
     def _columns(self, kept: Kept, mind: Mind) -> tuple[Column, ...]:
         now, latch = kept.measured, kept.latch
@@ -345,8 +366,15 @@ def _of_these(kept: Kept, ids: tuple[int, ...], now: float) -> Kept:
     """What was kept, of other objects."""
     if kept.history.ids == ids:
         return kept
-    numbers = carried(kept.history.ids, ids)[1]
-    return replace(kept, latch=kept.latch.select(numbers, now), rcc8=kept.rcc8.select(numbers, now))
+    rows, numbers = carried(kept.history.ids, ids)
+    smooth = Smooth(
+        kept.smooth.time,
+        np.append(kept.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
+        np.append(kept.smooth.gap, np.nan)[numbers],
+        np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1)[:, numbers],
+    )
+    latch, rcc8 = kept.latch.select(numbers, now), kept.rcc8.select(numbers, now)
+    return replace(kept, latch=latch, rcc8=rcc8, smooth=smooth)
 
 
 def _limit(before: Codes, enter: float, leave: float) -> Floats:

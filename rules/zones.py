@@ -98,7 +98,7 @@ class SeeZones:
         band = np.full(flat.shape, s.enter * scale(mind.frame_size))
         spread = [s.depth_sigmas * (b.depth_sigma or 0.0) for b in objects]
         band[3] = np.tile(spread, len(names))
-        wanted = edge_sign(flat, latch.leaning, band)
+        wanted = edge_sign(flat, latch.state, band)
         latch = step(latch, wanted, mind.time, s.minimum_s)
         kept = Kept(ids, names, latch, apart[:, :, 0])
         told = tuple(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-RELATION_KEYS = ("fps", "plain_fps", "ratio", "changes", "seen_s")
+RELATION_KEYS = ("fps", "fps_cpu", "plain_fps", "ratio", "changes", "seen_s")
 
 
 def relations(

@@ -35,7 +35,8 @@ def evaluate_relations(
         progress: Told what is being done.
 
     Returns:
-        `items`: for each number of objects `fps`, `plain_fps` (RCC-8, QTC-B, distance and approach
+        `items`: for each number of objects `fps`, `fps_cpu` (by processor time, where others share the
+        machine), `plain_fps` (RCC-8, QTC-B, distance and approach
         in plain NumPy, without noise thresholds, in the same run) and `ratio`; for each scene at
         rest `changes`; `drift` with `seen_s`. `total`: `rcc8_wrong`, `qtc_wrong` of `draws`,
         `changes` of all scenes, `seen_s`.
@@ -80,21 +81,22 @@ def speed(count: int, seed: int, frames: int = 160, rounds: int = 20) -> dict[st
     """Frames per second with thresholds and without, the best of several rounds in turn."""
     boxes = moving_boxes(count, frames, seed)
     ids = tuple(range(count))
-    ours, plain = [], []
+    ours, alone, plain = [], [], []
     for _ in range(rounds):
         kept = Boxes()
         for k in range(60):
             kept = watch_boxes(kept, ids, boxes[k], k / FPS)
-        begin = time.perf_counter()
+        begin, busy = time.perf_counter(), time.process_time()
         for k in range(60, frames):
             kept = watch_boxes(kept, ids, boxes[k], k / FPS)
         ours.append(time.perf_counter() - begin)
+        alone.append(time.process_time() - busy)
         begin = time.perf_counter()
         for k in range(60, frames):
             plain_relations(boxes[k - 1], boxes[k], 1.0 / FPS)
         plain.append(time.perf_counter() - begin)
-    fps, plain_fps = (frames - 60) / min(ours), (frames - 60) / min(plain)
-    return {"fps": fps, "plain_fps": plain_fps, "ratio": fps / plain_fps}
+    fps, cpu, plain_fps = ((frames - 60) / min(t) for t in (ours, alone, plain))
+    return {"fps": fps, "fps_cpu": cpu, "plain_fps": plain_fps, "ratio": fps / plain_fps}
 
 
 def moving_boxes(count: int, frames: int, seed: int, noise: float = 0.5) -> Floats:
