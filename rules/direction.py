@@ -50,8 +50,7 @@ def directions(
     angle = np.arctan2(dy, dx)
     cone = np.pi / 4.0
     code = np.rint(angle / cone) % 8.0
-    off = np.abs(angle - before * cone)
-    off = np.minimum(off, 2.0 * np.pi - off)
+    off = np.abs((angle - before * cone + np.pi) % (2.0 * np.pi) - np.pi)
     directed = (before >= 0) & (before < AT_PLACE)
     slack_now = np.maximum(slack, 4.0 * np.sqrt(2.0) * noise / np.maximum(length, 1e-9))
     code = np.where(directed & (off <= 0.5 * cone + slack_now), before, code)

@@ -36,6 +36,7 @@ from visup.rules.latch import (
     unknown_latch,
 )
 from visup.rules.measure import scale
+from visup.rules.smooth import smoothed
 
 ZONES = "rules.zones"
 QUESTIONS = ("inside", "reaching", "within")
@@ -70,12 +71,16 @@ class Kept:
         latch: (4, Z * M) states, zone by zone: the signs of how far centre, nearest and farthest
             part are outside the polygon, and of how far the depth is outside its range.
         outside: (Z, M) pixels of the centre, negative inside.
+        smooth: (4, Z * M) how far outside, smoothed; what states are judged by.
+        time: Seconds of the last step.
     """
 
     ids: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
     latch: Latch = field(default_factory=lambda: unknown_latch((4, 0), 0.0))
     outside: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    smooth: Floats = field(default_factory=lambda: np.zeros((4, 0)))
+    time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,16 +96,21 @@ class SeeZones:
         s, objects = self.settings, mind.present()
         old: Kept = mind.memory.get(ZONES, Kept())
         ids, names = tuple(b.id for b in objects), tuple(z.name for z in mind.zones)
-        latch = self._before(old, ids, names, mind.time)
+        latch, smooth = self._before(old, ids, names, mind.time)
         apart = np.array([[self._apart(z, b, mind) for b in objects] for z in mind.zones])
         apart = apart.reshape(len(names), len(ids), 4)
         flat = apart.reshape(-1, 4).T
         band = np.full(flat.shape, s.enter * scale(mind.frame_size))
         spread = [s.depth_sigmas * (b.depth_sigma or 0.0) for b in objects]
         band[3] = np.tile(spread, len(names))
+        jump = 2.0 * s.enter * scale(mind.frame_size)
+        # Depth was smoothed before, and is -inf where a zone has no range.
+        flat = np.append(
+            smoothed(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
+        )
         wanted = edge_sign(flat, latch.state, band)
         latch = step(latch, wanted, mind.time, s.minimum_s)
-        kept = Kept(ids, names, latch, apart[:, :, 0])
+        kept = Kept(ids, names, latch, apart[:, :, 0], flat, mind.time)
         told = tuple(
             _relation(kept, question, i, name)
             for name in names
@@ -109,13 +119,16 @@ class SeeZones:
         )
         return Outcome(replace(mind, relations=mind.relations + told).remember(ZONES, kept))
 
-    def _before(self, old: Kept, ids: tuple[int, ...], names: tuple[str, ...], now: float) -> Latch:
+    def _before(
+        self, old: Kept, ids: tuple[int, ...], names: tuple[str, ...], now: float
+    ) -> tuple[Latch, Floats]:
         if old.ids == ids and old.names == names:
-            return old.latch
+            return old.latch, old.smooth
         known = ((z, i) for z in old.names for i in old.ids)
         place = {which: k for k, which in enumerate(known)}
-        places = [place.get((z, i), -1) for z in names for i in ids]
-        return old.latch.select(np.array(places, dtype=np.intp), now)
+        places = np.array([place.get((z, i), -1) for z in names for i in ids], dtype=np.intp)
+        smooth = np.append(old.smooth, np.full((4, 1), np.nan), axis=1)[:, places]
+        return old.latch.select(places, now), smooth
 
     def _apart(self, zone: Zone, belief: ObjectBelief, mind: Mind) -> tuple[float, ...]:
         """Outside the zone: centre, nearest part, farthest part, depth; NaN unknown."""
