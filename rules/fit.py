@@ -143,24 +143,62 @@ def velocity(
         (M, 2) pixels per second; NaN where fewer than four samples or three directions serve, or
         where the outline does not move as one, as when one body passes before another.
     """
+    slopes, usable = reach_slopes(times, support, free)
+    return common_motion(slopes, usable, misfit)
+
+
+def reach_slopes(
+    times: Floats, support: Floats, free: NDArray[np.bool_]
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """How fast outlines' reach changes: (M, 16) pixels per second, and where that is known.
+
+    Args:
+        times: (T,) seconds.
+        support: (T, M, 16) pixels, NaN where a body is not seen.
+        free: (T, M, 16) bool, clear of the border.
+    """
     good = np.isfinite(support) & free
+    if good.all() and len(times) >= 4:
+        centred = times - times.mean()
+        weights = centred / max(float((centred**2).sum()), 1e-12)
+        slopes = np.tensordot(weights, support, axes=1)
+        return slopes, np.ones(slopes.shape, dtype=bool)
     count = good.sum(axis=0)
     usable = (count >= 4) & (count >= 0.5 * len(times))
     values = np.where(good, support, 0.0)
     n = np.maximum(count, 1)
     t = np.where(good, times[:, None, None], 0.0)
-    centred = np.where(good, times[:, None, None] - t.sum(axis=0) / n, 0.0)
-    slopes = (centred * values).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-12)
+    offset = np.where(good, times[:, None, None] - t.sum(axis=0) / n, 0.0)
+    slopes = (offset * values).sum(axis=0) / np.maximum((offset**2).sum(axis=0), 1e-12)
+    return slopes, usable
+
+
+_X, _Y = DIRECTIONS.T
+_SQUARES = np.stack([_X * _X, _X * _Y, _Y * _Y], axis=1)
+
+
+def common_motion(slopes: Floats, usable: NDArray[np.bool_], misfit: float = np.inf) -> Floats:
+    """The velocity that explains best how the reach of outlines changes; see `velocity`.
+
+    Args:
+        slopes: (M, 16) pixels per second.
+        usable: (M, 16) bool.
+        misfit: As of `velocity`.
+
+    Returns:
+        (M, 2) pixels per second; NaN where nothing explains it.
+    """
     weight = usable.astype(float)
-    enough = usable.sum(axis=1) >= 3
-    found = np.zeros((support.shape[1], 2))
+    count = usable.sum(axis=1)
+    found = np.zeros((len(slopes), 2))
     for _ in range(5):
-        a = np.einsum("mk,ki,kj->mij", weight, DIRECTIONS, DIRECTIONS) + 1e-9 * np.eye(2)
-        b = np.einsum("mk,mk,ki->mi", weight, slopes, DIRECTIONS)
-        found = np.linalg.solve(a, b[..., None])[..., 0]
+        # Normal equations of two unknowns, solved by hand for all bodies at once.
+        xx, xy, yy = (weight @ _SQUARES).T + np.array([[1e-9], [0.0], [1e-9]])
+        bx, by = ((weight * slopes) @ DIRECTIONS).T
+        determinant = xx * yy - xy * xy
+        found = np.stack([yy * bx - xy * by, xx * by - xy * bx], axis=1) / determinant[:, None]
         off = np.abs(slopes - found @ DIRECTIONS.T)
         weight = usable / np.maximum(off, 0.3)
-    off = (np.abs(slopes - found @ DIRECTIONS.T) * usable).sum(axis=1)
-    off /= np.maximum(usable.sum(axis=1), 1)
-    as_one = off <= np.maximum(misfit, np.linalg.norm(found, axis=1) / 3.0)
-    return np.where((enough & as_one)[:, None], found, np.nan)
+    mean_off = (off * usable).sum(axis=1) / np.maximum(count, 1)
+    as_one = mean_off <= np.maximum(misfit, np.hypot(*found.T) / 3.0)
+    return np.where(((count >= 3) & as_one)[:, None], found, np.nan)

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief
-from visup.rules.fit import binned, slope_noise, theil_sen, velocity
+from visup.rules.distance import signed_gap
+from visup.rules.fit import binned, common_motion, reach_slopes, slope_noise, theil_sen
 from visup.rules.geometry import Floats, outline_gap
 from visup.rules.history import History, covered
 from visup.rules.judge import JudgeSettings
+from visup.rules.pairs import pairs, square
 from visup.rules.parting import parting_speed
+from visup.rules.rcc8 import edge_differences
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +196,7 @@ class Measuring:
         """
         m = len(objects)
         slope, sigma = np.full((m, m), np.nan), np.full((m, m), np.nan)
-        i, j = np.triu_indices(m, 1)
+        i, j = pairs(m)
         if covered(h, self.settings.window_s) and len(i):
             slope[i, j], sigma[i, j] = self._trend(h.times, h.separation[:, i, j], mind)
             slope[j, i], sigma[j, i] = slope[i, j], sigma[i, j]
@@ -268,36 +271,32 @@ class Measuring:
         recent = h.times > mind.time - self.settings.motion_window_s
         times, support, free = h.times[recent], h.support[recent], h.free[recent]
         half = len(times) // 2
-        return (
-            velocity(times, support, free, misfit),
-            velocity(times[:half], support[:half], free[:half], misfit),
-            velocity(times[half:], support[half:], free[half:], misfit),
+        spans = (slice(None), slice(None, half), slice(half, None))
+        fits = [reach_slopes(times[p], support[p], free[p]) for p in spans]
+        found = common_motion(
+            np.concatenate([slopes for slopes, _ in fits]),
+            np.concatenate([usable for _, usable in fits]),
+            misfit,
         )
+        return found[:m], found[m : 2 * m], found[2 * m :]
 
     def _gaps(
         self, objects: tuple[ObjectBelief, ...], h: History, mind: Mind, before: Measured
     ) -> Floats:
         """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
-        gaps = np.full((len(objects), len(objects)), np.nan)
-        for i, a in enumerate(objects):
-            for j in range(i + 1, len(objects)):
-                b = objects[j]
-                unseen = mind.time - min(a.last_seen, b.last_seen)
-                if unseen == 0.0:
-                    gaps[i, j] = gaps[j, i] = self._gap(a, b, h, (i, j), mind)
-                elif unseen <= self.settings.hold_s:
-                    gaps[i, j] = gaps[j, i] = before.pair("gap", a.id, b.id)
-        return gaps
-
-    def _gap(
-        self, a: ObjectBelief, b: ObjectBelief, h: History, at: tuple[int, int], mind: Mind
-    ) -> float:
-        near = 0.05 * scale(mind.frame_size)
-        gap = outline_gap(a.region, b.region, near)
-        if gap is not None:
-            return gap
-        apart = float(h.separation[-1][at]) if len(h.times) else np.nan
-        return max(near, apart) if np.isfinite(apart) else np.nan
+        m, near = len(objects), 0.05 * scale(mind.frame_size)
+        i, j = pairs(m)
+        unseen = np.array([mind.time - b.last_seen for b in objects])
+        longest = np.maximum(unseen[i], unseen[j]) if m else np.zeros(0)
+        boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
+        apart = h.separation[-1][i, j] if len(h.times) else np.full(len(i), np.nan)
+        found = np.where(longest == 0.0, np.maximum(near, apart), np.nan)
+        for k in np.flatnonzero((longest == 0.0) & (signed_gap(edge_differences(boxes)) <= near)):
+            gap = outline_gap(objects[i[k]].region, objects[j[k]].region, near)
+            found[k] = found[k] if gap is None else gap
+        for k in np.flatnonzero((longest > 0.0) & (longest <= self.settings.hold_s)):
+            found[k] = before.pair("gap", objects[i[k]].id, objects[j[k]].id)
+        return square(found, m)
 
 
 def at_rest(now: Measured, settings: RelationSettings, diagonal: float) -> NDArray[np.bool_]:
