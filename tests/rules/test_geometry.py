@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from tests.rules.scenes import SIZE, box_region
+from visup.agent import Region
+from visup.evaluation.relation_oracles import rcc8_by_definition
 from visup.rules.geometry import (
     DIRECTIONS,
     RCC8,
@@ -16,32 +19,11 @@ from visup.rules.geometry import (
     reach,
     shared_pixels,
 )
-from visup.rules.rcc8 import rcc8
+from visup.rules.latch import UNKNOWN, hold_sign
+from visup.rules.rcc8 import from_outline_signs, outline_differences, rcc8
 
 some = settings(max_examples=80, deadline=None)
 rect = st.tuples(st.integers(0, 60), st.integers(0, 60), st.integers(2, 40), st.integers(2, 40))
-
-
-def rcc8_by_definition(a: tuple[int, ...], b: tuple[int, ...]) -> str:
-    """From interiors and boundaries of closed boxes, point by point on a half-pixel grid."""
-
-    def points(r: tuple[int, ...]) -> tuple[set[tuple[int, int]], set[tuple[int, int]]]:
-        x, y, w, h = (2 * v for v in r)
-        closed = {(i, j) for i in range(x, x + w + 1) for j in range(y, y + h + 1)}
-        inner = {(i, j) for i in range(x + 1, x + w) for j in range(y + 1, y + h)}
-        return closed, inner
-
-    (ca, ia), (cb, ib) = points(a), points(b)
-    if not ca & cb:
-        return "disconnected"
-    if not ia & ib:
-        return "externally_connected"
-    if ca == cb:
-        return "equal"
-    for one, other, inner, end in ((ca, cb, ib, ""), (cb, ca, ia, "_inverse")):
-        if one <= other:
-            return ("non_" if one <= inner else "") + "tangential_proper_part" + end
-    return "partially_overlapping"
 
 
 @settings(max_examples=60, deadline=None)
@@ -123,3 +105,56 @@ def test_moved_moves_all_of_a_region() -> None:
     assert there.bbox == (35, 37, 20, 10)
     assert there.centroid == (region.centroid[0] + 5, region.centroid[1] - 3)
     assert np.allclose(there.contour - region.contour, [5, -3])
+
+
+def by_masks(a: Region, b: Region, level: int) -> str:
+    """RCC-8 of two masks by shifting them a few pixels: what is level within `level` px is level."""
+    one, two = (r.full_mask((120, 120)) for r in (a, b))
+    wide = [binary_dilation(m, iterations=level) for m in (one, two)]
+    thin = [binary_erosion(m, iterations=level) for m in (one, two)]
+    if not (wide[0] & two).any():
+        return "disconnected"
+    a_in, b_in = not (one & ~wide[1]).any(), not (two & ~wide[0]).any()
+    if a_in and b_in:
+        return "equal"
+    if a_in or b_in:
+        inner = not (one & ~thin[1]).any() if a_in else not (two & ~thin[0]).any()
+        return ("non_" if inner else "") + "tangential_proper_part" + ("" if a_in else "_inverse")
+    return "externally_connected" if not (thin[0] & two).any() else "partially_overlapping"
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        ((10, 10, 30, 30), (60, 10, 30, 30)),
+        ((10, 10, 30, 30), (40, 12, 30, 30)),
+        ((10, 10, 30, 30), (30, 20, 30, 40)),
+        ((10, 10, 40, 40), (10, 10, 40, 40)),
+        ((10, 20, 15, 15), (10, 10, 50, 50)),
+        ((25, 25, 15, 15), (10, 10, 50, 50)),
+        ((10, 10, 60, 20), (30, 2, 18, 60)),  # a cross
+    ],
+)
+def test_rcc8_of_outlines_is_that_of_masks(a: tuple[int, ...], b: tuple[int, ...]) -> None:
+    rects = [(float(r[0]), float(r[1]), float(r[2]), float(r[3])) for r in (a, b)]
+    regions = [box_region(n, rect) for n, rect in enumerate(rects)]
+    one, two = (r for r in regions if r is not None)
+    for first, second in ((one, two), (two, one)):
+        apart = outline_differences((first, second), np.ones(1, bool), np.ones(1, bool), 40.0)
+        signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
+        assert RCC8[from_outline_signs(signs)[0]] == by_masks(first, second, 2)
+
+
+def test_outlines_of_an_l_hold_a_box_in_their_corner_that_their_boxes_do_not() -> None:
+    """The box of an L covers what the L does not."""
+    frame = np.zeros((60, 60), dtype=bool)
+    frame[:, :10] = frame[50:, :] = True
+    corner = np.array([(0, 0), (9, 0), (9, 50), (59, 50), (59, 59), (0, 59)], dtype=np.float32)
+    hook = Region(1, (20, 20, 60, 60), frame, corner + 20, (30.0, 60.0), float(frame.sum()))
+    box = box_region(2, (50, 30, 20, 20))
+    assert box is not None
+    boxes = np.array([hook.bbox, box.bbox], dtype=float)
+    assert RCC8[rcc8(boxes)[1, 0]] == "non_tangential_proper_part"
+    apart = outline_differences((hook, box), np.ones(1, bool), np.ones(1, bool), 40.0)
+    signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
+    assert RCC8[from_outline_signs(signs)[0]] == "disconnected"
