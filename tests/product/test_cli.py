@@ -126,6 +126,11 @@ def bad_behaviour(folder: Path) -> list[object]:
     return ["watch", folder / "clip.avi", "--behaviour", folder / "plugin.py"]
 
 
+def bad_zones(folder: Path) -> list[object]:
+    (folder / "bad.toml").write_text('[[zone]]\nname = "dock"\npolygon = [[0, 0], [9, 9]]\n')
+    return ["watch", folder / "clip.avi", "--zones", folder / "bad.toml"]
+
+
 def bad_every(folder: Path) -> list[object]:
     return ["watch", folder / "clip.avi", "--every", "0"]
 
@@ -160,6 +165,7 @@ def scenario_that_is_none(folder: Path) -> list[object]:
         (unknown_actor, "satellite"),
         (unknown_task, "dock"),
         (bad_rules, "bad.rules:1"),
+        (bad_zones, "the polygon has 2 corners"),
         (bad_behaviour, "plugin.py"),
         (bad_every, "--every"),
         (unknown_option, "--no-such-option"),
