@@ -41,8 +41,7 @@ class RuleSet:
 
     Attributes:
         update: Percepts enter the mind.
-        cogitate: Presence, votes, poses, depth, relations, zones,
-            couplings, narrative, and rules.
+        cogitate: Presence, votes, poses, depth, relations, zones, couplings, narrative, rules.
     """
 
     update: tuple[Thinker, ...]
