@@ -69,10 +69,9 @@ from visup.rules.rcc8 import (
 )
 from visup.rules.smooth import smoothed
 from visup.rules.tracks import merged_pairs
+from visup.rules.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES, wanted_trend, with_depth
 
 RELATIONS = "rules.relations"
-CONVERGING, KEEPING, DIVERGING = 0, 1, 2
-TREND_NAMES = ("converging", "keeping_distance", "diverging")
 DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
 TOWARDS_NAMES = ("moving_towards", "steady_to", "moving_away_from")
 SIDE_NAMES = ("moving_left_of", "", "moving_right_of")
@@ -381,54 +380,6 @@ def _limit(before: Codes, enter: float, leave: float) -> Floats:
     """Up to which value a state is begun or kept; by the middle while it is not known yet."""
     middle = 0.5 * (enter + leave)
     return np.where(before == 1, leave, np.where(before == UNKNOWN, middle, enter))
-
-
-def wanted_trend(
-    rate: Floats, sigma: Floats, before: Codes, enter: float, leave: float, sigmas: float
-) -> Codes:
-    """Which trend a rate of change stands for, with hysteresis.
-
-    Args:
-        rate: (P,) pixels per second; NaN unknown.
-        sigma: (P,) its standard deviation.
-        before: (P,) the trend believed so far.
-        enter: Rate that must be exceeded to enter a trend, pixels per second.
-        leave: Rate below which it ends.
-        sigmas: How many deviations the rate must also exceed to enter.
-
-    Returns:
-        (P,) codes; a rate between the thresholds leaves things as they are.
-    """
-    strong = np.abs(rate) > np.maximum(enter, sigmas * sigma)
-    weak = np.abs(rate) < leave
-    wanted = before.copy()
-    moving = (before == CONVERGING) | (before == DIVERGING)
-    turned = ((before == CONVERGING) & (rate > 0)) | ((before == DIVERGING) & (rate < 0))
-    # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
-    wanted[~strong & (weak | turned | ~moving)] = KEEPING
-    wanted[strong] = np.where(rate < 0, CONVERGING, DIVERGING)[strong].astype(np.int8)
-    wanted[~np.isfinite(rate)] = UNKNOWN
-    return wanted
-
-
-def with_depth(image: Codes, depth: Codes) -> Codes:
-    """Judge the trends of image distance and of depth difference together.
-
-    Args:
-        image: Codes of trends in the image.
-        depth: Codes of trends of the depth difference, UNKNOWN where depth is not known.
-
-    Returns:
-        The image's trend where the depth agrees, keeps or is unknown; the depth's where the image
-        keeps its distance; UNKNOWN where they contradict each other.
-    """
-    joined = image.copy()
-    by_depth = (image == KEEPING) & (depth != UNKNOWN)
-    joined[by_depth] = depth[by_depth]
-    against = (image == CONVERGING) & (depth == DIVERGING)
-    against |= (image == DIVERGING) & (depth == CONVERGING)
-    joined[against] = UNKNOWN
-    return joined
 
 
 def _numbers(ids: tuple[int, ...], of: Iterable[tuple[int, int]]) -> tuple[int, ...]:

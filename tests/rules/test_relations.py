@@ -8,15 +8,9 @@ import pytest
 from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Relation, Truth
-from visup.rules.relations import (
-    CONVERGING,
-    DIVERGING,
-    KEEPING,
-    measured,
-    wanted_trend,
-    with_depth,
-)
+from visup.rules.relations import measured
 from visup.rules.thinkers import default_thinkers
+from visup.rules.trend import CONVERGING, DIVERGING, KEEPING, wanted_trend, with_depth
 
 Place = Callable[[float], float]
 
