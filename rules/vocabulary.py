@@ -76,6 +76,13 @@ class Quantity:
     look: Callable[..., Floats]
     meaning: str
 
+    @property
+    def unit(self) -> str:
+        """The unit in which it is told."""
+        return {TIME: "s", LENGTH: "px", SPEED: "px/s", TURNING: "deg/s", SHARE: "%"}[
+            self.dimension
+        ]
+
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:

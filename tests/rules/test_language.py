@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from visup.agent import Severity, Truth
 from visup.agent.errors import ManyErrors, Place, RuleError
-from visup.rules.facts import QUANTITIES, RELATION_NAMES, WORDS, all_true, any_true, negated
+from visup.rules.facts import RELATION_NAMES
 from visup.rules.formula import (
     DIMENSION,
     And,
