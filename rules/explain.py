@@ -132,9 +132,11 @@ class _Reader:
         return replace(self.node(formula), text=text, parts=(), interval=(-np.inf, np.inf))
 
     def node(self, node: Node) -> Explanation:
-        term = isinstance(node, Term)
         compiler = self.values.prepared.compiler
-        place = compiler.term(node, self.scope) if term else compiler.formula(node, self.scope)
+        if isinstance(node, Term):
+            term, place = True, compiler.term(node, self.scope)
+        else:
+            term, place = False, compiler.formula(node, self.scope)
         value = self.values.at(place)
         low, high = (
             float(bound[tuple(r if n > 1 else 0 for r, n in self._indices(bound.shape))])

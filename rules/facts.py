@@ -6,13 +6,13 @@ Quantities are intervals: value +- `SIGMAS` standard deviations where the deviat
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent import Mind, ObjectBelief, Truth
+from visup.agent import Mind, ObjectBelief, Relation, Truth
 from visup.rules.geometry import RCC8
 from visup.rules.measure import Measured
 from visup.rules.relations import measured
@@ -71,34 +71,43 @@ class Facts:
             self._codes[name] = self._box(name) if name in RCC8 else self._plain(name)
         return self._codes[name]
 
-    def _plain(self, name: str) -> Codes:
-        codes = self.pairs(MAYBE)
-        if name == "coupled":
-            codes[:] = NO
-            for a, b in (c.objects for c in self.mind.couplings):
-                self._put(codes, a, b, YES)
-            return codes
+    @cached_property
+    def _told(self) -> Mapping[str, list[Relation]]:
+        """Relations between objects that are here, by name."""
+        found: dict[str, list[Relation]] = {}
         for r in self.mind.relations:
-            if r.name == name:
-                self._put(codes, *r.objects, CODE[r.truth])
+            found.setdefault(r.name, []).append(r)
+        return found
+
+    def _plain(self, name: str) -> Codes:
+        """A relation for which the order of its objects does not matter."""
+        if name == "coupled":
+            codes = self.pairs(NO)
+            self._put(codes, [(c.objects, YES) for c in self.mind.couplings])
+            return codes
+        codes = self.pairs(MAYBE)
+        self._put(codes, [(r.objects, CODE[r.truth]) for r in self._told.get(name, ())])
         np.fill_diagonal(codes, NO)
         return codes
+
+    def _put(self, codes: Codes, found: list[tuple[tuple[int, ...], int]]) -> None:
+        row = self.row
+        known = [(row[a], row[b], c) for (a, b), c in found if a in row and b in row]
+        if known:
+            i, j, values = np.array(known).T
+            codes[i, j] = codes[j, i] = values
 
     def _box(self, name: str) -> Codes:
         """One box relation is told of each pair, in the order of its ids."""
         codes, inverse = self.pairs(MAYBE), INVERSE.get(name, name)
-        for r in self.mind.relations:
-            if r.name in RCC8 and r.truth is Truth.TRUE and set(r.objects) <= self.row.keys():
+        told = (r for n in RCC8 for r in self._told.get(n, ()) if r.truth is Truth.TRUE)
+        for r in told:
+            if set(r.objects) <= self.row.keys():
                 i, j = self.row[r.objects[0]], self.row[r.objects[1]]
                 codes[i, j] = YES if r.name == name else NO
                 codes[j, i] = YES if r.name == inverse else NO
         np.fill_diagonal(codes, YES if name == "equal" else NO)
         return codes
-
-    def _put(self, codes: Codes, a: int, b: int, code: int) -> None:
-        i, j = self.row.get(a), self.row.get(b)
-        if i is not None and j is not None:
-            codes[i, j] = codes[j, i] = code
 
     @cached_property
     def measured(self) -> Measured:

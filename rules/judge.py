@@ -18,7 +18,7 @@ from visup.rules.intervals import Arrays, Box
 from visup.rules.operators import Pick
 from visup.rules.program import Compiler, Moment, Place, Program, Scope
 from visup.rules.terms import Measure
-from visup.rules.vocabulary import RULES
+from visup.rules.vocabulary import RULES, Quantity, Word
 
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
 """Intervals of what is false, unknown, true; by code + 1."""
@@ -82,9 +82,9 @@ class Values:
     def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:
         """A fact or quantity of all objects, laid along its axes."""
         fact = isinstance(node, Predicate)
-        word = RULES.words[node.name] if fact else RULES.quantities[node.name]
+        word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
         others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
-        found = word.look(self.facts, *others)
+        found: Any = word.look(self.facts, *others)
         value: Box = TRUTHS[:, found + 1] if fact else found
         if len(axes) == 2 and axes[0] > axes[1]:
             value = value.swapaxes(1, 2)

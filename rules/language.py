@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
@@ -75,7 +76,7 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         rules += found
         sound += () if reading.faults else found
     errors += [*checker.twice(rules), *(fault for rule in sound for fault in checker.rule(rule))]
-    _raise(errors)
+    raise_all(errors)
     return tuple(rules)
 
 
@@ -101,11 +102,13 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
     reading, checker = ToTree(file), Checker(text, file, vocabulary)
     found = cast("Formula", reading.transform(tree))
     errors: list[VisupError] = [checker.fault(*f) for f in reading.faults]
-    _raise(errors or list(checker.formula(found)))
+    raise_all(errors or list(checker.formula(found)))
     return found
 
 
-def _raise(errors: list[VisupError]) -> None:
+def raise_all(errors: Sequence[VisupError]) -> None:
+    """Raise what is wrong: one error as itself, several as one, none not at all."""
+    errors = list(errors)
     if len(errors) == 1:
         raise errors[0]
     if errors:

@@ -52,7 +52,7 @@ class Monitor:
         def look(node: Predicate | Measure, axes: tuple[int, ...]) -> Interval:
             value = values.get(node.name)
             if value.__class__ is float:
-                return UNKNOWN if isnan(value) else (value, value)  # type: ignore[arg-type,return-value]
+                return UNKNOWN if isnan(value) else (value, value)
             if value is None:
                 return UNKNOWN
             return value if isinstance(value, tuple) else (float(value), float(value))

@@ -9,7 +9,7 @@ does it a second time over whole histories.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -68,7 +68,7 @@ class Sliding:
         high: How long before now it begins.
     """
 
-    algebra: Algebra
+    algebra: Algebra = field(repr=False)
     kind: str
     low: int
     high: int
@@ -142,7 +142,7 @@ class Lasting:
         high: Length of the window, microseconds.
     """
 
-    algebra: Arrays
+    algebra: Arrays = field(repr=False)
     kind: str
     high: int
 
@@ -193,7 +193,7 @@ class SoFar:
         kind: 'always', 'once' or 'since'.
     """
 
-    algebra: Algebra
+    algebra: Algebra = field(repr=False)
     kind: str
 
     def step(self, state: SoFarState | None, now: int, *values: Any) -> tuple[SoFarState, Any]:
@@ -260,7 +260,7 @@ class Counting:
         samples: Whether samples are counted.
     """
 
-    algebra: Algebra
+    algebra: Algebra = field(repr=False)
     least: float
     span: int
     samples: bool
@@ -338,7 +338,7 @@ class Recalling:
         age: Microseconds.
     """
 
-    algebra: Algebra
+    algebra: Algebra = field(repr=False)
     age: int
 
     def step(self, state: Remembered | None, now: int, *values: Any) -> tuple[Remembered, Any]:
@@ -368,7 +368,7 @@ class Latching:
         algebra: Of the intervals.
     """
 
-    algebra: Algebra
+    algebra: Algebra = field(repr=False)
 
     def step(self, state: Any, now: int, *values: Any) -> tuple[Any, Any]:
         """See `Operator`; the values are those by the threshold to enter and to leave."""

@@ -298,20 +298,28 @@ class Compiler:
         return Place(placed.step, placed.delay, placed.axes, at.certain)
 
     def _comparison(self, node: Comparison, scope: Scope) -> Place:
-        left, right = self.term(node.left, scope), self.term(node.right, scope)
-        entered = self._compared(node.operator, left, right)
+        entered = self._compared(node.operator, node.left, node.right, scope)
         if node.leave is None:
             return entered
-        left_again = self._compared(node.operator, left, self.term(node.leave, scope))
-        return self._operator(Latching(self.algebra), entered, left_again)
+        left = self._compared(node.operator, node.left, node.leave, scope)
+        return self._operator(Latching(self.algebra), entered, left)
 
-    def _compared(self, operator: str, left: Place, right: Place) -> Place:
-        a = self.algebra
-        by = EQUAL if "=" in operator else -EQUAL
+    def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> Place:
+        a, by = self.algebra, EQUAL if "=" in operator else -EQUAL
         more, less = (left, right) if operator[0] == ">" else (right, left)
-        return self._map(
-            ("compare", by), lambda v, w: a.shifted(a.added(v, a.negated(w)), by), more, less
-        )
+        # With a number on one side nothing can fail to be a number, and half the work is saved.
+        if isinstance(less, Number):
+            c = -less.base
+            at = self.term(more, scope)
+            return self._map(("above", c, by), lambda v: a.shifted(a.shifted(v, c), by), at)
+        if isinstance(more, Number):
+            d = more.base
+            at = self.term(less, scope)
+            below = ("below", d, by)
+            return self._map(below, lambda v: a.shifted(a.shifted(a.negated(v), d), by), at)
+        sides = self.term(more, scope), self.term(less, scope)
+        key = ("compare", by)
+        return self._map(key, lambda v, w: a.shifted(a.added(v, a.negated(w)), by), *sides)
 
     def _computed(self, operator: str, left: Place, right: Place) -> Place:
         a = self.algebra

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
@@ -16,16 +16,25 @@ from visup.rules.sentences import sentence, with_names
 from visup.rules.units import ticks
 
 SAFETY = "rules.safety"
+MOST_RETOLD = 3
+"""How many concerns that stand are put in words anew in one step; words cost more than judging."""
 Key = tuple[str, frozenset[int]]
 """Rule and objects."""
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """A concern that stays for a while after its rule was last true; `until` in seconds."""
+    """A concern that stays for a while after its rule was last true.
+
+    Attributes:
+        concern: The concern.
+        until: Seconds up to which it stays though its rule is true no more.
+        told: Seconds when its sentences were made.
+    """
 
     concern: Concern
     until: float
+    told: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,9 +104,15 @@ def _concerns(
     now = values.facts.mind.time
     held: dict[Key, Held] = {}
     cooling = {key: until for key, until in old.cooling.items() if until > now}
+    found: dict[Key, tuple[Rule, tuple[int, ...]]] = {}
     for rule, ids in values.true():
-        key = (rule.name, frozenset(ids))
-        if key not in held and key not in cooling:
+        found.setdefault((rule.name, frozenset(ids)), (rule, ids))
+    standing = [key for key in found if key in old.held]
+    retold = sorted(standing, key=lambda key: old.held[key].told)[:MOST_RETOLD]
+    for key, (rule, ids) in found.items():
+        if key in old.held and key not in retold:
+            held[key] = replace(old.held[key], until=_until(rule, now))
+        elif key not in cooling:
             held[key] = _raised(rule, ids, values, old.held.get(key))
     rests = {rule.name: rule.cooldown.base for rule in rules if rule.cooldown is not None}
     for key, before in old.held.items():
@@ -117,7 +132,11 @@ def _raised(rule: Rule, ids: tuple[int, ...], values: Values, before: Held | Non
     words = with_names(rule.say, rule.variables)
     cause = sentence(mind, words, *objects, confidence=confidence(rule, ids, mind))
     concern = Concern(rule.name, objects, rule.severity, cause, evidence(rule, ids, values))
-    return Held(concern, mind.time + (rule.hold.base if rule.hold is not None else 0.0))
+    return Held(concern, _until(rule, mind.time), mind.time)
+
+
+def _until(rule: Rule, now: float) -> float:
+    return now + (rule.hold.base if rule.hold is not None else 0.0)
 
 
 def confidence(rule: Rule, ids: tuple[int, ...], mind: Mind) -> float:

@@ -143,7 +143,7 @@ def _turned(back: Cell, fold: Fold) -> tuple[Any, ...]:
     """The back as a front."""
     assert back is not None
     time, value, back = back
-    front = (time, value, value, None)
+    front: tuple[Any, ...] = (time, value, value, None)
     while back is not None:
         time, value, back = back
         front = (time, value, fold(value, front[2]), front)

@@ -103,8 +103,8 @@ def expected(facts: Facts, name: str) -> Codes:
     for task in facts.mind.tasks:
         for e in task.expected:
             if e.relation in fine:
-                pair = sorted(set(e.objects))
-                if len(pair) == 2 and all(i in facts.row for i in pair):
+                pair = set(e.objects)
+                if len(pair) == 2 and pair <= facts.row.keys():
                     i, j = (facts.row[o] for o in pair)
                     codes[i, j] = codes[j, i] = YES
     return codes
@@ -154,12 +154,16 @@ def first_contact(facts: Facts) -> Codes:
     times = facts.contact[1].copy()
     known = ~np.isnan(times)
     np.fill_diagonal(known, False)
-    codes = np.where(known, NO, MAYBE).astype(np.int8)
     times[~known] = np.inf
-    for i in np.flatnonzero(known.any(axis=1)):
-        # Of several that are never met, the first one counts, so that one always does.
-        first = times[i].argmin() if times[i].min() < np.inf else known[i].argmax()
-        codes[i, first] = YES
+    # Of several that are never met, the first one counts, so that one always does.
+    first = np.where(
+        np.isfinite(times.min(axis=1, initial=np.inf)),
+        times.argmin(axis=1) if len(times) else 0,
+        known.argmax(axis=1) if len(times) else 0,
+    )
+    codes = np.where(known, NO, MAYBE).astype(np.int8)
+    some = np.flatnonzero(known.any(axis=1))
+    codes[some, first[some]] = YES
     return codes
 
 
