@@ -11,6 +11,7 @@ import typer
 KEYS = (
     "formulas",
     "samples",
+    "online",
     "different",
     "us",
     "samples_per_s",

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
 from typing import Any
 
@@ -49,14 +49,31 @@ def online(formula: Formula, names: tuple[str, ...]) -> Callable[[int, list[tupl
     """
     import rtamt
 
-    monitor = rtamt.StlDiscreteTimeSpecification()
+    monitor = _declared(rtamt.StlDiscreteTimeSpecification(), formula, names)
+    update: Callable[[int, list[tuple[str, float]]], Any] = monitor.update
+    return update
+
+
+def offline(formula: Formula, samples: Mapping[str, list[float]]) -> list[float]:
+    """Rtamt's robustness of a formula at every sample, with all samples at hand.
+
+    Its online monitors of formulas about the future differ from this one, so that only those of
+    formulas about the past are compared with.
+    """
+    import rtamt
+
+    monitor = _declared(rtamt.StlDiscreteTimeSpecification(), formula, tuple(samples))
+    count = len(next(iter(samples.values())))
+    told = monitor.evaluate({"time": list(range(count)), **samples})
+    return [float(value) for _, value in told]
+
+
+def _declared(monitor: Any, formula: Formula, names: tuple[str, ...]) -> Any:
     for name in (*names, "out"):
         monitor.declare_var(name, "float")
     monitor.spec = f"out = {written(formula)}"
     monitor.parse()
-    monitor.pastify()
-    update: Callable[[int, list[tuple[str, float]]], Any] = monitor.update
-    return update
+    return monitor
 
 
 def written(node: Formula | Term) -> str:
@@ -126,17 +143,17 @@ def shared_formula(rng: Random, depth: int) -> Formula:
 
 
 def horizon(node: Formula | Term) -> int:
-    """How many samples before the one that is told a formula looks at."""
+    """How many samples before the moment that is spoken of a formula looks at."""
     match node:
-        case Past(part=part, window=window) | Future(part=part, window=window):
+        case Past(part=part, window=window):
             return _samples(window) + horizon(part)
         case Since(left=left, right=right, window=window):
             return _samples(window) + max(horizon(left), horizon(right))
-        case Until(left=left, right=right, window=window):
-            return _samples(window) + max(horizon(left), horizon(right))
+        case Until(left=left, right=right):
+            return max(horizon(left), horizon(right))
         case And(parts=parts) | Or(parts=parts):
-            return sum(map(horizon, parts))
-        case Not(part=part):
+            return max(map(horizon, parts))
+        case Not(part=part) | Future(part=part):
             return horizon(part)
     return 0
 

@@ -23,7 +23,7 @@ from visup.evaluation.rule_formulas import (
 from visup.evaluation.rule_oracle import robustness
 from visup.evaluation.rule_scenes import FPS, minds, twenty_rules
 from visup.rules.formula import Formula, Rule
-from visup.rules.language import parse_formula
+from visup.rules.language import parse_formula, shipped_rules
 from visup.rules.monitor import Monitor
 from visup.rules.safety import SAFETY, RuleThinker
 from visup.rules.units import ticks
@@ -34,6 +34,8 @@ WINDOWS = (30, 300, 3000)
 TIMED = ("x() >= 0.5 for {w} ms", "x() >= 0.5 within {w} ms")
 """Timed against rtamt too; its `since` takes the square of the window, and seconds for each sample."""
 TIMED_ALONE = ("x() >= 0.1 since[{w} ms] y() >= 0.9",)
+ROUNDS = 5
+"""How often each time is taken; the best counts."""
 SNAPSHOTS = 10_000
 PEER_SHARE = 10
 """One formula is compared with rtamt for so many that are compared with the oracle."""
@@ -62,16 +64,15 @@ def evaluate_rules(
     if peer:
         progress("formulas against rtamt")
         items["rtamt"] = _against_peer(formulas // PEER_SHARE, seed)
-    for window in WINDOWS:
-        progress(f"windows of {window} samples")
-        items[f"window {window}"] = _throughput(window, seed, peer)
+    progress("windows")
+    items |= _throughput(seed, peer)
     for objects in (3, 10):
         progress(f"twenty rules, {objects} objects")
         items[f"{objects} objects"] = _rule_cost(objects)
     progress("snapshots")
     items["snapshots"] = _snapshots()
-    cost = [items[f"window {w}"]["us"] for w in (WINDOWS[0], WINDOWS[-1])]
-    return {"items": items, "total": {"slower": cost[1] / cost[0], "rtamt": peer}}
+    slower = items[f"window {WINDOWS[-1]}"]["slower"]
+    return {"items": items, "total": {"slower": slower, "rtamt": peer}}
 
 
 def alike(one: Sequence[float], other: Sequence[float]) -> bool:
@@ -98,52 +99,70 @@ def _against_oracle(count: int, seed: int) -> dict[str, Any]:
 
 
 def _against_peer(count: int, seed: int) -> dict[str, Any]:
-    samples = different = 0
+    samples = different = online = 0
     for number in range(count):
         rng = Random(f"{seed} peer {number}")
         formula = rule_peer.shared_formula(rng, rng.randint(1, 3))
-        update, monitor = rule_peer.online(formula, SIGNALS), Monitor(formula)
-        begin = rule_peer.horizon(formula)
-        same = True
-        for k in range(begin + 20):
-            x, y = (rng.randint(-10, 10) / 2 for _ in SIGNALS)
-            (low, high) = monitor.step(k * STEP_MS / 1000, {"x": x, "y": y})
-            theirs = update(k, [("x", x), ("y", y)])
-            if k >= begin:
-                samples += 1
-                same = same and alike((low, high), (theirs, theirs))
+        monitor = Monitor(formula)
+        late = round(monitor.delay * 1000 / STEP_MS)
+        begin = late + rule_peer.horizon(formula)
+        drawn = {name: [rng.randint(-10, 10) / 2 for _ in range(begin + 20)] for name in SIGNALS}
+        rows = [dict(zip(drawn, row, strict=True)) for row in zip(*drawn.values(), strict=True)]
+        told = [monitor.step(k * STEP_MS / 1000, row) for k, row in enumerate(rows)]
+        theirs = rule_peer.offline(formula, drawn)
+        same = all(alike(told[k], (theirs[k - late],) * 2) for k in range(begin, len(rows)))
+        if late == 0:
+            update = rule_peer.online(formula, SIGNALS)
+            live = [update(k, list(row.items())) for k, row in enumerate(rows)]
+            same = same and all(alike(told[k], (live[k],) * 2) for k in range(begin, len(rows)))
+            online += 1
+        samples += len(rows) - begin
         different += not same
-    return {"formulas": count, "samples": samples, "different": different}
+    return {"formulas": count, "samples": samples, "online": online, "different": different}
 
 
-def _throughput(window: int, seed: int, peer: bool) -> dict[str, Any]:
-    """Microseconds of the processor per sample; the least favourable of the operators counts."""
-    ours, ratios = [], []
-    for text in (*TIMED, *TIMED_ALONE):
-        formula = parse_formula(text.format(w=window * STEP_MS), signals(*SIGNALS))
-        rng = Random(seed)
-        drawn = [(rng.random(), rng.random()) for _ in range(4 * max(WINDOWS))]
-        ours.append(_ours(formula, drawn, window))
-        if peer and text in TIMED:
-            ratios.append(_theirs(formula, drawn, window) / ours[-1])
-    found = {"us": max(ours), "samples_per_s": 1e6 / max(ours)}
-    return {**found, "times_rtamt": min(ratios)} if peer else found
+def _throughput(seed: int, peer: bool) -> dict[str, dict[str, Any]]:
+    """Microseconds of the processor per sample; the least favourable of the operators counts.
+
+    Windows take turns, so that what else the machine does falls on all of them alike.
+    """
+    rng = Random(seed)
+    drawn = [(rng.random(), rng.random()) for _ in range(4 * max(WINDOWS))]
+    texts = (*TIMED, *TIMED_ALONE)
+    best = {(w, t): float("inf") for t in texts for w in WINDOWS}
+    for _ in range(ROUNDS):
+        for window, text in best:
+            formula = _windowed(text, window)
+            best[window, text] = min(best[window, text], _ours(formula, drawn, window))
+    found: dict[str, dict[str, Any]] = {}
+    for window in WINDOWS:
+        slowest = max(best[window, t] for t in texts)
+        figures = {"us": slowest, "samples_per_s": 1e6 / slowest}
+        figures["slower"] = max(best[window, t] / best[WINDOWS[0], t] for t in texts)
+        if peer:
+            ratios = (
+                _theirs(_windowed(t, window), drawn, window) / best[window, t] for t in TIMED
+            )
+            figures["times_rtamt"] = min(ratios)
+        found[f"window {window}"] = figures
+    return found
+
+
+def _windowed(text: str, window: int) -> Formula:
+    return parse_formula(text.format(w=window * STEP_MS), signals(*SIGNALS))
 
 
 def _ours(formula: Formula, drawn: list[tuple[float, float]], window: int) -> float:
-    best = float("inf")
-    for _ in range(3):
-        monitor = Monitor(formula)
-        for k in range(window):
-            x, y = drawn[k]
-            monitor.step(k * STEP_MS / 1000, {"x": x, "y": y})
-        timed = range(window, len(drawn))
-        begin = time.process_time()
-        for k in timed:
-            x, y = drawn[k]
-            monitor.step(k * STEP_MS / 1000, {"x": x, "y": y})
-        best = min(best, (time.process_time() - begin) / len(timed) * 1e6)
-    return best
+    monitor = Monitor(formula)
+    for k in range(window):
+        x, y = drawn[k]
+        monitor.step(k * STEP_MS / 1000, {"x": x, "y": y})
+    timed = range(window, len(drawn))
+    begin = time.process_time()
+    for k in timed:
+        x, y = drawn[k]
+        monitor.step(k * STEP_MS / 1000, {"x": x, "y": y})
+    return (time.process_time() - begin) / len(timed) * 1e6
 
 
 def _theirs(formula: Formula, drawn: list[tuple[float, float]], window: int) -> float:
@@ -185,8 +204,8 @@ def _timed(rules: tuple[Rule, ...], seen: list[Mind]) -> tuple[list[float], list
 
 
 def _snapshots(count: int = SNAPSHOTS) -> dict[str, Any]:
-    """Memory of what rules remember in as many minds, all kept; three objects, twenty rules."""
-    thinker, mind = RuleThinker(twenty_rules()), list(minds(3, 50))[-1]
+    """Memory of what rules remember in as many minds, all kept; three objects, the shipped rules."""
+    thinker, mind = RuleThinker(shipped_rules()), list(minds(3, 50))[-1]
     nothing = Observation(0, 0.0, (0, 0))
     kept = []
     tracemalloc.start()
