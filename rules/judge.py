@@ -126,12 +126,15 @@ class Values:
             yield tuple(ids[row] for row in rows[:count])
 
 
-def rerowed(prepared: Ruled, states: States, old: tuple[int, ...], new: tuple[int, ...]) -> States:
+def rerowed(
+    prepared: Ruled, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
+) -> States:
     """The states of the operators for other objects.
 
     Args:
         prepared: The rules.
         states: States for the old objects.
+        now: Microseconds of the sample at which they change.
         old: Their ids.
         new: Ids of the new ones; of those that are not among the old nothing is known yet.
 
@@ -141,7 +144,7 @@ def rerowed(prepared: Ruled, states: States, old: tuple[int, ...], new: tuple[in
     place = {object_id: i for i, object_id in enumerate(old)}
     rows = np.array([place.get(i, -1) for i in new], dtype=np.intp)
     return tuple(
-        state if state is None or not axes else operator.rows(state, _picker(axes, rows, len(old)))
+        state if state is None or not axes else operator.rows(state, now, _picker(axes, rows, len(old)))
         for state, (operator, axes) in zip(states, prepared.program.operators, strict=True)
     )
 
@@ -151,18 +154,18 @@ def _picker(axes: frozenset[int], rows: NDArray[np.intp], count: int) -> Pick:
     fresh = rows < 0
 
     def pick(array: Any, fill: Any, lead: int = 1) -> Any:
-        if not isinstance(array, np.ndarray) or array.ndim == 0:
-            return array  # one value for all: what was never watched
-        if lead:
-            fill = np.reshape(fill, (2,) + (1,) * (array.ndim - 1))
+        fill = np.reshape(fill, (2,) + (1,) * (array.ndim - 1)) if lead else fill
         for axis in axes:
-            if array.shape[lead + axis] != count:
-                continue  # one value for all objects, and for new ones
-            array = array.take(np.maximum(rows, 0), axis=lead + axis) if count else np.empty(
-                [*array.shape[: lead + axis], len(rows), *array.shape[lead + axis + 1 :]],
-                array.dtype,
-            )
-            at = (slice(None),) * (lead + axis) + (fresh,)
+            along = lead + axis
+            if array.shape[along] != count:
+                # One value for all objects so far, which need not be that of new ones.
+                array = array.repeat(count, axis=along)
+            if count:
+                array = array.take(np.maximum(rows, 0), axis=along)
+            else:
+                shape = [*array.shape[:along], len(rows), *array.shape[along + 1 :]]
+                array = np.empty(shape, array.dtype)
+            at = (slice(None),) * along + (fresh,)
             array[at] = np.broadcast_to(fill, array.shape)[at]
         return array
 

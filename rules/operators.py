@@ -49,8 +49,8 @@ class Operator(Protocol):
             The state after, and the interval of the whole.
         """
 
-    def rows(self, state: Any, pick: Pick) -> Any:
-        """The same state for other objects; those that are new were never watched before."""
+    def rows(self, state: Any, now: int, pick: Pick) -> Any:
+        """The same state for the objects of the sample at `now`; the new ones have no past."""
 
     @property
     def kept(self) -> int:
@@ -111,7 +111,7 @@ class Sliding:
         each = 2 if self._pair else 1  # type: ignore[attr-defined]
         return each * (2 * most_samples(self.high) + 2)
 
-    def rows(self, state: Slide, pick: Pick) -> Slide:
+    def rows(self, state: Slide, now: int, pick: Pick) -> Slide:
         """See `Operator`."""
         if self._pair:  # type: ignore[attr-defined]
             return changed(state, lambda v: (pick(v[0], UNKNOWN), pick(v[1], UNKNOWN)))
@@ -168,7 +168,7 @@ class Lasting:
         """See `Operator`."""
         return 3
 
-    def rows(self, state: Ends, pick: Pick) -> Ends:
+    def rows(self, state: Ends, now: int, pick: Pick) -> Ends:
         """See `Operator`."""
         return Ends(
             state.then,
@@ -219,9 +219,14 @@ class SoFar:
         """See `Operator`."""
         return 1
 
-    def rows(self, state: SoFarState, pick: Pick) -> SoFarState:
+    def rows(self, state: SoFarState, now: int, pick: Pick) -> SoFarState:
         """See `Operator`."""
-        return SoFarState(state.then, pick(state.value, self._empty()))
+        then, value = state
+        if now - then > REACH:
+            # The silence is not part of what was watched of those that are new.
+            unknown = self.algebra.constant(UNKNOWN)
+            then, value = now - REACH, self._join(value, (unknown, unknown))
+        return SoFarState(then, pick(value, self._empty()))
 
 
 MAYBE: Interval = (0.0, 1.0)
@@ -303,20 +308,18 @@ class Counting:
         """See `Operator`."""
         return 2 * ((self.span if self.samples else most_samples(self.span)) + 2)
 
-    def rows(self, state: Tally, pick: Pick) -> Tally:
+    def rows(self, state: Tally, now: int, pick: Pick) -> Tally:
         """See `Operator`."""
-        rate = (0.0, 0.0) if self.samples else MAYBE
-
         def total(clock: int, value: Any) -> Any:
             return pick(value, (0.0, float(clock - state.born)))
 
         def piece(clock: int, value: tuple[Any, Any]) -> tuple[Any, Any]:
-            return total(clock, value[0]), pick(value[1], rate)
+            return total(clock, value[0]), pick(value[1], MAYBE)
 
         clock, value = state.begin
         return state._replace(
             total=total(state.clock, state.total),
-            rate=pick(state.rate, rate),
+            rate=pick(state.rate, MAYBE),
             begin=(clock, piece(clock, value)),
             queue=state.queue.changed(piece),
         )
@@ -355,7 +358,7 @@ class Recalling:
         """See `Operator`."""
         return 2
 
-    def rows(self, state: Remembered, pick: Pick) -> Remembered:
+    def rows(self, state: Remembered, now: int, pick: Pick) -> Remembered:
         """See `Operator`."""
         return Remembered(pick(state.value, UNKNOWN), pick(state.time, LONG_AGO, lead=0))
 
@@ -383,6 +386,6 @@ class Latching:
         """See `Operator`."""
         return 1
 
-    def rows(self, state: Any, pick: Pick) -> Any:
+    def rows(self, state: Any, now: int, pick: Pick) -> Any:
         """See `Operator`."""
         return pick(state, False, lead=0)

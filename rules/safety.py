@@ -81,7 +81,7 @@ class RuleThinker:
         prepared, facts = ruled(self.rules), Facts(mind)
         before = prepared.program.fresh if old.now is None else old.after
         if old.now is not None and old.ids != facts.ids:
-            before = rerowed(prepared, before, old.ids, facts.ids)
+            before = rerowed(prepared, before, now, old.ids, facts.ids)
         values = Values(prepared, facts, now, before)
         held, cooling = _concerns(self.rules, values, old)
         mind = mind.remember(
