@@ -75,8 +75,10 @@ class Meaning:
         """A node where something true or false is wanted."""
         if isinstance(node, Call):
             if node.name == "last":
-                part, duration = self._spanned(node)
-                return Last(self.formula(part), duration)
+                spanned = self._spanned(node)
+                if spanned is None:
+                    return Fact("", (), node.span)
+                return Last(self.formula(spanned[0]), spanned[1])
             if node.name in (*SPLIT, *OVER_TIME):
                 what = f"'{node.name}' is a quantity, neither true nor false"
                 self.fault((node.span, what, None, "compare it with a number"))
@@ -95,7 +97,10 @@ class Meaning:
                     node.name, tuple(self.term(self._unworded(a)) for a in node.arguments), node.span
                 )
             if node.name in OVER_TIME:
-                part, duration = self._spanned(node)
+                spanned = self._spanned(node)
+                if spanned is None:
+                    return Number(0.0, span=node.span)
+                part, duration = spanned
                 return OverTime(node.name, self.term(part), duration, node.span)
             return Measure(node.name, self._words(node), node.span)
         if isinstance(node, Term):
@@ -112,14 +117,14 @@ class Meaning:
                 return ()
         return tuple(a.name for a in call.arguments)
 
-    def _spanned(self, call: Call) -> tuple[Any, Number]:
-        """The parts of `rate(x, 2 s)` and its like."""
+    def _spanned(self, call: Call) -> tuple[Any, Number] | None:
+        """The parts of `rate(x, 2 s)` and its like, or None after a fault."""
         parts = call.arguments
         if len(parts) == 2 and isinstance(parts[1], Number) and parts[1].dimension == TIME:
             return self._unworded(parts[0]), parts[1]
         what = f"'{call.name}' takes something and a time"
         self.fault((call.span, what, f"such as {call.name}(speed(a), 2 s)", None))
-        return Number(0.0, span=call.span), Number(1.0, Unit.S)
+        return None
 
     def _unworded(self, argument: Any) -> Any:
         if isinstance(argument, Word):
