@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from difflib import get_close_matches
+from itertools import product
 
 from visup.agent import Mind
 from visup.agent.errors import RuleError
@@ -28,7 +31,7 @@ def explain(mind: Mind, rule: str, *ids: int) -> Explanation:
         RuleError: No such rule was judged, or the objects are not those of a choice for it.
     """
     values = values_of(mind)
-    return explained(choice(values, rule, ids), ids, values)
+    return explained(_choice(values, rule, ids), ids, values)
 
 
 def values_of(mind: Mind) -> Values:
@@ -45,16 +48,32 @@ def values_of(mind: Mind) -> Values:
     return Values(ruled(memory.rules), facts, memory.now, memory.before)
 
 
-def choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:
-    """The rule of that name, when the objects are a choice for it.
+def rule_named(values: Values, name: str) -> Rule:
+    """The rule of that name.
 
     Raises:
-        RuleError: There is none, or they are not.
+        RuleError: None was judged.
     """
     rules = {rule.name: rule for rule in values.prepared.rules}
     if name not in rules:
-        raise RuleError(f"no rule '{name}' was judged", expected=f"one of {', '.join(rules)}")
-    rule = rules[name]
+        close = get_close_matches(name, list(rules), 1, 0.6)
+        hint = f"did you mean '{close[0]}'?" if close else None
+        what = f"no rule '{name}' was judged"
+        raise RuleError(what, expected=f"one of {', '.join(rules)}", hint=hint)
+    return rules[name]
+
+
+def choices(values: Values, rule: Rule) -> Iterator[tuple[int, ...]]:
+    """Every choice of objects for a rule."""
+    for ids in product(values.facts.ids, repeat=len(rule.variables)):
+        once = [i for i, v in zip(ids, rule.variables, strict=True) if v not in rule.may_repeat]
+        if len(set(once)) == len(once):
+            yield ids
+
+
+def _choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:
+    """The rule of that name, when the objects are a choice for it."""
+    rule = rule_named(values, name)
     if len(ids) != len(rule.variables):
         what = f"'{name}' is about {len(rule.variables)} object(s), not {len(ids)}"
         raise RuleError(what, expected=f"{name}({', '.join(rule.variables)})")
@@ -62,4 +81,6 @@ def choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:
         if object_id not in values.facts.row:
             known = ", ".join(map(str, values.facts.ids)) or "none"
             raise RuleError(f"there is no object {object_id} in view", expected=f"one of {known}")
+    if ids not in set(choices(values, rule)):
+        raise RuleError(f"'{name}' is about distinct objects", expected="each object once")
     return rule

@@ -32,8 +32,35 @@ from visup.rules.units import SHARE, TIME, Number, Span, Unit
 from visup.rules.vocabulary import KINDS, RULES, Vocabulary
 
 KEYWORDS = frozenset(
-    "rule when unless hold cooldown say and or not for within since until once always eventually "
-    "henceforth exists forall in of samples leave to ago may repeat".split()
+    (
+        "rule",
+        "when",
+        "unless",
+        "hold",
+        "cooldown",
+        "say",
+        "and",
+        "or",
+        "not",
+        "for",
+        "within",
+        "since",
+        "until",
+        "once",
+        "always",
+        "eventually",
+        "henceforth",
+        "exists",
+        "forall",
+        "in",
+        "of",
+        "samples",
+        "leave",
+        "to",
+        "ago",
+        "may",
+        "repeat",
+    )
 )
 """Words of the language itself, which name nothing else."""
 
@@ -95,7 +122,9 @@ class Checker:
                 yield rule.span, f"'{word}' is a word of the language", "another name", None
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
-                what = f"the sentence of '{rule.name}' mentions '{word}', which is no variable of it"
+                what = (
+                    f"the sentence of '{rule.name}' mentions '{word}', which is no variable of it"
+                )
                 yield rule.span, what, _listed((*rule.variables, "is")), None
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:

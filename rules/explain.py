@@ -87,7 +87,8 @@ def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
     interval = (-np.inf, min(high, -parts[1].interval[0])) if suspended else (low, high)
     names = ", ".join(short(values.facts.mind, i) for i in ids)
     titled = tuple(
-        replace(p, text=f"{word} {p.text}") for word, p in zip(("when", "unless"), parts, strict=False)
+        replace(p, text=f"{word} {p.text}")
+        for word, p in zip(("when", "unless"), parts, strict=False)
     )
     found = Truth.FALSE if suspended else parts[0].verdict
     return Explanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
@@ -107,9 +108,7 @@ class _Reader:
         self.mind = values.facts.mind
         self.scope: Scope = scope_of(rule)
         self.rows = tuple(values.facts.row[i] for i in ids)
-        self.names = {
-            v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)
-        }
+        self.names = {v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)}
 
     def facts(self, formula: Formula) -> Iterator[Explanation]:
         """Its facts and comparisons; those under a quantifier are told by the quantifier."""

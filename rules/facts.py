@@ -181,6 +181,4 @@ def exactly(values: Floats) -> Floats:
 
 def between(low: Floats, high: Floats) -> Floats:
     """(2, ...) intervals; NaN becomes unknown."""
-    return np.stack(
-        (np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
-    )
+    return np.stack((np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)))

@@ -53,7 +53,7 @@ class Algebra(Protocol):
         """(surely, possibly) true, each 0 or 1."""
 
     def choose(self, which: Any, v: Any, w: Any) -> Any:
-        """v where `which`, else w."""
+        """The first where `which`, else the second."""
 
     def scaled(self, v: Any, factor: float) -> Any:
         """Times a number that is not negative; also of what `held` gives."""

@@ -144,7 +144,9 @@ def rerowed(
     place = {object_id: i for i, object_id in enumerate(old)}
     rows = np.array([place.get(i, -1) for i in new], dtype=np.intp)
     return tuple(
-        state if state is None or not axes else operator.rows(state, now, _picker(axes, rows, len(old)))
+        state
+        if state is None or not axes
+        else operator.rows(state, now, _picker(axes, rows, len(old)))
         for state, (operator, axes) in zip(states, prepared.program.operators, strict=True)
     )
 

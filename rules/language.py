@@ -15,7 +15,7 @@ from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 from visup.agent.errors import ManyErrors, Place, RuleError, VisupError
 from visup.rules.check import Checker
 from visup.rules.formula import Formula, Rule
-from visup.rules.transform import ToTree
+from visup.rules.transform import read_tree
 from visup.rules.vocabulary import RULES, Vocabulary
 
 _HEAD = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
@@ -70,11 +70,10 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         except UnexpectedInput as fault:
             errors.append(_syntax_error(fault, text, file))
             continue
-        reading = ToTree(file)
-        found = cast("list[Rule]", reading.transform(tree))
-        errors += [checker.fault(*f) for f in reading.faults]
+        found, faults = read_tree(tree, file)
+        errors += [checker.fault(*f) for f in faults]
         rules += found
-        sound += () if reading.faults else found
+        sound += () if faults else found
     errors += [*checker.twice(rules), *(fault for rule in sound for fault in checker.rule(rule))]
     raise_all(errors)
     return tuple(rules)
@@ -99,11 +98,10 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
         tree = _parser().parse(text, start="formula")
     except UnexpectedInput as fault:
         raise _syntax_error(fault, text, file) from None
-    reading, checker = ToTree(file), Checker(text, file, vocabulary)
-    found = cast("Formula", reading.transform(tree))
-    errors: list[VisupError] = [checker.fault(*f) for f in reading.faults]
-    raise_all(errors or list(checker.formula(found)))
-    return found
+    checker = Checker(text, file, vocabulary)
+    found, faults = read_tree(tree, file)
+    raise_all([checker.fault(*f) for f in faults] or list(checker.formula(found)))
+    return cast("Formula", found)
 
 
 def raise_all(errors: Sequence[VisupError]) -> None:

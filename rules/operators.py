@@ -310,6 +310,7 @@ class Counting:
 
     def rows(self, state: Tally, now: int, pick: Pick) -> Tally:
         """See `Operator`."""
+
         def total(clock: int, value: Any) -> Any:
             return pick(value, (0.0, float(clock - state.born)))
 

@@ -267,7 +267,9 @@ class Compiler:
 
     def _slid(self, kind: str, low: int, high: int, delay: int, *at: Place) -> Place:
         certain = all(p.certain for p in at)
-        lasting = certain and low == 0 and kind in ("always", "once") and isinstance(self.algebra, Arrays)
+        lasting = (
+            certain and low == 0 and kind in ("always", "once") and isinstance(self.algebra, Arrays)
+        )
         operator: Operator = (
             Lasting(self.algebra, kind, high) if lasting else Sliding(self.algebra, kind, low, high)
         )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from lark import Token, Transformer
+from lark import Token, Transformer, Tree
 from lark import v_args as with_meta
 
 from visup.agent import Severity
@@ -94,7 +94,9 @@ class Meaning:
         if isinstance(node, Call):
             if node.name in SPLIT:
                 return Combined(
-                    node.name, tuple(self.term(self._unworded(a)) for a in node.arguments), node.span
+                    node.name,
+                    tuple(self.term(self._unworded(a)) for a in node.arguments),
+                    node.span,
                 )
             if node.name in OVER_TIME:
                 spanned = self._spanned(node)
@@ -142,14 +144,28 @@ def _place(node: Any) -> Span:
     return _place(inner if inner is not None else node.parts[0])
 
 
-def span_of(meta: Any) -> Span:
+def _span_of(meta: Any) -> Span:
     """The place of a node of Lark's tree; of one that runs over several lines, its beginning."""
     one_line = meta.end_line == meta.line
     return Span(meta.line, meta.column, meta.end_column - meta.column if one_line else 1)
 
 
+def read_tree(tree: Tree[Token], file: str) -> tuple[Any, list[Fault]]:
+    """Rules, or one formula, from the tree that the parser gives.
+
+    Args:
+        tree: Of a rule file or of a formula.
+        file: Its name, for messages.
+
+    Returns:
+        A list of rules or a formula; and the faults that were found on the way.
+    """
+    reading = _ToTree(file)
+    return reading.transform(tree), reading.faults
+
+
 @with_meta(meta=True)
-class ToTree(Transformer[Token, Any]):
+class _ToTree(Transformer[Token, Any]):
     """Lark's tree to ours.
 
     Args:
@@ -194,7 +210,7 @@ class ToTree(Transformer[Token, Any]):
         return str(parts[0]), parts[1] is not None
 
     def word(self, meta: Any, parts: list[Token]) -> Word:
-        return Word(str(parts[0]), span_of(meta))
+        return Word(str(parts[0]), _span_of(meta))
 
     def when(self, meta: Any, parts: list[Any]) -> Formula:
         return self.meaning.formula(parts[0])
@@ -225,7 +241,7 @@ class ToTree(Transformer[Token, Any]):
     def until(self, meta: Any, parts: list[Any]) -> Until:
         left, window, right = parts
         formulas = self.meaning.formula(left), self.meaning.formula(right)
-        return Until(*formulas, window, span_of(meta))
+        return Until(*formulas, window, _span_of(meta))
 
     def quantified(self, meta: Any, parts: list[Any]) -> Quantified:
         kind, (variable, repeats), part = parts
@@ -268,31 +284,31 @@ class ToTree(Transformer[Token, Any]):
     def comparison(self, meta: Any, parts: list[Any]) -> Comparison:
         left, operator, right, leave = parts
         sides = self.meaning.term(left), self.meaning.term(right)
-        return Comparison(sides[0], str(operator), sides[1], leave, span_of(meta))
+        return Comparison(sides[0], str(operator), sides[1], leave, _span_of(meta))
 
     def sum(self, meta: Any, parts: list[Any]) -> Arithmetic:
         left, operator, right = parts
         sides = self.meaning.term(left), self.meaning.term(right)
-        return Arithmetic(sides[0], str(operator), sides[1], span_of(meta))
+        return Arithmetic(sides[0], str(operator), sides[1], _span_of(meta))
 
     product = sum
 
     def negative(self, meta: Any, parts: list[Any]) -> Term:
         part = self.meaning.term(parts[1])
         if isinstance(part, Number):
-            return Number(-part.value, part.unit, span_of(meta))
-        return Negative(part, span_of(meta))
+            return Number(-part.value, part.unit, _span_of(meta))
+        return Negative(part, _span_of(meta))
 
     def signed(self, meta: Any, parts: list[Any]) -> Number:
         minus, number = parts
         value = -number.value if minus is not None else number.value
-        return Number(value, number.unit, span_of(meta))
+        return Number(value, number.unit, _span_of(meta))
 
     def call(self, meta: Any, parts: list[Any]) -> Call:
-        return Call(str(parts[0]), parts[1] or (), span_of(meta))
+        return Call(str(parts[0]), parts[1] or (), _span_of(meta))
 
     def number(self, meta: Any, parts: list[Any]) -> Number:
         unit = Unit.NONE if parts[1] is None else Unit(str(parts[1]))
-        return Number(float(parts[0]), unit, span_of(meta))
+        return Number(float(parts[0]), unit, _span_of(meta))
 
     duration = number

@@ -7,16 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from visup.rules.facts import IMPLIED, QUANTITIES, WORDS
-from visup.rules.formula import DIMENSION
+from visup.rules.bounds import MOST_KEPT, MOST_VARIABLES
+from visup.rules.facts import SIGMAS
 from visup.rules.fragments import FragmentSettings
 from visup.rules.language import parse_rules, shipped_rules
 from visup.rules.measure import RelationSettings
+from visup.rules.operators import REACH, SPACING
 from visup.rules.thinkers import RuleSettings
+from visup.rules.units import DIMENSION, TICKS
+from visup.rules.vocabulary import IMPLIED, KEEP_OUT, QUANTITIES, WORDS
 from visup.rules.work import PresenceSettings
 
 PAGE = (Path(__file__).parents[2] / "docs/rules.md").read_text("utf-8")
-BLOCKS = re.findall(r"```\n(.*?)```", PAGE, re.S)
+BLOCKS = [t for kind, t in re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.S | re.M) if not kind]
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
     for line in re.findall(r"^\|.*\|$", PAGE, re.M)
@@ -41,6 +44,7 @@ def _call(cell: str) -> re.Match[str] | None:
 
 def test_units_of_quantities_are_those_of_their_dimension() -> None:
     units = {str(unit): dimension for unit, (dimension, _) in DIMENSION.items()}
+    assert KEEP_OUT in PAGE
     rows = {m[1]: r[1].strip("`") for r in ROWS if len(r) == 3 and (m := _call(r[0]))}
     assert {name: units[unit] for name, unit in rows.items()} == {
         name: q.dimension for name, q in QUANTITIES.items()
@@ -60,6 +64,11 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
 @pytest.mark.parametrize(
     ("text", "value"),
     [
+        ("speaks for what follows it, but for no more than {:g} s", REACH / TICKS),
+        ("closer than {:g} ms", 1000 * SPACING / TICKS),
+        ("at most {:,} values", MOST_KEPT),
+        ("at most {} objects together", MOST_VARIABLES),
+        ("value +- {:g} standard deviation", SIGMAS),
         ("trend above {} D/s", RelationSettings().rate_enter),
         ("below {} D/s, or turned", RelationSettings().rate_exit),
         ("gap at most {} D", RelationSettings().touch_enter),

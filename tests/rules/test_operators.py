@@ -59,6 +59,14 @@ def cast(rng: Random, count: int) -> Iterator[tuple[int, ...]]:
         yield tuple(sorted(here))
 
 
+def looking(objects: dict[int, dict[str, Interval]], ids: tuple[int, ...]) -> Any:
+    def look(node: Predicate | Measure, axes: tuple[int, ...]) -> Any:
+        values = [objects[i][node.name] for i in ids]
+        return np.array(values, dtype=float).reshape(len(ids), 2).T
+
+    return look
+
+
 def by_arrays(
     formula: Formula, times: list[float], seen: list[dict[int, dict[str, Interval]]]
 ) -> list[dict[int, Interval]]:
@@ -73,11 +81,7 @@ def by_arrays(
             states = rerowed(prepared, states, ticks(time), ids, now)
         ids = now
 
-        def look(node: Predicate | Measure, axes: tuple[int, ...]) -> Any:
-            values = [objects[i][node.name] for i in ids]  # noqa: B023
-            return np.array(values, dtype=float).reshape(len(ids), 2).T
-
-        moment = Moment(ticks(time), states, look)
+        moment = Moment(ticks(time), states, looking(objects, ids))
         value = np.broadcast_to(prepared.program.step(moment)[place.step], (2, len(ids)))
         states = tuple(moment.after)
         told.append({i: (float(value[0, k]), float(value[1, k])) for k, i in enumerate(ids)})
@@ -217,9 +221,11 @@ def test_what_a_window_holds_is_bounded_by_its_length() -> None:
         ("x() >= 1", {0.0: 1}, [(1e-300, 1e-300)]),
         ("x() > 1", {0.0: 1}, [(-1e-300, -1e-300)]),
         # Once entered, the second threshold counts.
-        ("x() > 5 leave 3", {0: 4, 1: 6, 2: 4, 3: 2, 4: 4}, [(-1,) * 2, (1,) * 2, (1,) * 2, (-1,) * 2, (-1,) * 2]),
+        ("x() > 5 leave 3", {0: 4, 1: 6, 2: 4, 3: 2, 4: 4},
+         [(-1, -1), (1, 1), (1, 1), (-1, -1), (-1, -1)]),
         ("x() > 1 in 2 of 3 samples", {0: 2, 0.1: 0, 0.2: 2}, [(-1, 1), (-1, 0), (0, 0)]),
-        ("x() > 1 in 50 % of 0.2 s", {0: 2, 0.1: 0, 0.2: 0, 0.3: 0}, [(-0.5, 0.5), (0, 0.5), (0, 0), (-0.5, -0.5)]),
+        ("x() > 1 in 50 % of 0.2 s", {0: 2, 0.1: 0, 0.2: 0, 0.3: 0},
+         [(-0.5, 0.5), (0, 0.5), (0, 0), (-0.5, -0.5)]),
         ("eventually[0.1 s] x() > 1", {0: 3, 0.1: 0, 0.2: 0.5}, [(2, inf), (2, 2), (-0.5, -0.5)]),
         ("rate(x(), 0.2 s) > 1 /s", {0: 1, 0.1: 3, 0.2: 2}, [(-inf, inf), (-inf, inf), (4, 4)]),
         ("once x() > 1 and not always x() > 1", {0: 3, 0.1: 0}, [(-2, -2), (1, 1)]),

@@ -113,9 +113,7 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
 
     values = values_of(mind)
     wanted = [rule_named(values, only)] if only else list(values.prepared.rules)
-    return [
-        str(explain(mind, rule.name, *ids)) for rule in wanted for ids in choices(values, rule)
-    ]
+    return [str(explain(mind, rule.name, *ids)) for rule in wanted for ids in choices(values, rule)]
 
 
 def _cost(rule: Rule) -> str:

@@ -82,34 +82,34 @@ class _Oracle:
                 s = self.formula(part)
                 return Signal([(-h, -low) for low, h in s.values], s.delay)
             case And(parts=parts):
-                return self.joined([self.formula(p) for p in parts], both)
+                return self.joined([self.formula(p) for p in parts], _both)
             case Or(parts=parts):
-                return self.joined([self.formula(p) for p in parts], either)
+                return self.joined([self.formula(p) for p in parts], _either)
             case Past(kind=kind, part=part, window=None):
                 s = self.formula(part)
-                join = both if kind == "always" else either
-                return Signal(self.each(lambda k: fold(self.so_far(k, s), join)), s.delay)
+                join = _both if kind == "always" else _either
+                return Signal(self.each(lambda k: _fold(self.so_far(k, s), join)), s.delay)
             case Past(kind=kind, part=part, window=Window(low=low, high=high)):
-                join = both if kind == "always" else either
-                return self.past(self.formula(part), join, micro(low), micro(high))
+                join = _both if kind == "always" else _either
+                return self.past(self.formula(part), join, _micro(low), _micro(high))
             case Future(kind=kind, part=part, window=Window(low=low, high=high)):
-                join = either if kind == "eventually" else both
-                s, a, b = self.formula(part), micro(low), micro(high)
+                join = _either if kind == "eventually" else _both
+                s, a, b = self.formula(part), _micro(low), _micro(high)
                 late = s.delay + b
 
                 def ahead(k: int) -> Interval:
                     moment = self.times[k] - late
-                    return fold(self.meeting(k, moment + a, moment + b, s), join)
+                    return _fold(self.meeting(k, moment + a, moment + b, s), join)
 
                 return Signal(self.each(ahead), late)
             case Since(left=left, right=right, window=window):
                 return self.since(self.formula(left), self.formula(right), window)
             case Until(left=left, right=right, window=Window(high=high)):
-                return self.until(self.formula(left), self.formula(right), micro(high))
+                return self.until(self.formula(left), self.formula(right), _micro(high))
             case Often():
                 return self.often(f)
             case Last(part=part, duration=age):
-                return self.last(self.formula(part), micro(age))
+                return self.last(self.formula(part), _micro(age))
         raise NotImplementedError(f)
 
     def each(self, value: object) -> Values:
@@ -125,16 +125,12 @@ class _Oracle:
             value = tuple(s.values[j] for s in signals)
             found.append(Piece(start - late, min(end, start + SPEAKS) - late, value))
             if j < k and end > start + SPEAKS:
-                found.append(
-                    Piece(start + SPEAKS - late, end - late, (ANYTHING,) * len(signals))
-                )
+                found.append(Piece(start + SPEAKS - late, end - late, (ANYTHING,) * len(signals)))
         return found
 
     def meeting(self, k: int, low: float, high: float, signal: Signal) -> Values:
-        """Its values at all moments from `low` to `high`, both included."""
-        return [
-            p.value[0] for p in self.pieces(k, signal) if p.start <= high and p.end > low
-        ]
+        """Its values at all moments from `low` to `high`, _both included."""
+        return [p.value[0] for p in self.pieces(k, signal) if p.start <= high and p.end > low]
 
     def so_far(self, k: int, signal: Signal) -> Values:
         return [p.value[0] for p in self.pieces(k, signal)[1:]]
@@ -142,7 +138,7 @@ class _Oracle:
     def past(self, s: Signal, join: object, a: int, b: int) -> Signal:
         def back(k: int) -> Interval:
             moment = self.times[k] - s.delay
-            return fold(self.meeting(k, moment - b, moment - a, s), join)
+            return _fold(self.meeting(k, moment - b, moment - a, s), join)
 
         return Signal(self.each(back), s.delay)
 
@@ -159,7 +155,7 @@ class _Oracle:
 
     def joined(self, signals: list[Signal], join: object) -> Signal:
         signals = self.waited(signals)
-        values = [fold(list(v), join) for v in zip(*(s.values for s in signals), strict=True)]
+        values = [_fold(list(v), join) for v in zip(*(s.values for s in signals), strict=True)]
         return Signal(values, signals[0].delay)
 
     def since(self, left: Signal, right: Signal, window: Window | None) -> Signal:
@@ -167,13 +163,13 @@ class _Oracle:
 
         def at(k: int) -> Interval:
             pieces = self.pieces(k, left, right)
-            begin = self.times[k] - left.delay - (micro(window.high) if window else 0)
+            begin = self.times[k] - left.delay - (_micro(window.high) if window else 0)
             inner = [p for p in pieces if p.end > begin] if window else pieces[1:]
             found = [
-                fold([p.value[1], *(later.value[0] for later in inner[i + 1 :])], both)
+                _fold([p.value[1], *(later.value[0] for later in inner[i + 1 :])], _both)
                 for i, p in enumerate(inner)
             ]
-            return fold(found, either)
+            return _fold(found, _either)
 
         return Signal(self.each(at), left.delay)
 
@@ -185,10 +181,10 @@ class _Oracle:
             begin = self.times[k] - late
             inner = [p for p in self.pieces(k, left, right) if p.end > begin]
             found = [
-                fold([p.value[1], *(earlier.value[0] for earlier in inner[:i])], both)
+                _fold([p.value[1], *(earlier.value[0] for earlier in inner[:i])], _both)
                 for i, p in enumerate(inner)
             ]
-            return fold(found, either)
+            return _fold(found, _either)
 
         return Signal(self.each(at), late)
 
@@ -204,7 +200,7 @@ class _Oracle:
             return surely - need + LEAST, possibly - need + LEAST
 
         def share(k: int) -> Interval:
-            span, now = micro(f.of), self.times[k] - s.delay
+            span, now = _micro(f.of), self.times[k] - s.delay
             surely = possibly = 0.0
             for p in self.pieces(k, s):
                 stands = max(0.0, min(p.end, now) - max(p.start, now - span))
@@ -240,7 +236,9 @@ class _Oracle:
         by = LEAST if "=" in operator else -LEAST
         more, less = (left, right) if ">" in operator else (right, left)
         values = zip(self.term(more), self.term(less), strict=True)
-        return [(number(v[0] - w[1], -inf) + by, number(v[1] - w[0], inf) + by) for v, w in values]
+        return [
+            (_number(v[0] - w[1], -inf) + by, _number(v[1] - w[0], inf) + by) for v, w in values
+        ]
 
     def term(self, t: Term) -> Values:
         match t:
@@ -251,63 +249,63 @@ class _Oracle:
             case Negative(part=part):
                 return [(-h, -low) for low, h in self.term(part)]
             case Combined(name="abs", parts=(part,)):
-                return [absolute(v) for v in self.term(part)]
+                return [_absolute(v) for v in self.term(part)]
             case Combined(name=name, parts=parts):
-                join = both if name == "min" else either
-                return [fold(list(v), join) for v in zip(*map(self.term, parts), strict=True)]
+                join = _both if name == "min" else _either
+                return [_fold(list(v), join) for v in zip(*map(self.term, parts), strict=True)]
             case Arithmetic(left=left, operator=operator, right=right):
                 sides = zip(self.term(left), self.term(right), strict=True)
-                return [computed(operator, v, w) for v, w in sides]
+                return [_computed(operator, v, w) for v, w in sides]
             case OverTime(name="last", part=part, duration=age):
-                return self.last(Signal(self.term(part)), micro(age)).values
+                return self.last(Signal(self.term(part)), _micro(age)).values
             case OverTime(name="lowest" | "highest" as name, part=part, duration=span):
-                join = both if name == "lowest" else either
-                return self.past(Signal(self.term(part)), join, 0, micro(span)).values
+                join = _both if name == "lowest" else _either
+                return self.past(Signal(self.term(part)), join, 0, _micro(span)).values
             case OverTime(name="before", part=part, duration=span):
-                return self.past(Signal(self.term(part)), both, micro(span), micro(span)).values
+                return self.past(Signal(self.term(part)), _both, _micro(span), _micro(span)).values
             case OverTime(part=part, duration=span):
                 now = self.term(part)
-                then = self.past(Signal(now), both, micro(span), micro(span)).values
+                then = self.past(Signal(now), _both, _micro(span), _micro(span)).values
                 return [
-                    (number(v[0] - w[1], -inf) / span.base, number(v[1] - w[0], inf) / span.base)
+                    (_number(v[0] - w[1], -inf) / span.base, _number(v[1] - w[0], inf) / span.base)
                     for v, w in zip(now, then, strict=True)
                 ]
         raise NotImplementedError(t)
 
 
-def both(v: Interval, w: Interval) -> Interval:
+def _both(v: Interval, w: Interval) -> Interval:
     return min(v[0], w[0]), min(v[1], w[1])
 
 
-def either(v: Interval, w: Interval) -> Interval:
+def _either(v: Interval, w: Interval) -> Interval:
     return max(v[0], w[0]), max(v[1], w[1])
 
 
-def fold(values: Values, join: object) -> Interval:
+def _fold(values: Values, join: object) -> Interval:
     return reduce(join, values)  # type: ignore[arg-type]
 
 
-def micro(n: Number) -> int:
+def _micro(n: Number) -> int:
     return round(n.base * 1_000_000)
 
 
-def number(value: float, otherwise: float) -> float:
+def _number(value: float, otherwise: float) -> float:
     return otherwise if isnan(value) else value
 
 
-def absolute(v: Interval) -> Interval:
+def _absolute(v: Interval) -> Interval:
     ends = sorted((abs(v[0]), abs(v[1])))
     return (0.0 if v[0] <= 0 <= v[1] else ends[0], ends[1])
 
 
-def computed(operator: str, v: Interval, w: Interval) -> Interval:
+def _computed(operator: str, v: Interval, w: Interval) -> Interval:
     if operator in "+-":
         w = w if operator == "+" else (-w[1], -w[0])
-        return number(v[0] + w[0], -inf), number(v[1] + w[1], inf)
+        return _number(v[0] + w[0], -inf), _number(v[1] + w[1], inf)
     if operator == "/":
         if w[0] <= 0 <= w[1]:
             return ANYTHING
-        ends = [number(p / q, 0.0) for p in v for q in w]
+        ends = [_number(p / q, 0.0) for p in v for q in w]
     else:
         ends = [0.0 if 0.0 in (p, q) else p * q for p in v for q in w]
     return min(ends), max(ends)

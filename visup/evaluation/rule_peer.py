@@ -1,5 +1,6 @@
-"""Formulas in the syntax of rtamt (Nickovic and Yamaguchi, "RTAMT: online robustness monitors from STL",
-2020), to be compared with where all samples are present and regular.
+"""Formulas for rtamt, to be compared with where all samples are present and regular.
+
+Source: Nickovic and Yamaguchi, "RTAMT: online robustness monitors from STL", 2020.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ def available() -> bool:
     return True
 
 
-def online(formula: Formula, names: tuple[str, ...]) -> Callable[[int, list[tuple[str, float]]], Any]:
+def online(
+    formula: Formula, names: tuple[str, ...]
+) -> Callable[[int, list[tuple[str, float]]], Any]:
     """Rtamt's online monitor of a formula.
 
     Args:
@@ -168,7 +171,9 @@ def _comparison(rng: Random) -> Comparison:
         (x, y, Arithmetic(x, "+", y), Arithmetic(x, "-", y), Combined("abs", (y,)))
     )
     # Numbers of two kinds, so that nothing is equal and the conventions for that do not matter.
-    return Comparison(term, rng.choice(("<", "<=", ">", ">=")), Number(rng.randint(-4, 4) / 2 + 0.25))
+    return Comparison(
+        term, rng.choice(("<", "<=", ">", ">=")), Number(rng.randint(-4, 4) / 2 + 0.25)
+    )
 
 
 def _window(rng: Random, later: float) -> Window:

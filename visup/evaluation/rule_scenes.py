@@ -69,7 +69,9 @@ def observation(index: int, objects: int) -> Observation:
         y = SIZE[1] / 2 + (100 + 8 * k) * sin(angle) - SIDE / 2
         regions.append(box(k + 1, x, y))
     percepts = tuple(Percept("region", r, now, "script") for r in regions)
-    return Observation(index, now, SIZE, (Report("script", ReportState.RAN, ("region",), percepts),))
+    return Observation(
+        index, now, SIZE, (Report("script", ReportState.RAN, ("region",), percepts),)
+    )
 
 
 def box(number: int, x: float, y: float) -> Region:

@@ -78,8 +78,7 @@ def evaluate_rules(
 def alike(one: Sequence[float], other: Sequence[float]) -> bool:
     """Whether two intervals are equal but for the last digits of a division."""
     return all(
-        p == q or isclose(p, q, rel_tol=1e-9, abs_tol=1e-9)
-        for p, q in zip(one, other, strict=True)
+        p == q or isclose(p, q, rel_tol=1e-9, abs_tol=1e-9) for p, q in zip(one, other, strict=True)
     )
 
 
@@ -140,9 +139,7 @@ def _throughput(seed: int, peer: bool) -> dict[str, dict[str, Any]]:
         figures = {"us": slowest, "samples_per_s": 1e6 / slowest}
         figures["slower"] = max(best[window, t] / best[WINDOWS[0], t] for t in texts)
         if peer:
-            ratios = (
-                _theirs(_windowed(t, window), drawn, window) / best[window, t] for t in TIMED
-            )
+            ratios = (_theirs(_windowed(t, window), drawn, window) / best[window, t] for t in TIMED)
             figures["times_rtamt"] = min(ratios)
         found[f"window {window}"] = figures
     return found
