@@ -210,9 +210,9 @@ def _margin(interval: Interval) -> str:
 
 
 def _amount(interval: Interval, unit: str) -> str:
-    low, high = interval
     if interval == UNKNOWN:
         return "unknown"
     scale = 100.0 if unit == "%" else 1.0
-    number = f"{low * scale:.3g}" if low == high else f"{low * scale:.3g} to {high * scale:.3g}"
+    first, last = (f"{bound * scale:.3g}" for bound in interval)
+    number = first if first == last else f"{first} to {last}"
     return f"{number} {unit}".rstrip()

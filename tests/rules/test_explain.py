@@ -82,7 +82,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
     seen_minds = list(minds(4, 90))
 
     def run(mind: Mind | None, rest: list[Mind]) -> list[tuple[object, ...]]:
-        told = []
+        told: list[tuple[object, ...]] = []
         for new in rest:
             if mind is not None:
                 new = new.remember(SAFETY, mind.memory[SAFETY])

@@ -33,7 +33,7 @@ from visup.rules.formula import (
     Window,
 )
 from visup.rules.language import load_rules, parse_formula, parse_rules, shipped_rules
-from visup.rules.terms import Arithmetic, Combined, Measure, OverTime
+from visup.rules.terms import Arithmetic, Combined, Measure, OverTime, Term
 from visup.rules.units import DIMENSION, Number, Unit
 from visup.rules.vocabulary import QUANTITIES, WORDS, signals
 
@@ -69,20 +69,16 @@ def comparisons(draw: st.DrawFn) -> Comparison:
     slack = draw(st.integers(0, 20)) / 2 * (-1 if ">" in operator else 1)
     leave = Number(bound.value + slack, unit) if draw(st.booleans()) else None
     left = Measure(name, arguments(QUANTITIES[name].takes))
-    term = draw(
-        st.sampled_from(
-            [
-                left,
-                Arithmetic(left, "-", Number(2.0, unit)),
-                Arithmetic(Number(3.0), "*", Arithmetic(left, "+", left)),
-                Arithmetic(Arithmetic(left, "/", Number(2.0)), "-", Arithmetic(left, "-", left)),
-                Combined("max", (left, Number(1.0, unit))),
-                Combined("abs", (left,)),
-                OverTime("lowest", left, Number(2.0, Unit.S)),
-            ]
-        )
-    )
-    return Comparison(term, operator, bound, leave)
+    terms: list[Term] = [
+        left,
+        Arithmetic(left, "-", Number(2.0, unit)),
+        Arithmetic(Number(3.0), "*", Arithmetic(left, "+", left)),
+        Arithmetic(Arithmetic(left, "/", Number(2.0)), "-", Arithmetic(left, "-", left)),
+        Combined("max", (left, Number(1.0, unit))),
+        Combined("abs", (left,)),
+        OverTime("lowest", left, Number(2.0, Unit.S)),
+    ]
+    return Comparison(draw(st.sampled_from(terms)), operator, bound, leave)
 
 
 def joined(inner: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:

@@ -74,7 +74,8 @@ def by_arrays(
     compiler = Compiler(Arrays(1))
     place = compiler.formula(formula, (("a", False),))
     prepared = Ruled((), compiler, ())
-    states, ids, told = prepared.program.fresh, tuple[int, ...](), []
+    states, ids = prepared.program.fresh, tuple[int, ...]()
+    told: list[dict[int, Interval]] = []
     for time, objects in zip(times, seen, strict=True):
         now = tuple(sorted(objects))
         if told and now != ids:

@@ -6,7 +6,7 @@ samples, as `docs/rules.md` words it. What it is for is to be compared with.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import inf, isnan
@@ -29,6 +29,7 @@ from visup.rules.terms import Arithmetic, Combined, Measure, Negative, OverTime,
 from visup.rules.units import Number
 
 Interval = tuple[float, float]
+Join = Callable[[Interval, Interval], Interval]
 Sample = tuple[int, dict[str, Interval]]
 """Moment in microseconds; what each signal is then."""
 Values = list[Interval]
@@ -112,8 +113,8 @@ class _Oracle:
                 return self.last(self.formula(part), _micro(age))
         raise NotImplementedError(f)
 
-    def each(self, value: object) -> Values:
-        return [value(k) for k in range(len(self.times))]  # type: ignore[operator]
+    def each(self, value: Callable[[int], Interval]) -> Values:
+        return [value(k) for k in range(len(self.times))]
 
     def pieces(self, k: int, *signals: Signal) -> list[Piece]:
         """Signals of one delay as pieces of time, with what is known at sample k."""
@@ -135,7 +136,7 @@ class _Oracle:
     def so_far(self, k: int, signal: Signal) -> Values:
         return [p.value[0] for p in self.pieces(k, signal)[1:]]
 
-    def past(self, s: Signal, join: object, a: int, b: int) -> Signal:
+    def past(self, s: Signal, join: Join, a: int, b: int) -> Signal:
         def back(k: int) -> Interval:
             moment = self.times[k] - s.delay
             return _fold(self.meeting(k, moment - b, moment - a, s), join)
@@ -153,7 +154,7 @@ class _Oracle:
 
         return [Signal([at(s, k) for k in range(len(self.times))], late) for s in signals]
 
-    def joined(self, signals: list[Signal], join: object) -> Signal:
+    def joined(self, signals: list[Signal], join: Join) -> Signal:
         signals = self.waited(signals)
         values = [_fold(list(v), join) for v in zip(*(s.values for s in signals), strict=True)]
         return Signal(values, signals[0].delay)
@@ -281,8 +282,8 @@ def _either(v: Interval, w: Interval) -> Interval:
     return max(v[0], w[0]), max(v[1], w[1])
 
 
-def _fold(values: Values, join: object) -> Interval:
-    return reduce(join, values)  # type: ignore[arg-type]
+def _fold(values: Values, join: Join) -> Interval:
+    return reduce(join, values)
 
 
 def _micro(n: Number) -> int:
