@@ -95,7 +95,8 @@ def explain(
                 break
     if mind is None or mind.time < at:
         raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
-    for text in explanations(mind, rule):
+    told = explanations(mind, rule)
+    for text in told or [f"at {mind.time:g} s too few objects are in view for any choice"]:
         typer.echo(text)
 
 
