@@ -6,14 +6,18 @@ stands in it too (`memory`), so that a snapshot of a mind is a snapshot of every
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, empty
 from visup.agent.relations import Relation, RelationTable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 NO_OBJECTS: Mapping[int, ObjectBelief] = MappingProxyType({})
 NO_ANSWERS: Mapping[int, str] = MappingProxyType({})
@@ -337,6 +341,10 @@ class Mind:
     def holding(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""
         return self._table.true(*names)
+
+    def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
+        """A relation between all of some objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
+        return self._table.truths(name, ids)
 
     @property
     def _table(self) -> RelationTable:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 UNKNOWN_CODE = -1
+_CODES = {Truth.TRUE: 1, Truth.UNKNOWN: 0, Truth.FALSE: -1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +143,36 @@ class RelationTable(Sequence[Relation]):
                     pair = pairs[k] if row == 0 else pairs[k][::-1]
                     found.append(column.relation(code, pair, int(row), int(k)))
         return tuple(sorted(found, key=lambda r: r.objects))
+
+    def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
+        """A relation between all of some objects.
+
+        Args:
+            name: Any relation, listed or not.
+            ids: Objects, in any order.
+
+        Returns:
+            (n, n) int8, a the row and b the column: 1 true, -1 false, 0 unknown or not judged.
+        """
+        import numpy as np
+
+        codes = np.zeros((len(ids), len(ids)), dtype=np.int8)
+        row = {object_id: i for i, object_id in enumerate(ids)}
+        at = self._named.get(name)
+        if at is not None:
+            column, code = at
+            first, second = np.triu_indices(len(self.ids), 1)
+            where = np.array([row.get(i, -1) for i in self.ids], dtype=np.intp)
+            a, b = where[first], where[second]
+            here = (a >= 0) & (b >= 0)
+            told = np.where(column.state == code, 1, np.where(column.state == UNKNOWN_CODE, 0, -1))
+            codes[a[here], b[here]] = told[0, here]
+            codes[b[here], a[here]] = told[-1, here]
+        for r in self.extra:
+            if r.name == name and len(r.objects) == 2 and set(r.objects) <= row.keys():
+                i, j = (row[o] for o in r.objects)
+                codes[i, j] = codes[j, i] = _CODES[r.truth]
+        return codes
 
     def all(self) -> Iterator[Relation]:
         """Everything that is judged, listed or not: of each question the relation that holds."""

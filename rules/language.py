@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
-from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
-from lark import v_args as with_meta
+from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 
-from visup.agent import Severity
 from visup.agent.errors import ManyErrors, Place, RuleError, VisupError
-from visup.rules.check import faults
-from visup.rules.formula import (
-    And,
-    Comparison,
-    For,
-    Formula,
-    Measure,
-    Not,
-    Number,
-    Or,
-    Predicate,
-    Rule,
-    Span,
-    Unit,
-)
+from visup.rules.check import Checker
+from visup.rules.formula import Formula, Rule
+from visup.rules.transform import read_tree
+from visup.rules.vocabulary import RULES, Vocabulary
 
 _HEAD = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
 _WANTED = {
@@ -39,9 +27,20 @@ _WANTED = {
     "SEVERITY": "info, warning or critical",
     "NAME": "a name",
     "NUMBER": "a number",
-    "UNIT": "a unit (s, ms, min, px, px/s, %, deg)",
+    "UNIT": "a unit (s, ms, min, px, px/s, px/s2, %, deg, deg/s, /s)",
     "STRING": "a sentence in double quotes on one line",
     "OPERATOR": "<, <=, > or >=",
+    "LSQB": "'['",
+    "RSQB": "']'",
+    "__ANON_0": "'..'",
+    "PLUS": "'+'",
+    "MINUS": "'-'",
+    "TIMES": "'*'",
+    "OVER": "'/'",
+    "PAST": "'once', 'always'",
+    "FUTURE": "'eventually', 'henceforth'",
+    "QUANTIFIER": "'exists', 'forall'",
+    "REPEAT": "'may repeat'",
     "$END": "the end of the file",
 }
 
@@ -61,21 +60,57 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         ManyErrors: It has several; each rule is read by itself, so that one syntax fault in a rule
             hides nothing of the others.
     """
+    checker = Checker(text, file)
     errors: list[VisupError] = []
     rules: list[Rule] = []
+    sound: list[Rule] = []
     for block in _blocks(text):
         try:
-            tree = _parser().parse(block)
+            tree = _parser().parse(block, start="start")
         except UnexpectedInput as fault:
             errors.append(_syntax_error(fault, text, file))
             continue
-        rules += cast("list[Rule]", _ToTree(file).transform(tree))
-    errors += faults(tuple(rules), text, file)
+        found, faults = read_tree(tree, file)
+        errors += [checker.fault(*f) for f in faults]
+        rules += found
+        sound += () if faults else found
+    errors += [*checker.twice(rules), *(fault for rule in sound for fault in checker.rule(rule))]
+    raise_all(errors)
+    return tuple(rules)
+
+
+def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
+    """Read one formula without object variables, such as one of signals.
+
+    Args:
+        text: The formula.
+        vocabulary: What it may name.
+
+    Returns:
+        Its tree.
+
+    Raises:
+        RuleError: It has one fault.
+        ManyErrors: It has several.
+    """
+    file = "<formula>"
+    try:
+        tree = _parser().parse(text, start="formula")
+    except UnexpectedInput as fault:
+        raise _syntax_error(fault, text, file) from None
+    checker = Checker(text, file, vocabulary)
+    found, faults = read_tree(tree, file)
+    raise_all([checker.fault(*f) for f in faults] or list(checker.formula(found)))
+    return cast("Formula", found)
+
+
+def raise_all(errors: Sequence[VisupError]) -> None:
+    """Raise what is wrong: one error as itself, several as one, none not at all."""
+    errors = list(errors)
     if len(errors) == 1:
         raise errors[0]
     if errors:
         raise ManyErrors(sorted(errors, key=_place))
-    return tuple(rules)
 
 
 def load_rules(path: str | Path) -> tuple[Rule, ...]:
@@ -110,7 +145,10 @@ def shipped_rules() -> tuple[Rule, ...]:
 @lru_cache(maxsize=1)
 def _parser() -> Lark:
     grammar = files("visup.rules").joinpath("rules.lark").read_text(encoding="utf-8")
-    return Lark(grammar, parser="lalr", propagate_positions=True, maybe_placeholders=True)
+    starts = ["start", "formula"]
+    return Lark(
+        grammar, start=starts, parser="lalr", propagate_positions=True, maybe_placeholders=True
+    )
 
 
 def _blocks(text: str) -> list[str]:
@@ -163,77 +201,3 @@ def _slip(found: str, wanted: set[str]) -> str | None:
     known += ["info", "warning", "critical"] if "SEVERITY" in wanted else []
     close = get_close_matches(found.lower(), known, 1, 0.6) if found else []
     return f"did you mean '{close[0]}'?" if close else None
-
-
-def _span(meta: Any) -> Span:
-    one_line = meta.end_line == meta.line
-    return Span(meta.line, meta.column, meta.end_column - meta.column if one_line else 1)
-
-
-@with_meta(meta=True)
-class _ToTree(Transformer[Token, Any]):
-    """Lark's tree to ours."""
-
-    def __init__(self, file: str) -> None:
-        super().__init__()
-        self.file = file
-
-    def start(self, meta: Any, parts: list[Any]) -> list[Rule]:
-        return parts
-
-    def rule(self, meta: Any, parts: list[Any]) -> Rule:
-        name, variables, severity, when, unless, hold, say = parts
-        return Rule(
-            name=str(name),
-            variables=variables or (),
-            severity=Severity[str(severity).upper()],
-            when=when,
-            say=say,
-            unless=unless,
-            hold=hold,
-            span=Span(name.line, name.column, len(name)),
-            file=self.file,
-        )
-
-    def variables(self, meta: Any, parts: list[Token]) -> tuple[str, ...]:
-        return tuple(str(p) for p in parts)
-
-    words = variables
-
-    def when(self, meta: Any, parts: list[Any]) -> Formula:
-        return cast("Formula", parts[0])
-
-    unless = when
-
-    def hold(self, meta: Any, parts: list[Any]) -> Number:
-        return cast("Number", parts[0])
-
-    def say(self, meta: Any, parts: list[Token]) -> str:
-        return str(parts[0])[1:-1]
-
-    def or_(self, meta: Any, parts: list[Formula]) -> Or:
-        return Or(tuple(parts))
-
-    def and_(self, meta: Any, parts: list[Formula]) -> And:
-        return And(tuple(parts))
-
-    def not_(self, meta: Any, parts: list[Formula]) -> Not:
-        return Not(parts[0])
-
-    def for_(self, meta: Any, parts: list[Any]) -> For:
-        return For(parts[0], parts[1])
-
-    def predicate(self, meta: Any, parts: list[Any]) -> Predicate:
-        return Predicate(str(parts[0]), parts[1] or (), _span(meta))
-
-    def measure(self, meta: Any, parts: list[Any]) -> Measure:
-        return Measure(str(parts[0]), parts[1] or (), _span(meta))
-
-    def comparison(self, meta: Any, parts: list[Any]) -> Comparison:
-        return Comparison(parts[0], str(parts[1]), parts[2], _span(meta))
-
-    def number(self, meta: Any, parts: list[Any]) -> Number:
-        unit = Unit.NONE if parts[1] is None else Unit(str(parts[1]))
-        return Number(float(parts[0]), unit, _span(meta))
-
-    duration = number

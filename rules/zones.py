@@ -10,11 +10,11 @@ How to read them off a mind:
 
 - `inside(mind, object_id, zone_name) -> Truth`: the centre is inside;
 - `reaching(mind, object_id, zone_name) -> Truth`: some part is;
-- `within(mind, object_id, zone_name) -> Truth`: all of it is;
+- `wholly_inside(mind, object_id, zone_name) -> Truth`: all of it is;
 - `distance_outside(mind, object_id, zone_name) -> float`: pixels from the centre to the edge of the
   polygon, negative inside it, NaN unknown.
 
-The mind's relations hold the same as `inside NAME`, `reaching NAME` and `within NAME`.
+The mind's relations hold the same as `inside NAME`, `reaching NAME` and `wholly_inside NAME`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from visup.rules.measure import scale
 from visup.rules.smooth import smoothed
 
 ZONES = "rules.zones"
-QUESTIONS = ("inside", "reaching", "within")
+QUESTIONS = ("inside", "reaching", "wholly_inside")
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,17 +191,17 @@ def contains(points: Floats, polygon: Floats) -> NDArray[np.bool_]:
 
 def inside(mind: Mind, object_id: int, zone: str) -> Truth:
     """Whether an object's centre is inside a zone; unknown for what is not judged."""
-    return _asked(mind, "inside", object_id, zone)
+    return asked(mind, "inside", object_id, zone)
 
 
 def reaching(mind: Mind, object_id: int, zone: str) -> Truth:
     """Whether some part of an object is inside a zone."""
-    return _asked(mind, "reaching", object_id, zone)
+    return asked(mind, "reaching", object_id, zone)
 
 
-def within(mind: Mind, object_id: int, zone: str) -> Truth:
+def wholly_inside(mind: Mind, object_id: int, zone: str) -> Truth:
     """Whether all of an object is inside a zone."""
-    return _asked(mind, "within", object_id, zone)
+    return asked(mind, "wholly_inside", object_id, zone)
 
 
 def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
@@ -212,7 +212,8 @@ def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
     return float(kept.outside[kept.names.index(zone), kept.ids.index(object_id)])
 
 
-def _asked(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
+def asked(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
+    """One of `QUESTIONS` about an object and a zone; unknown for what is not judged."""
     kept: Kept = mind.memory.get(ZONES, Kept())
     if zone not in kept.names or object_id not in kept.ids:
         return Truth.UNKNOWN

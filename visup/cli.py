@@ -15,6 +15,7 @@ from visup.commands.doctor import doctor
 from visup.commands.evaluate import app as evaluate_app
 from visup.commands.models import app as models_app
 from visup.commands.render import render
+from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task import app as task_app
 from visup.commands.watch import demo, watch
@@ -39,6 +40,7 @@ app.command("step")(step)
 app.command("render")(render)
 app.command("doctor")(doctor)
 app.add_typer(task_app, name="task", help="Check, show and list task files.")
+app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
 app.add_typer(evaluate_app, name="eval", help="Compute figures against ground truth.")
 app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")

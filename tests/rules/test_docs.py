@@ -7,16 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from visup.rules.facts import IMPLIED, QUANTITIES, WORDS
-from visup.rules.formula import DIMENSION
+from visup.rules.bounds import MOST_KEPT, MOST_VARIABLES
+from visup.rules.facts import SIGMAS
 from visup.rules.fragments import FragmentSettings
 from visup.rules.language import parse_rules, shipped_rules
 from visup.rules.measure import RelationSettings
+from visup.rules.operators import REACH, SPACING
 from visup.rules.thinkers import RuleSettings
+from visup.rules.units import DIMENSION, TICKS
+from visup.rules.vocabulary import IMPLIED, KEEP_OUT, QUANTITIES, WORDS
 from visup.rules.work import PresenceSettings
 
 PAGE = (Path(__file__).parents[2] / "docs/rules.md").read_text("utf-8")
-BLOCKS = re.findall(r"```\n(.*?)```", PAGE, re.S)
+BLOCKS = [t for kind, t in re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.S | re.M) if not kind]
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
     for line in re.findall(r"^\|.*\|$", PAGE, re.M)
@@ -29,19 +32,22 @@ def test_every_example_of_the_page_is_in_the_language(block: str) -> None:
 
 
 def test_the_page_explains_every_word_and_quantity_with_its_arguments() -> None:
-    told = {m[1]: len(m[2].split(", ")) if m[2] else 0 for r in ROWS if (m := _call(r[0]))}
+    told = {n: len(words.split(", ")) if words else 0 for r in ROWS for n, words in _calls(r[0])}
     known = {n: len(w.takes) for n, w in WORDS.items()}
     known |= {n: len(q.takes) for n, q in QUANTITIES.items()}
     assert told == known
 
 
-def _call(cell: str) -> re.Match[str] | None:
-    return re.fullmatch(r"`(\w+)\(([^)]*)\)`", cell)
+def _calls(cell: str) -> list[tuple[str, str]]:
+    """Name and arguments of the calls of which a cell consists, and nothing but commas."""
+    call = r"`(\w+)\(([^)]*)\)`"
+    return re.findall(call, cell) if re.fullmatch(f"{call}(, {call})*", cell) else []
 
 
 def test_units_of_quantities_are_those_of_their_dimension() -> None:
     units = {str(unit): dimension for unit, (dimension, _) in DIMENSION.items()}
-    rows = {m[1]: r[1].strip("`") for r in ROWS if len(r) == 3 and (m := _call(r[0]))}
+    assert KEEP_OUT in PAGE
+    rows = {n: r[1].strip("`") for r in ROWS if len(r) == 3 for n, _ in _calls(r[0])}
     assert {name: units[unit] for name, unit in rows.items()} == {
         name: q.dimension for name, q in QUANTITIES.items()
     }
@@ -60,6 +66,11 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
 @pytest.mark.parametrize(
     ("text", "value"),
     [
+        ("speaks for what follows it, but for no more than {:g} s", REACH / TICKS),
+        ("closer than {:g} ms", 1000 * SPACING / TICKS),
+        ("at most {:,} values", MOST_KEPT),
+        ("at most {} objects together", MOST_VARIABLES),
+        ("value +- {:g} standard deviation", SIGMAS),
         ("trend above {} D/s", RelationSettings().rate_enter),
         ("below {} D/s, or turned", RelationSettings().rate_exit),
         ("gap at most {} D", RelationSettings().touch_enter),

@@ -157,11 +157,11 @@ NAMED = {Truth.TRUE: "probe", Truth.FALSE: "dish", Truth.UNKNOWN: None}
 
 
 def by_history(values: list[Truth]) -> Truth:
-    """True if true in all of the last 0.3 s, unknown if at least never false, else false."""
+    """False if false in the last 0.3 s, true if true in all of it; before the first sample unknown."""
     tail = values[-4:]
-    if len(tail) < 4 or Truth.FALSE in tail:
+    if Truth.FALSE in tail:
         return Truth.FALSE
-    return Truth.TRUE if set(tail) == {Truth.TRUE} else Truth.UNKNOWN
+    return Truth.TRUE if len(tail) == 4 and set(tail) == {Truth.TRUE} else Truth.UNKNOWN
 
 
 @settings(max_examples=80, deadline=None)

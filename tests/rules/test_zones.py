@@ -15,7 +15,7 @@ from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Truth, Zone
 from visup.agent.errors import ManyErrors, SettingsError
 from visup.rules.thinkers import default_thinkers
-from visup.rules.zones import contains, distance_outside, inside, outside, reaching, within
+from visup.rules.zones import contains, distance_outside, inside, outside, reaching, wholly_inside
 from visup.zones import load_zones
 
 DOCK = Zone("dock", ((300.0, 100.0), (500.0, 100.0), (500.0, 400.0), (300.0, 400.0)))
@@ -43,12 +43,12 @@ def test_a_body_reaches_then_is_inside_then_is_within() -> None:
     run = list(minds(lambda t: 180 + 20 * t, 8.0))
     first = {
         ask.__name__: next(m.time for m in run if ask(m, 1, "dock") is Truth.TRUE)
-        for ask in (reaching, inside, within)
+        for ask in (reaching, inside, wholly_inside)
     }
     assert first["reaching"] == pytest.approx(2.4, abs=0.2)  # its right edge at 300
     assert first["inside"] == pytest.approx(4.4, abs=0.2)
-    assert first["within"] == pytest.approx(6.4, abs=0.2)
-    told = run[-1].relation("within dock", 1)
+    assert first["wholly_inside"] == pytest.approx(6.4, abs=0.2)
+    told = run[-1].relation("wholly_inside dock", 1)
     assert told is not None
     assert told.truth is Truth.TRUE
     assert distance_outside(run[-1], 1, "dock") == pytest.approx(-78.5, abs=1.5)

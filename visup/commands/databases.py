@@ -38,7 +38,7 @@ def scale(
         return evaluate_scale(models, most=views, seed=seed, progress=tell)
 
     settings = {"views": views, "seed": seed}
-    figures = _run(f"scale: {models}", run, SCALE_KEYS, json_file, settings)
+    figures = run_and_show(f"scale: {models}", run, SCALE_KEYS, json_file, settings)
     total = figures["total"]
     typer.echo(
         f"built at {total['build_views_per_s']:.0f} views a second; "
@@ -59,20 +59,21 @@ def robustness(
         return evaluate_robustness(files=files, masks=masks, seed=seed, progress=tell)
 
     settings = {"files": files, "masks": masks, "seed": seed}
-    figures = _run("robustness", run, ROBUSTNESS_KEYS, json_file, settings)
+    figures = run_and_show("robustness", run, ROBUSTNESS_KEYS, json_file, settings)
     for failure in figures["failures"]:
         typer.echo("{kind}, number {number}: {what}, {seconds:.2f} s".format(**failure))
     if figures["failures"]:
         raise typer.Exit(1)
 
 
-def _run(
+def run_and_show(
     title: str,
     run: Callable[[Callable[[str], None]], dict[str, Any]],
     keys: tuple[str, ...],
     json_file: Path | None,
     settings: Mapping[str, Any],
 ) -> dict[str, Any]:
+    """Run an evaluation with a line of progress, print its figures and write them to a file."""
     from rich.console import Console
 
     from visup.commands.evaluate import print_table, told, writable

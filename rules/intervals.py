@@ -1,0 +1,198 @@
+"""Intervals [low, high]: what is known of a quantity, and of how far a formula is from changing.
+
+One algebra of two kinds: of single intervals (`Scalars`), and of arrays of them for all choices of
+objects at once (`Arrays`). What stands above, the operators over time, is written once for both.
+
+A formula's robustness is how far its quantities are from where it changes its truth (Donze and
+Maler, "Robust satisfaction of temporal logic over real-valued signals", 2010); as an interval it
+also says how little is known (Deshmukh and others, "Robust online monitoring of signal temporal
+logic", 2017). It is true when all of it lies above 0, false when all of it lies below, else
+unknown. A fact, which is no matter of degree, has an infinite one, and what is not known at all has
+[-inf, inf]. Where two quantities are equal, `>=` and `<=` hold and `>` and `<` do not: `EQUAL` is
+added or subtracted, which changes no other number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, isnan
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Interval = tuple[float, float]
+Box = NDArray[np.float64]
+"""(2, ...) array: lower bounds, upper bounds."""
+
+UNKNOWN: Interval = (-inf, inf)
+FALSE: Interval = (-inf, -inf)
+TRUE: Interval = (inf, inf)
+EQUAL = 1e-300
+
+
+class Algebra(Protocol):
+    """What operators over time ask of intervals; `v` and `w` are intervals of its kind."""
+
+    def constant(self, value: Interval) -> Any:
+        """An interval that is the same for all choices of objects."""
+
+    def least(self, v: Any, w: Any) -> Any:
+        """The lesser of each bound: 'and'."""
+
+    def most(self, v: Any, w: Any) -> Any:
+        """The greater of each bound: 'or'."""
+
+    def negated(self, v: Any) -> Any:
+        """Zero minus the interval: 'not'."""
+
+    def known(self, v: Any) -> Any:
+        """Whether anything is known: not [-inf, inf]."""
+
+    def held(self, v: Any) -> Any:
+        """(surely, possibly) true, each 0 or 1."""
+
+    def choose(self, which: Any, v: Any, w: Any) -> Any:
+        """The first where `which`, else the second."""
+
+    def scaled(self, v: Any, factor: float) -> Any:
+        """Times a number that is not negative; also of what `held` gives."""
+
+    def added(self, v: Any, w: Any) -> Any:
+        """The sum; also of what `held` gives."""
+
+    def shifted(self, v: Any, by: float) -> Any:
+        """A number added to both bounds."""
+
+
+class Scalars:
+    """Single intervals, as pairs of floats."""
+
+    def constant(self, value: Interval) -> Interval:
+        """See `Algebra`."""
+        return value
+
+    def least(self, v: Interval, w: Interval) -> Interval:
+        """See `Algebra`."""
+        a, b = v
+        c, d = w
+        return (a if a < c else c, b if b < d else d)
+
+    def most(self, v: Interval, w: Interval) -> Interval:
+        """See `Algebra`."""
+        a, b = v
+        c, d = w
+        return (a if a > c else c, b if b > d else d)
+
+    def negated(self, v: Interval) -> Interval:
+        """See `Algebra`."""
+        return (-v[1], -v[0])
+
+    def known(self, v: Interval) -> bool:
+        """See `Algebra`."""
+        return v != UNKNOWN
+
+    def held(self, v: Interval) -> Interval:
+        """See `Algebra`."""
+        return (1.0 if v[0] > 0 else 0.0, 1.0 if v[1] >= 0 else 0.0)
+
+    def choose(self, which: bool, v: Any, w: Any) -> Any:
+        """See `Algebra`."""
+        return v if which else w
+
+    def scaled(self, v: Interval, factor: float) -> Interval:
+        """See `Algebra`."""
+        return (v[0] * factor, v[1] * factor)
+
+    def added(self, v: Interval, w: Interval) -> Interval:
+        """See `Algebra`."""
+        low, high = v[0] + w[0], v[1] + w[1]
+        return (-inf if isnan(low) else low, inf if isnan(high) else high)
+
+    def shifted(self, v: Interval, by: float) -> Interval:
+        """See `Algebra`."""
+        return (v[0] + by, v[1] + by)
+
+    def absolute(self, v: Interval) -> Interval:
+        """Of an interval that spans 0, all up to the farther bound."""
+        low, high = v
+        return (max(low, -high, 0.0), max(-low, high))
+
+    def times(self, v: Interval, w: Interval) -> Interval:
+        """The product; 0 times what is without end is 0."""
+        products = [0.0 if p == 0.0 or q == 0.0 else p * q for p in v for q in w]
+        return (min(products), max(products))
+
+    def over(self, v: Interval, w: Interval) -> Interval:
+        """The quotient; by an interval that holds 0, nothing is known of it."""
+        if w[0] <= 0.0 <= w[1]:
+            return UNKNOWN
+        return self.times(v, (1.0 / w[1], 1.0 / w[0]))
+
+
+class Arrays:
+    """(2, ...) arrays of intervals, one for each choice of objects.
+
+    Args:
+        axes: How many object variables there are at most, that is, dimensions after the first.
+    """
+
+    def __init__(self, axes: int) -> None:
+        self.axes = axes
+
+    def constant(self, value: Interval) -> Box:
+        """See `Algebra`."""
+        return np.array(value).reshape(2, *(1,) * self.axes)
+
+    least: Callable[[Any, Box, Box], Box] = staticmethod(np.minimum)  # type: ignore[assignment]
+    most: Callable[[Any, Box, Box], Box] = staticmethod(np.maximum)  # type: ignore[assignment]
+    choose: Callable[..., Box] = staticmethod(np.where)  # type: ignore[assignment]
+    scaled: Callable[[Any, Box, float], Box] = staticmethod(np.multiply)  # type: ignore[assignment]
+    shifted: Callable[[Any, Box, float], Box] = staticmethod(np.add)  # type: ignore[assignment]
+
+    def negated(self, v: Box) -> Box:
+        """See `Algebra`."""
+        negative: Box = -v[::-1]
+        return negative
+
+    def known(self, v: Box) -> NDArray[np.bool_]:
+        """See `Algebra`."""
+        known: NDArray[np.bool_] = (v[0] > -inf) | (v[1] < inf)
+        return known
+
+    def held(self, v: Box) -> Box:
+        """See `Algebra`."""
+        return np.stack((v[0] > 0, v[1] >= 0)).astype(np.float64)
+
+    def added(self, v: Box, w: Box) -> Box:
+        """See `Algebra`."""
+        with np.errstate(invalid="ignore"):
+            total: Box = v + w
+        return _widened(total)
+
+    def absolute(self, v: Box) -> Box:
+        """See `Scalars`."""
+        low, high = v
+        return np.stack((np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)))
+
+    def times(self, v: Box, w: Box) -> Box:
+        """See `Scalars`."""
+        with np.errstate(invalid="ignore"):
+            products = np.stack([p * q for p in v for q in w])
+        products[np.isnan(products)] = 0.0
+        return np.stack((products.min(axis=0), products.max(axis=0)))
+
+    def over(self, v: Box, w: Box) -> Box:
+        """See `Scalars`."""
+        with np.errstate(divide="ignore"):
+            quotient = self.times(v, 1.0 / w[::-1])
+        around = (w[0] <= 0.0) & (w[1] >= 0.0)
+        return np.where(around, self.constant(UNKNOWN), quotient)
+
+
+def _widened(v: Box) -> Box:
+    """What is no number becomes unknown."""
+    if np.isnan(v).any():
+        v[0][np.isnan(v[0])] = -inf
+        v[1][np.isnan(v[1])] = inf
+    return v

@@ -1,0 +1,140 @@
+"""Numbers with units, and what they measure: sums need one dimension, products make new ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Where a node stands in its file: line and column from 1, length in characters."""
+
+    line: int = 1
+    column: int = 1
+    length: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """What a number measures: powers of length, time and angle; a share has none of them.
+
+    Attributes:
+        length: Power of pixels.
+        time: Power of seconds.
+        angle: Power of degrees.
+    """
+
+    length: int = 0
+    time: int = 0
+    angle: int = 0
+
+    def __mul__(self, other: Dimension) -> Dimension:
+        """The dimension of a product."""
+        return Dimension(
+            self.length + other.length, self.time + other.time, self.angle + other.angle
+        )
+
+    def __truediv__(self, other: Dimension) -> Dimension:
+        """The dimension of a quotient."""
+        return Dimension(
+            self.length - other.length, self.time - other.time, self.angle - other.angle
+        )
+
+    def __str__(self) -> str:
+        return NAMES.get(self) or " ".join(
+            f"{unit}^{power}"
+            for unit, power in (("px", self.length), ("s", self.time), ("deg", self.angle))
+            if power
+        )
+
+
+SHARE = Dimension()
+LENGTH = Dimension(length=1)
+TIME = Dimension(time=1)
+ANGLE = Dimension(angle=1)
+SPEED = LENGTH / TIME
+TURNING = ANGLE / TIME
+ACCELERATION = SPEED / TIME
+CHANGE = SHARE / TIME
+
+NAMES = {
+    SHARE: "share",
+    LENGTH: "length",
+    TIME: "time",
+    ANGLE: "angle",
+    SPEED: "speed",
+    TURNING: "rate of turn",
+    ACCELERATION: "acceleration",
+    CHANGE: "rate of change",
+}
+"""Dimensions that have a name, for messages and docs."""
+
+
+class Unit(StrEnum):
+    """What a number counts."""
+
+    NONE = ""
+    S = "s"
+    MS = "ms"
+    MIN = "min"
+    PX = "px"
+    PX_S = "px/s"
+    PX_S2 = "px/s2"
+    PERCENT = "%"
+    DEG = "deg"
+    DEG_S = "deg/s"
+    PER_S = "/s"
+
+
+DIMENSION = {
+    Unit.NONE: (SHARE, 1.0),
+    Unit.S: (TIME, 1.0),
+    Unit.MS: (TIME, 0.001),
+    Unit.MIN: (TIME, 60.0),
+    Unit.PX: (LENGTH, 1.0),
+    Unit.PX_S: (SPEED, 1.0),
+    Unit.PX_S2: (ACCELERATION, 1.0),
+    Unit.PERCENT: (SHARE, 0.01),
+    Unit.DEG: (ANGLE, 1.0),
+    Unit.DEG_S: (TURNING, 1.0),
+    Unit.PER_S: (CHANGE, 1.0),
+}
+"""Unit -> what it measures, and how many of the base unit it is."""
+
+TICKS = 1_000_000
+"""Moments are counted in whole microseconds, so that the ends of windows compare exactly."""
+
+
+def ticks(seconds: float) -> int:
+    """Seconds as a whole number of microseconds."""
+    return round(seconds * TICKS)
+
+
+def units_of(dimension: Dimension) -> str:
+    """The units in which a dimension is written, for messages: 'a speed: px/s'."""
+    units = [str(u) or "no unit" for u, (d, _) in DIMENSION.items() if d == dimension]
+    return f"a {dimension}: {', '.join(units)}" if units else f"a quantity in {dimension}"
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """`20 s`: a number with its unit."""
+
+    value: float
+    unit: Unit = Unit.NONE
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    @property
+    def base(self) -> float:
+        """The number in the base unit of its dimension: seconds, pixels, share of one."""
+        return self.value * DIMENSION[self.unit][1]
+
+    @property
+    def dimension(self) -> Dimension:
+        """What it measures."""
+        return DIMENSION[self.unit][0]
+
+    def __str__(self) -> str:
+        digits = f"{self.value:.10f}".rstrip("0").rstrip(".")
+        return f"{digits} {self.unit}".rstrip()

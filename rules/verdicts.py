@@ -1,0 +1,174 @@
+"""Rules over a mind: all of them, for all choices of objects, in one run of one program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.rules.bounds import variables_of
+from visup.rules.facts import Facts
+from visup.rules.formula import Predicate, Rule
+from visup.rules.intervals import Arrays, Box
+from visup.rules.operators import Pick
+from visup.rules.program import Compiler, Moment, Place, Program, Scope
+from visup.rules.terms import Measure
+from visup.rules.vocabulary import RULES, Quantity, Word
+
+TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
+"""Intervals of what is false, unknown, true; by code + 1."""
+States = tuple[Any, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Ruled:
+    """Rules made ready to run.
+
+    Attributes:
+        rules: The rules.
+        compiler: Knows where the value of every formula is found.
+        places: Of each rule: `when`, and `unless` if there is one.
+    """
+
+    rules: tuple[Rule, ...]
+    compiler: Compiler
+    places: tuple[tuple[Place, ...], ...]
+
+    @property
+    def program(self) -> Program:
+        """All steps of all rules."""
+        return self.compiler.program
+
+
+@lru_cache(maxsize=16)
+def ruled(rules: tuple[Rule, ...]) -> Ruled:
+    """Rules made ready to run; the same object for the same rules."""
+    compiler = Compiler(Arrays(max(map(variables_of, rules), default=0)))
+    return Ruled(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
+
+
+def scope_of(rule: Rule) -> Scope:
+    """The variables of a rule by axis."""
+    return tuple((v, v in rule.may_repeat) for v in rule.variables)
+
+
+class Values:
+    """The values of all formulas at one step.
+
+    Args:
+        prepared: The rules.
+        facts: The mind.
+        now: Microseconds.
+        before: States of the operators before, for the objects of `facts`.
+
+    Attributes:
+        after: States after.
+    """
+
+    def __init__(self, prepared: Ruled, facts: Facts, now: int, before: States) -> None:
+        self.prepared = prepared
+        self.facts = facts
+        self.axes = prepared.compiler.algebra.axes
+        self._same: dict[tuple[int, int], NDArray[np.bool_]] = {}
+        moment = Moment(now, before, self._look, self._same_object)
+        self._values: list[Box] = prepared.program.step(moment)
+        self.after: States = tuple(moment.after)
+
+    def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:
+        """A fact or quantity of all objects, laid along its axes."""
+        fact = isinstance(node, Predicate)
+        word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
+        others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
+        found: Any = word.look(self.facts, *others)
+        value: Box = TRUTHS[:, found + 1] if fact else found
+        if len(axes) == 2 and axes[0] > axes[1]:
+            value = value.swapaxes(1, 2)
+        n = len(self.facts.ids)
+        return value.reshape(2, *(n if axis in axes else 1 for axis in range(self.axes)))
+
+    def _same_object(self, one: int, other: int) -> NDArray[np.bool_]:
+        """Whether two axes stand for one object."""
+        key = (min(one, other), max(one, other))
+        if key not in self._same:
+            n = len(self.facts.ids)
+            shape = [n if axis in key else 1 for axis in range(self.axes)]
+            same = np.ones(n, bool) if one == other else np.eye(n, dtype=bool)
+            self._same[key] = same.reshape(shape)
+        return self._same[key]
+
+    def at(self, place: Place) -> Box:
+        """(2, ...) the interval of a formula for all choices of objects."""
+        return self._values[place.step]
+
+    def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
+        """Every rule with every choice of objects for which it is true and not suspended."""
+        for rule, places in zip(self.prepared.rules, self.prepared.places, strict=True):
+            holds = self.at(places[0])[0] > 0
+            if len(places) > 1 and holds.any():
+                holds = holds & ~(self.at(places[1])[0] > 0)
+            if holds.any():
+                yield from ((rule, ids) for ids in self._choices(rule, holds))
+
+    def _choices(self, rule: Rule, holds: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
+        count, ids = len(rule.variables), self.facts.ids
+        for i, j in combinations(range(count), 2):
+            if rule.variables[i] not in rule.may_repeat and (
+                rule.variables[j] not in rule.may_repeat
+            ):
+                holds = holds & ~self._same_object(i, j)
+        shape = (len(ids),) * count + (1,) * (self.axes - count)
+        for rows in np.argwhere(np.broadcast_to(holds, shape)):
+            yield tuple(ids[row] for row in rows[:count])
+
+
+def rerowed(
+    prepared: Ruled, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
+) -> States:
+    """The states of the operators for other objects.
+
+    Args:
+        prepared: The rules.
+        states: States for the old objects.
+        now: Microseconds of the sample at which they change.
+        old: Their ids.
+        new: Ids of the new ones; of those that are not among the old nothing is known yet.
+
+    Returns:
+        The states for the new objects.
+    """
+    place = {object_id: i for i, object_id in enumerate(old)}
+    rows = np.array([place.get(i, -1) for i in new], dtype=np.intp)
+    return tuple(
+        state
+        if state is None or not axes
+        else operator.rows(state, now, _picker(axes, rows, len(old)))
+        for state, (operator, axes) in zip(states, prepared.program.operators, strict=True)
+    )
+
+
+def _picker(axes: frozenset[int], rows: NDArray[np.intp], count: int) -> Pick:
+    """Takes rows along every axis of an array that runs over objects."""
+    fresh = rows < 0
+
+    def pick(array: Any, fill: Any, lead: int = 1) -> Any:
+        fill = np.reshape(fill, (2,) + (1,) * (array.ndim - 1)) if lead else fill
+        for axis in axes:
+            along = lead + axis
+            if array.shape[along] != count:
+                # One value for all objects so far, which need not be that of new ones.
+                array = array.repeat(count, axis=along)
+            if count:
+                array = array.take(np.maximum(rows, 0), axis=along)
+            else:
+                shape = [*array.shape[:along], len(rows), *array.shape[along + 1 :]]
+                array = np.empty(shape, array.dtype)
+            at = (slice(None),) * along + (fresh,)
+            array[at] = np.broadcast_to(fill, array.shape)[at]
+        return array
+
+    return pick

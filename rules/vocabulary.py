@@ -1,0 +1,297 @@
+"""The words of the rule language: what each takes, what it looks at, what it means."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from visup.agent import HealthStatus, ObjectBelief, Presence
+from visup.rules.facts import (
+    CODE,
+    MAYBE,
+    NO,
+    RELATION_NAMES,
+    SIGMAS,
+    YES,
+    Codes,
+    Facts,
+    Floats,
+    between,
+    code,
+    exactly,
+)
+from visup.rules.measure import RelationSettings, scale
+from visup.rules.sentences import believed_name
+from visup.rules.tracks import at_border, tracks
+from visup.rules.units import LENGTH, SHARE, SPEED, TIME, TURNING, Dimension
+from visup.rules.zones import QUESTIONS, asked
+
+IMPLIED = MappingProxyType(
+    {
+        "converging": frozenset({"converging", "touching", "coupled"}),
+        "touching": frozenset({"touching", "coupled"}),
+        "keeping_distance": frozenset({"keeping_distance", "moving_together", "coupled"}),
+        "moving_together": frozenset({"moving_together", "coupled"}),
+    }
+)
+"""Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
+
+KEEP_OUT = "keep_out"
+"""Zones whose names begin so are forbidden to all."""
+KINDS = ("region", "hypothesis", "depth", "health")
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word of the rule language that stands for something true, false or unknown.
+
+    Attributes:
+        takes: What its arguments are: 'object', 'relation', 'kind', 'name' or 'zone'.
+        look: Its meaning: codes of all objects, one dimension for each argument 'object', in their
+            order; the other arguments come as words.
+        meaning: One clause for people.
+    """
+
+    takes: tuple[str, ...]
+    look: Callable[..., Codes]
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A word of the rule language that stands for a number.
+
+    Attributes:
+        takes: What its arguments are.
+        dimension: What it measures.
+        look: Its intervals in the base unit, (2, ...), of all objects.
+        meaning: One clause for people.
+    """
+
+    takes: tuple[str, ...]
+    dimension: Dimension
+    look: Callable[..., Floats]
+    meaning: str
+
+    @property
+    def unit(self) -> str:
+        """The unit in which it is told."""
+        return {TIME: "s", LENGTH: "px", SPEED: "px/s", TURNING: "deg/s", SHARE: "%"}[
+            self.dimension
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """What formulas may name.
+
+    Attributes:
+        words: Relations and facts.
+        quantities: Numbers.
+    """
+
+    words: Mapping[str, Word]
+    quantities: Mapping[str, Quantity]
+
+
+def expected(facts: Facts, name: str) -> Codes:
+    """Whether an active task expects a relation between two objects now."""
+    codes, fine = facts.pairs(NO), IMPLIED.get(name, frozenset({name}))
+    for task in facts.mind.tasks:
+        for e in task.expected:
+            if e.relation in fine:
+                pair = set(e.objects)
+                if len(pair) == 2 and pair <= facts.row.keys():
+                    i, j = (facts.row[o] for o in pair)
+                    codes[i, j] = codes[j, i] = YES
+    return codes
+
+
+def engaged(facts: Facts) -> Codes:
+    """Whether an active task expects something of an object and another one now."""
+    wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
+    return facts.each(lambda b: code(b.id in wanted))
+
+
+def unexpected(facts: Facts) -> Codes:
+    """Whether no active task explains an object; without a task nothing is unexpected."""
+    tasks = facts.mind.tasks
+    return facts.each(lambda b: code(bool(tasks) and all(b.id in t.unexplained for t in tasks)))
+
+
+def is_actor(facts: Facts) -> Codes:
+    """Whether an object plays an actor of an active task."""
+    bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
+    return facts.each(lambda b: code(b.id in bound))
+
+
+def is_named(facts: Facts, name: str) -> Codes:
+    """Whether an object is believed to be that model or actor; unknown while not identified."""
+
+    def look(b: ObjectBelief) -> int:
+        return code(name in (b.name, believed_name(facts.mind, b.id))) if b.candidates else MAYBE
+
+    return facts.each(look)
+
+
+def moving(facts: Facts) -> Codes:
+    """Whether an object moves in the image."""
+    speed = facts.one("speed")
+    still = RelationSettings().still_speed * scale(facts.mind.frame_size)
+    return np.where(np.isnan(speed), MAYBE, np.where(speed > still, YES, NO)).astype(np.int8)
+
+
+def whole(facts: Facts) -> Codes:
+    """Whether an object is clear of the image border."""
+    return facts.each(lambda b: code(not at_border(b.region, facts.mind.frame_size, 0)))
+
+
+def first_contact(facts: Facts) -> Codes:
+    """Whether the second is what the first would meet first."""
+    times = facts.contact[1].copy()
+    known = ~np.isnan(times)
+    np.fill_diagonal(known, False)
+    times[~known] = np.inf
+    # Of several that are never met, the first one counts, so that one always does.
+    first = np.where(
+        np.isfinite(times.min(axis=1, initial=np.inf)),
+        times.argmin(axis=1) if len(times) else 0,
+        known.argmax(axis=1) if len(times) else 0,
+    )
+    codes = np.where(known, NO, MAYBE).astype(np.int8)
+    some = np.flatnonzero(known.any(axis=1))
+    codes[some, first[some]] = YES
+    return codes
+
+
+def lost(facts: Facts) -> Codes:
+    """Whether an object is out of sight and nothing tells why."""
+    known = tracks(facts.mind).of
+    return facts.each(lambda b: code(b.id in known and known[b.id].told == "lost"))
+
+
+def stale(facts: Facts, kind: str) -> Codes:
+    """Whether percepts of a kind could not be observed in this step."""
+    return np.array(code(kind in facts.mind.unknown), dtype=np.int8)
+
+
+def healthy(facts: Facts) -> Codes:
+    """Whether the image is sound."""
+    return np.array(code(facts.mind.health.status is HealthStatus.OK), dtype=np.int8)
+
+
+def depth_difference(facts: Facts) -> Floats:
+    """Difference of depth as a share of the smaller one; both depths within their deviations."""
+    depth = facts.one("depth")
+    spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
+    apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
+    least = np.minimum(depth[:, None], depth[None])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(least > 0, 1.0 / least, np.nan)
+        return between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
+
+
+def spin(facts: Facts) -> Floats:
+    """How fast an object turns about itself, degrees per second."""
+    found = [None if b.pose is None else b.pose.spin for b in facts.beliefs]
+    rate = np.array([np.nan if s is None else s.rate for s in found], dtype=float)
+    sigma = np.array([0.0 if s is None else SIGMAS * s.sigma for s in found], dtype=float)
+    return between(np.maximum(rate - sigma, 0.0), rate + sigma)
+
+
+def _since(moment: str) -> Callable[[Facts], Floats]:
+    def look(facts: Facts) -> Floats:
+        return exactly(np.array([facts.mind.time - getattr(b, moment) for b in facts.beliefs]))
+
+    return look
+
+
+def _presence(wanted: Presence) -> Callable[[Facts], Codes]:
+    return lambda facts: facts.each(lambda b: code(b.presence is wanted))
+
+
+def in_forbidden_zone(facts: Facts) -> Codes:
+    """Whether some part of an object is in a zone that is forbidden to all."""
+    zones = [z.name for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
+    if not zones:
+        return facts.each(lambda _: NO)
+    codes: Codes = np.max([_zone("reaching")(facts, name) for name in zones], axis=0)
+    return codes
+
+
+def _zone(question: str) -> Callable[[Facts, str], Codes]:
+    return lambda facts, zone: facts.each(lambda b: CODE[asked(facts.mind, question, b.id, zone)])
+
+
+def _relation(name: str) -> Word:
+    meaning = f"{name.replace('_', ' ')}, a relation"
+    return Word(_TWO, lambda facts: facts.related(name), meaning)
+
+
+_ONE, _TWO = ("object",), ("object", "object")
+
+WORDS: MappingProxyType[str, Word] = MappingProxyType(
+    {
+        **{name: _relation(name) for name in RELATION_NAMES},
+        "expected": Word(
+            ("relation", "object", "object"), expected, "an active task expects the relation"
+        ),
+        "engaged": Word(_ONE, engaged, "an active task expects something of the object now"),
+        "unexpected": Word(_ONE, unexpected, "no active task explains the object"),
+        "actor": Word(_ONE, is_actor, "the object plays an actor of an active task"),
+        "named": Word(("object", "name"), is_named, "the object is believed to be that"),
+        "seen": Word(_ONE, _presence(Presence.SEEN), "the object is seen"),
+        "hidden": Word(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
+        "lost": Word(_ONE, lost, "it is out of sight and nothing tells why"),
+        "moving": Word(_ONE, moving, "it moves in the image"),
+        "whole": Word(_ONE, whole, "it is clear of the image border"),
+        **{
+            question: Word(("object", "zone"), _zone(question), f"{part} is in the zone")
+            for question, part in zip(
+                QUESTIONS, ("its centre", "some part", "all of it"), strict=True
+            )
+        },
+        "in_forbidden_zone": Word(
+            _ONE, in_forbidden_zone, f"some part is in a zone whose name begins with {KEEP_OUT}"
+        ),
+        "first_contact": Word(_TWO, first_contact, "the second is what the first would meet first"),
+        "stale": Word(("kind",), stale, "percepts of that kind could not be observed"),
+        "healthy": Word((), healthy, "the image is sound"),
+    }
+)
+"""Every relation and fact that a rule may name."""
+
+QUANTITIES: MappingProxyType[str, Quantity] = MappingProxyType(
+    {
+        "time_to_contact": Quantity(
+            _TWO, TIME, lambda f: between(f.contact[0], f.contact[2]), "until the outlines meet"
+        ),
+        "gap": Quantity(_TWO, LENGTH, lambda f: exactly(f.pair("gap")), "between the outlines"),
+        "closing_speed": Quantity(
+            _TWO, SPEED, lambda f: between(f.closing[0], f.closing[2]), "of the distance"
+        ),
+        "relative_speed": Quantity(
+            _TWO, SPEED, lambda f: exactly(f.pair("relative_speed")), "in the image"
+        ),
+        "speed": Quantity(_ONE, SPEED, lambda f: exactly(f.one("speed")), "in the image"),
+        "depth_difference": Quantity(_TWO, SHARE, depth_difference, "of the smaller depth"),
+        "spin": Quantity(_ONE, TURNING, spin, "about itself"),
+        "out_of_sight": Quantity(_ONE, TIME, _since("last_seen"), "since last seen"),
+        "in_view": Quantity(_ONE, TIME, _since("first_seen"), "since first seen"),
+    }
+)
+"""Every quantity that a rule may compare."""
+
+RULES = Vocabulary(WORDS, QUANTITIES)
+"""What rules may name."""
+
+
+def signals(*names: str) -> Vocabulary:
+    """A vocabulary of plain numbers without objects, each written `name()`."""
+    nothing: Mapping[str, Any] = MappingProxyType({})
+    table = {n: Quantity((), SHARE, lambda facts: np.zeros(2), "a signal") for n in names}
+    return Vocabulary(nothing, MappingProxyType(table))

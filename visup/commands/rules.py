@@ -1,0 +1,125 @@
+"""`visup rules`: check rule files, list rules with what they cost, explain a verdict."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from visup.commands.watch import Actors, Every, Fov, Fps, Models, Rules, Source, Tasks, settings_of
+
+if TYPE_CHECKING:
+    from visup.agent import Mind
+    from visup.rules.formula import Rule
+
+app = typer.Typer(no_args_is_help=True)
+
+Files = Annotated[list[Path] | None, typer.Argument(help="Rule files; the shipped rules if none.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
+
+
+@app.command()
+def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
+    """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
+    from visup.agent.errors import ManyErrors, VisupError
+    from visup.rules.language import load_rules, raise_all
+
+    faults: list[VisupError] = []
+    for file in files:
+        try:
+            found = load_rules(file)
+        except ManyErrors as errors:
+            faults += errors.errors
+        except VisupError as error:
+            faults.append(error)
+        else:
+            typer.echo(f"{file}: ok")
+            for rule in found:
+                typer.echo(f"  {rule.name}: {_cost(rule)}")
+    raise_all(faults)
+
+
+@app.command("list")
+def list_rules(files: Files = None, as_json: AsJson = False) -> None:
+    """List rules: severity, memory bound and delay of each."""
+    from visup.rules.bounds import bounds_of
+    from visup.rules.language import load_rules, shipped_rules
+
+    found = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
+    if as_json:
+        rows: list[dict[str, Any]] = []
+        for rule in found:
+            cost = bounds_of(rule)
+            rows.append(
+                {
+                    "name": rule.name,
+                    "objects": len(rule.variables),
+                    "severity": rule.severity.name.lower(),
+                    "delay_s": cost.delay_s,
+                    "most_bytes_per_choice": cost.bytes,
+                    "text": str(rule),
+                }
+            )
+        typer.echo(json.dumps(rows, indent=2))
+        return
+    width = max((len(r.name) for r in found), default=0)
+    for rule in found:
+        typer.echo(f"{rule.name:{width}}  {rule.severity.name.lower():8}  {_cost(rule)}")
+
+
+@app.command()
+def explain(
+    source: Source,
+    at: Annotated[float, typer.Option("--at", min=0.0, help="Seconds of the video.")],
+    rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
+    task: Tasks = None,
+    models: Models = None,
+    rules: Rules = None,
+    actor: Actors = None,
+    every: Every = 1,
+    fps: Fps = None,
+    fov: Fov = None,
+) -> None:
+    """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
+    from visup.agent.errors import SettingsError
+    from visup.supervisor import build_agent, open_video
+
+    settings = settings_of(source, task, models, rules, actor, every, None, None, fps, fov)
+    agent, mind = build_agent(settings), None
+    with open_video(settings) as video:
+        for frame in video:
+            mind = agent.step(frame).mind
+            if mind.time >= at:
+                break
+    if mind is None or mind.time < at:
+        raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
+    told = explanations(mind, rule)
+    for text in told or [f"at {mind.time:g} s too few objects are in view for any choice"]:
+        typer.echo(text)
+
+
+def explanations(mind: Mind, only: str | None) -> list[str]:
+    """Why each rule is true, false or unknown of each choice of objects in a mind.
+
+    Args:
+        mind: A mind that rules have judged.
+        only: Name of the one rule that is wanted, or None for all.
+
+    Raises:
+        RuleError: There is no rule of that name.
+    """
+    from visup.rules.ask import choices, explain, rule_named, values_of
+
+    values = values_of(mind)
+    wanted = [rule_named(values, only)] if only else list(values.prepared.rules)
+    return [str(explain(mind, rule.name, *ids)) for rule in wanted for ids in choices(values, rule)]
+
+
+def _cost(rule: Rule) -> str:
+    from visup.rules.bounds import bounds_of
+
+    cost = bounds_of(rule)
+    late = f"told {cost.delay_s:g} s late" if cost.delay_s else "told at once"
+    return f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"
