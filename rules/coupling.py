@@ -7,9 +7,8 @@ Two bodies are believed coupled when, for a while, they are at rest to each othe
 
 Rest is judged by how far both outlines have moved relative to each other (`joint.py`), over a short
 window and over both halves of it, so that a body that bounces off (whose mean relative velocity is
-zero for a moment) is not taken for one that was caught. How slow is slow depends on how fast the
-two came together. Outlines that touch in the image may still be apart in space: with the depth of
-one of the two unknown this is not told apart from contact.
+zero for a moment) is not taken for one that was caught. Outlines that touch in the image may still
+be apart in space: with the depth of one of the two unknown this is not told apart from contact.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from visup.agent import (
     Relation,
     Truth,
 )
-from visup.rules.joint import Joint, follow, speeds
+from visup.rules.joint import Joint, follow, motions
 from visup.rules.measure import Measured, RelationSettings, scale
 from visup.rules.relations import measured
 from visup.rules.sentences import sentence
@@ -50,8 +49,7 @@ class CouplingSettings:
         near: Gap from which on two bodies are followed, image diagonals.
         window_s: Over how long their relative speed is judged.
         rest_s: How long rest must last.
-        rest_share: Relative speed that is rest, as a share of the speed at which they came together.
-        half: How much faster they may be in each half of the window, where the noise is greater.
+        strange: Squared distance from rest, in deviations, up to which a motion is rest.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
@@ -60,9 +58,8 @@ class CouplingSettings:
     relations: RelationSettings = field(default_factory=RelationSettings)
     near: float = 0.02
     window_s: float = 0.6
-    rest_s: float = 0.08
-    rest_share: float = 0.2
-    half: float = 2.0
+    rest_s: float = 0.12
+    strange: float = 3.0
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.5
@@ -74,14 +71,12 @@ class Pending:
 
     Attributes:
         converged_at: When they last were converging, not touching yet.
-        approach: How fast they then did, pixels per second.
         rest_since: Since when they touch and are at rest.
         apart_since: Since when they are apart.
         joint: How they have moved relative to each other since they are near.
     """
 
     converged_at: float | None = None
-    approach: float = 0.0
     rest_since: float | None = None
     apart_since: float | None = None
     joint: Joint | None = None
@@ -145,12 +140,10 @@ class Couple:
         if joint is None or touching is Truth.FALSE:
             rest_since = None
         elif joint is not before.joint:
-            slow = self._slow(joint, before.approach, mind)
+            slow = self._slow(joint, mind)
             rest_since = _since(rest_since, slow and touching is Truth.TRUE, mind.time)
-        rate = abs(now.pair("rate", *pair))
         return Pending(
             mind.time if converging else before.converged_at,
-            rate if converging and rate == rate else before.approach,
             rest_since,
             _since(before.apart_since, apart, mind.time),
             joint,
@@ -170,15 +163,14 @@ class Couple:
             before, regions, mind.time, mind.frame_size, lasts_s=2 * s.window_s, anew_s=s.anew_s
         )
 
-    def _slow(self, joint: Joint, approach: float, mind: Mind) -> bool:
+    def _slow(self, joint: Joint, mind: Mind) -> bool:
         """Whether two bodies are at rest to each other."""
         s = self.settings
-        found = speeds(joint, mind.time, s.window_s)
+        found = motions(joint, mind.time, s.window_s)
         if found is None:
             return False
         still = s.relations.still_speed * scale(mind.frame_size)
-        least = min(max(s.rest_share * approach, still), 2.5 * still)
-        return found[0] < least and max(found[1:]) < s.half * least
+        return all(m.strangeness(still) < s.strange for m in found)
 
     def _well_apart(self, now: Measured, pair: Pair, mind: Mind) -> bool:
         return now.pair("gap", *pair) > 0.02 * scale(mind.frame_size)

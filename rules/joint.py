@@ -1,6 +1,6 @@
-"""How two bodies that meet move relative to each other, from the whole of both outlines.
+"""How two bodies that meet move relative to each other: by their outlines, and by image motion.
 
-Each outline is kept as it was when the two came near, and laid upon every later one: points are
+The velocities that the segmenter reports are used where there are any; outlines always. Each outline is kept as it was when the two came near, and laid upon every later one: points are
 moved along their normals until they lie on it (iterated closest points, Chen and Medioni 1992,
 translation alone, robust). Hundreds of points say more than the few by which a body reaches
 furthest, errors of single stretches hardly count, and what is wrong with the kept outline is wrong
@@ -13,6 +13,7 @@ other begins, have no say.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +30,12 @@ REACH = 12.0
 
 BESIDE = 6.0
 """How near the other body an outline is not trusted, pixels."""
+
+LEAST_SIGMA = 0.3
+"""No velocity in the image is believed to be known better, pixels per second."""
+
+LASTS_S = 0.2
+"""Errors of velocities are alike for so long, seconds."""
 
 LEAST_POINTS = 12
 _WILD = 1.5  # pixels beyond which a point counts less
@@ -58,14 +65,16 @@ class Joint:
         second: of the other.
         since: Seconds when they were kept.
         before: Relative shift up to then, pixels.
-        path: (time, x, y): how far the second had moved relative to the first; pixels, oldest first.
+        path: (time, x, y, vx, vy, variance): how far the second had moved relative to the first,
+            pixels, and how fast it did by image motion, pixels per second; NaN where unknown. Oldest
+            first.
     """
 
     first: Kept
     second: Kept
     since: float
     before: tuple[float, float] = (0.0, 0.0)
-    path: tuple[tuple[float, float, float], ...] = ()
+    path: tuple[tuple[float, ...], ...] = ()
 
     @property
     def path_end(self) -> float:
@@ -73,12 +82,14 @@ class Joint:
         return self.path[-1][0] if self.path else self.since
 
 
-def kept_outline(region: Region, other: Region, size: tuple[int, int]) -> Kept | None:
+def kept_outline(
+    region: Region, others: Sequence[Region], size: tuple[int, int]
+) -> Kept | None:
     """The points of a region's outline that can be followed, or None when there are too few.
 
     Args:
         region: The region.
-        other: The body near it.
+        others: Bodies near it.
         size: (width, height) of the image, pixels.
     """
     points = evenly(outline(region), POINTS)
@@ -87,8 +98,9 @@ def kept_outline(region: Region, other: Region, size: tuple[int, int]) -> Kept |
     normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
     x, y = points.T
     free = (x > 3) & (y > 3) & (x < size[0] - 4) & (y < size[1] - 4) & (length > 0)
-    beside = cKDTree(outline(other)).query(points, distance_upper_bound=BESIDE)[0]
-    free &= ~np.isfinite(beside)
+    for other in others:
+        beside = cKDTree(outline(other)).query(points, distance_upper_bound=BESIDE)[0]
+        free &= ~np.isfinite(beside)
     return Kept(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
 
 
@@ -165,7 +177,8 @@ def follow(
     x, y = (
         b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True)
     )
-    path = (*(p for p in joint.path if p[0] > now - lasts_s), (now, x, y))
+    place = (now, x, y, *_image_motion(regions))
+    path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
     if apart and now - joint.since > anew_s:
         fresh = _begun(regions, now, size)
         if fresh is not None:
@@ -174,15 +187,47 @@ def follow(
 
 
 def _begun(regions: tuple[Region, Region], now: float, size: tuple[int, int]) -> Joint | None:
-    first = kept_outline(regions[0], regions[1], size)
-    second = kept_outline(regions[1], regions[0], size)
+    first = kept_outline(regions[0], regions[1:], size)
+    second = kept_outline(regions[1], regions[:1], size)
     if first is None or second is None:
         return None
-    return Joint(first, second, now, path=((now, 0.0, 0.0),))
+    return Joint(first, second, now, path=((now, 0.0, 0.0, *_image_motion(regions)),))
 
 
-def speeds(joint: Joint, now: float, window_s: float) -> tuple[float, float, float] | None:
-    """How fast two bodies move relative to each other.
+def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
+    """Relative velocity as the segmenter reports it, and the variance of each component."""
+    a, b = regions
+    if a is b or a.velocity_sigma <= 0.0 or b.velocity_sigma <= 0.0:
+        return (np.nan, np.nan, np.nan)
+    variance = max(a.velocity_sigma, LEAST_SIGMA) ** 2 + max(b.velocity_sigma, LEAST_SIGMA) ** 2
+    return b.velocity[0] - a.velocity[0], b.velocity[1] - a.velocity[1], variance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Relative velocity over some time: (2,) pixels per second, and its covariance (2, 2)."""
+
+    velocity: Floats
+    covariance: Floats
+
+    @property
+    def speed(self) -> float:
+        """Pixels per second."""
+        return float(np.hypot(*self.velocity))
+
+    def strangeness(self, slow: float) -> float:
+        """How ill the motion suits bodies at rest, as a squared distance; 2 is usual for those.
+
+        Args:
+            slow: Speed that still is rest, pixels per second. What is hardly known in a direction,
+                as the motion of a long arm along itself, weighs little.
+        """
+        allowed = self.covariance + slow**2 * np.eye(2)
+        return float(self.velocity @ np.linalg.solve(allowed, self.velocity))
+
+
+def motions(joint: Joint, now: float, window_s: float) -> tuple[Motion, Motion, Motion] | None:
+    """How two bodies move relative to each other.
 
     Args:
         joint: What is known of them.
@@ -190,16 +235,30 @@ def speeds(joint: Joint, now: float, window_s: float) -> tuple[float, float, flo
         window_s: Over how long.
 
     Returns:
-        Pixels per second over the window and over its two halves; None while too little is known.
+        Motion over the window and over its two halves; None while too little is known.
     """
     recent = np.array([p for p in joint.path if p[0] > now - window_s - 1e-6])
-    if len(recent) < 5 or recent[-1, 0] - recent[0, 0] < 0.7 * window_s:
+    if len(recent) < 6 or recent[-1, 0] - recent[0, 0] < 0.7 * window_s:
         return None
+    # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
+    # longer, and is believed to be as large.
+    steps = np.diff(recent[:, 1:3], axis=0)
+    noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
     middle = len(recent) // 2
-    return _speed(recent), _speed(recent[: middle + 1]), _speed(recent[middle:])
+    first, second = recent[: middle + 1], recent[middle:]
+    return _motion(recent, noise), _motion(first, noise), _motion(second, noise)
 
 
-def _speed(path: Floats) -> float:
+def _motion(path: Floats, noise: Floats) -> Motion:
+    """The slope of the places, joined with the mean of the velocities, each by its precision."""
     t = path[:, 0] - path[:, 0].mean()
-    slope = t @ path[:, 1:] / max(float(t @ t), 1e-9)
-    return float(np.hypot(*slope))
+    lever = max(float(t @ t), 1e-9)
+    slope, spread = t @ path[:, 1:3] / lever, noise / lever
+    flow = path[np.isfinite(path[:, 5]), 3:]
+    if not len(flow):
+        return Motion(slope, spread)
+    independent = max(1.0, (path[-1, 0] - path[0, 0]) / LASTS_S)
+    precision = np.linalg.inv(spread)
+    certain = independent / flow[:, 2].mean() * np.eye(2)
+    spread = np.linalg.inv(precision + certain)
+    return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread)

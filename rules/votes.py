@@ -46,7 +46,7 @@ from visup.agent.mind import UNKNOWN_OBJECT
 from visup.rules.objects import owners
 from visup.rules.pose import pose_support
 from visup.rules.presence import visible_share
-from visup.rules.sentences import called, spaced
+from visup.rules.sentences import called, seems, spaced
 
 VOTES = "rules.votes"
 Tally = tuple[tuple[str, float], ...]
@@ -68,9 +68,8 @@ class VoteSettings:
         stranger: Similarity that an object has to some model even when it is none of them.
         apart_s: Hypotheses this far apart in time are of different pictures.
         evidence: How much a vote tells, in units of log likelihood.
-        settle_share: Share at which a name is told.
-        settle_margin: Lead over the second name at which it is told.
-        settle_s: How long it must have had both.
+        settle: Likelihood at which a name is told.
+        settle_s: How long it must have had it.
     """
 
     least_similarity: float = 0.4
@@ -84,8 +83,7 @@ class VoteSettings:
     stranger: float = 0.5
     apart_s: float = 0.2
     evidence: float = 2.2
-    settle_share: float = 0.45
-    settle_margin: float = 0.1
+    settle: float = 0.7
     settle_s: float = 0.8
 
 
@@ -278,10 +276,7 @@ class Votes:
 
     def _lead(self, ballot: Ballot, named: tuple[Candidate, ...], now: float) -> Ballot:
         s = self.settings
-        leader = None
-        if named and named[0].share >= s.settle_share:
-            second = named[1].share if len(named) > 1 else 0.0
-            leader = named[0].name if named[0].share - second >= s.settle_margin else None
+        leader = named[0].name if named and named[0].confidence >= s.settle else None
         since = ballot.leads_since if leader == ballot.leader else now
         settled = leader is not None and now - since >= s.settle_s - 1e-9
         told = leader if settled else ballot.told
@@ -304,10 +299,10 @@ def _identified(
     # By its model alone: the part that it plays in a task may be another's, and lags behind.
     words = spaced(called(mind, belief.name))
     if before is None:
-        text = f"An object is believed to be the {words}."
+        text = f"An object {seems(belief.confidence)} the {words}."
     else:
         was = spaced(called(mind, before))
-        text = f"The object taken for the {was} is now believed to be the {words}."
+        text = f"The object taken for the {was} {seems(belief.confidence)} the {words}."
     data = MappingProxyType({"name": belief.name, "before": before})
     return Event(
         "identified",
@@ -315,6 +310,6 @@ def _identified(
         observation.frame_index,
         text,
         (belief.id,),
-        belief.strength,
+        belief.confidence,
         data=data,
     )

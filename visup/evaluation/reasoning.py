@@ -128,7 +128,7 @@ def covering(mind: Mind, masks: Sequence[Sequence[TrueMask]]) -> ObjectBelief | 
     scored = [
         (max(_iou(b, parts) for parts in masks), -b.id, b)
         for b in mind.objects.values()
-        if b.presence is not Presence.LEFT
+        if b.presence is not Presence.LEFT or b.last_seen == mind.time
     ]
     best = max(scored, default=None, key=lambda s: s[:2])
     return best[2] if best is not None and best[0] >= COVERING_IOU else None

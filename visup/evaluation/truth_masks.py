@@ -6,8 +6,8 @@ cut at zero moves the outline in and out. Nothing here knows what an object is c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,14 @@ from numpy.typing import NDArray
 from visup.agent import Region
 from visup.agent.errors import SettingsError
 from visup.evaluation.mission_files import read_json
+from visup.rules.geometry import outline
+from visup.rules.joint import kept_outline, laid_upon
 
 MARGIN = 8
 """Pixels round a mask in which its outline may move."""
+
+LAG_S = 0.24
+"""Over how long true velocities are taken; those that a camera sees lag as well."""
 
 _STEP = 1 / 8  # of the signed distances that are kept, pixels
 
@@ -33,11 +38,13 @@ class TrueMask:
         at: (x, y) of the crop in the image, pixels.
         inside: (h, w) int8, signed distance to the outline, positive inside, in eighths of a pixel.
         visible_px: Pixels of the mask.
+        velocity: (vx, vy) pixels per second, or None when it is not known.
     """
 
     at: tuple[int, int]
     inside: NDArray[np.int8]
     visible_px: int
+    velocity: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +91,53 @@ def load_mission(folder: Path, *, every: int = 1) -> Mission:
         _masks(folder / "masks" / f"{row['index']:05d}.png", labels) if k % every == 0 else {}
         for k, row in enumerate(truth["frames"])
     )
-    return Mission(folder.name, read_json(folder / "mission.json"), truth, masks)
+    lag = max(1, round(LAG_S * float(truth["fps"]) / every)) * every
+    moving = tuple(
+        moved_since(masks[max(0, k - lag)], here, lag / float(truth["fps"]), truth["size"])
+        for k, here in enumerate(masks)
+    )
+    return Mission(folder.name, read_json(folder / "mission.json"), truth, moving)
+
+
+def moved_since(
+    before: Mapping[str, TrueMask],
+    now: Mapping[str, TrueMask],
+    dt: float,
+    size: tuple[int, int],
+) -> dict[str, TrueMask]:
+    """Masks with the velocities at which their outlines have moved.
+
+    Args:
+        before: The masks some time ago.
+        now: The masks now.
+        dt: Seconds between the two.
+        size: (width, height) of the image, pixels.
+
+    Returns:
+        The masks of now. What was not in sight before has no velocity; where another object hides a
+        part, the edge of that has no say.
+    """
+    old = {name: _region(mask, size) for name, mask in before.items()}
+    moved = {}
+    for name, mask in now.items():
+        velocity = None
+        if name in old:
+            others = [r for n, r in old.items() if n != name]
+            velocity = _velocity(old[name], others, _region(mask, size), dt, size)
+        moved[name] = replace(mask, velocity=velocity)
+    return moved
+
+
+def _region(mask: TrueMask, size: tuple[int, int]) -> Region:
+    return region_from_mask(0, mask.inside > 0, at=mask.at, size=size)
+
+
+def _velocity(
+    old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
+) -> tuple[float, float] | None:
+    kept = kept_outline(old, others, size)
+    laid = None if kept is None else laid_upon(kept, outline(new))
+    return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
 
 
 def _masks(path: Path, labels: Mapping[str, int]) -> dict[str, TrueMask]:
@@ -186,6 +239,8 @@ def region_from_mask(
     at: tuple[int, int] = (0, 0),
     size: tuple[int, int] | None = None,
     confidence: float = 0.9,
+    velocity: tuple[float, float] = (0.0, 0.0),
+    velocity_sigma: float = 0.0,
 ) -> Region:
     """A region with a mask; its contour is that of the largest part.
 
@@ -195,6 +250,8 @@ def region_from_mask(
         at: Where the mask's corner is in the image, pixels.
         size: (width, height) of the image; the mask is the whole image when left out.
         confidence: Of the segmenter.
+        velocity: (vx, vy) pixels per second.
+        velocity_sigma: Of each component; 0 when the velocity is not known.
     """
     x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
     crop = np.ascontiguousarray(mask[y : y + h, x : x + w])
@@ -211,5 +268,7 @@ def region_from_mask(
         centroid=(float(xs.mean()) + x, float(ys.mean()) + y),
         area=float(len(xs)),
         cut=x == 0 or y == 0 or x + w == width or y + h == height,
+        velocity=velocity,
+        velocity_sigma=velocity_sigma,
         confidence=confidence,
     )

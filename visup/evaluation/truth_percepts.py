@@ -44,6 +44,9 @@ class PerceptNoise:
         missing: Share of an object's frames without its region.
         in_bursts: Share of these that come in runs; the others come alone.
         burst_s: Mean length of such a run.
+        velocity: Standard deviation of each component of a region's velocity, pixels per second.
+        velocity_share: The same as a share of its speed, added.
+        velocity_tau_s: How long that error lasts.
         wrong: Share of times at which the first name is wrong.
         wrong_run_s: Mean length of a run of wrong names.
         listed: How often the right name is among the others while the first one is wrong.
@@ -62,6 +65,9 @@ class PerceptNoise:
     missing: float = 0.15
     in_bursts: float = 0.5
     burst_s: float = 0.2
+    velocity: float = 0.7
+    velocity_share: float = 0.1
+    velocity_tau_s: float = 0.2
     wrong: float = 0.3
     wrong_run_s: float = 0.4
     listed: float = 0.7
@@ -70,10 +76,6 @@ class PerceptNoise:
     least_px: int = 150
     fresh_id_s: float = 0.8
     merge_coupled: bool = False
-
-
-SIMPLE = PerceptNoise(missing=0.0, wrong=0.1, contour_px=0.5)
-"""Percepts that are nearly right."""
 
 
 class Gaps:
@@ -106,8 +108,22 @@ class _Seen:
 
     contour: ContourNoise
     gaps: Gaps
+    rng: np.random.Generator
     number: int = 0
     last: float = -1.0
+    off: tuple[float, float] = (0.0, 0.0)
+
+    def velocity(
+        self, true: tuple[float, float] | None, noise: PerceptNoise, dt: float
+    ) -> tuple[tuple[float, float], float]:
+        """A velocity that is not quite the true one, and its deviation; 0 when it is not known."""
+        keep = float(np.exp(-dt / noise.velocity_tau_s))
+        x, y = np.sqrt(1 - keep**2) * self.rng.standard_normal(2) + keep * np.array(self.off)
+        self.off = (float(x), float(y))
+        if true is None or noise.velocity <= 0.0:
+            return (0.0, 0.0), 0.0
+        sigma = float(noise.velocity + noise.velocity_share * np.hypot(*true))
+        return (true[0] + sigma * self.off[0], true[1] + sigma * self.off[1]), sigma
 
 
 @dataclass(slots=True)
@@ -135,7 +151,7 @@ class SeesTruth:
             contour = ContourNoise(
                 n.contour_px, n.contour_length_px, n.contour_tau_s, self.mission.size, rng
             )
-            self._seen[name] = _Seen(contour, Gaps(n, dt, rng))
+            self._seen[name] = _Seen(contour, Gaps(n, dt, rng), rng)
         self._coupled = tuple(
             (e["frame"] / self.mission.fps, frozenset(e["objects"]))
             for e in self.mission.truth["events"]
@@ -151,7 +167,12 @@ class SeesTruth:
             kept = self._seen[names[0]]
             if int(np.count_nonzero(mask)) < self.noise.least_px or kept.gaps.missing():
                 continue
-            region = region_from_mask(self._number(names, frame.time), mask)
+            true = self.mission.masks[frame.index][names[0]].velocity
+            # Motion is what changed since the last frames: it is not known of what was not in them.
+            known = true if frame.time - kept.last < 0.1 else None
+            velocity, sigma = kept.velocity(known, self.noise, 1.0 / self.mission.fps)
+            number = self._number(names, frame.time)
+            region = region_from_mask(number, mask, velocity=velocity, velocity_sigma=sigma)
             self.who[region.id] = names
             yield Percept("region", region, frame.time, "truth", region.confidence)
 
