@@ -29,7 +29,7 @@ from visup.agent import (
     Relation,
     Truth,
 )
-from visup.rules.joint import Joint, follow, motions
+from visup.rules.joint import Joint, begun, follow, motions
 from visup.rules.measure import Measured, RelationSettings, scale
 from visup.rules.relations import measured
 from visup.rules.sentences import sentence
@@ -58,7 +58,7 @@ class CouplingSettings:
     relations: RelationSettings = field(default_factory=RelationSettings)
     near: float = 0.02
     window_s: float = 0.6
-    rest_s: float = 0.12
+    rest_s: float = 0.2
     strange: float = 3.0
     anew_s: float = 2.5
     approach_s: float = 6.0
@@ -159,6 +159,9 @@ class Couple:
         gap = now.pair("gap", *pair)
         if regions[0] is not regions[1] and not gap <= s.near * scale(mind.frame_size):
             return None
+        if before is None and regions[0] is regions[1]:
+            # Not seen side by side before: one is followed as it was last seen, the other with it.
+            return begun(_apart(pair, mind), mind.time, mind.frame_size)
         return follow(
             before, regions, mind.time, mind.frame_size, lasts_s=2 * s.window_s, anew_s=s.anew_s
         )
@@ -218,6 +221,12 @@ def _regions(pair: Pair, mind: Mind) -> tuple[Region, Region] | None:
     if first.last_seen < mind.time or second.last_seen < mind.time:
         return None
     return first.region, second.region
+
+
+def _apart(pair: Pair, mind: Mind) -> tuple[Region, Region]:
+    """The regions of two that are merged: what was last seen of the one, and the joint one."""
+    first, second = (mind.objects[i].region for i in pair)
+    return first, second
 
 
 def _since(before: float | None, holds: bool, now: float) -> float | None:

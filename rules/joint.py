@@ -169,24 +169,25 @@ def follow(
     """
     apart = regions[0] is not regions[1]
     if joint is None:
-        return _begun(regions, now, size) if apart else None
+        return begun(regions, now, size) if apart else None
     targets = [evenly(outline(r), max(POINTS, len(outline(r)))) for r in regions]
     first, second = laid_upon(joint.first, targets[0]), laid_upon(joint.second, targets[1])
     if first is None or second is None:
-        return _begun(regions, now, size) if apart else replace(joint, path=())
+        return begun(regions, now, size) if apart else replace(joint, path=())
     x, y = (
         b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True)
     )
     place = (now, x, y, *_image_motion(regions))
     path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
     if apart and now - joint.since > anew_s:
-        fresh = _begun(regions, now, size)
+        fresh = begun(regions, now, size)
         if fresh is not None:
             return replace(fresh, before=(x, y), path=path)
     return replace(joint, first=first, second=second, path=path)
 
 
-def _begun(regions: tuple[Region, Region], now: float, size: tuple[int, int]) -> Joint | None:
+def begun(regions: tuple[Region, Region], now: float, size: tuple[int, int]) -> Joint | None:
+    """Two bodies followed from now on; None when too little of them is in the clear."""
     first = kept_outline(regions[0], regions[1:], size)
     second = kept_outline(regions[1], regions[:1], size)
     if first is None or second is None:
