@@ -56,7 +56,7 @@ class CouplingSettings:
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
-    near: float = 0.02
+    near: float = 0.012
     window_s: float = 0.6
     rest_s: float = 0.2
     strange: float = 3.0

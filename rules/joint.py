@@ -1,11 +1,12 @@
 """How two bodies that meet move relative to each other: by their outlines, and by image motion.
 
-The velocities that the segmenter reports are used where there are any; outlines always. Each outline is kept as it was when the two came near, and laid upon every later one: points are
-moved along their normals until they lie on it (iterated closest points, Chen and Medioni 1992,
-translation alone, robust). Hundreds of points say more than the few by which a body reaches
-furthest, errors of single stretches hardly count, and what is wrong with the kept outline is wrong
-in the same way each time, so that it does not look like motion. Once both are seen as one region,
-both kept outlines are laid upon that.
+The velocities that the segmenter reports are used where there are any; outlines always. Each outline
+is kept as it was when the two came near, and laid upon every later one: points are moved along their
+normals until they lie on it (iterated closest points, Chen and Medioni 1992, translation alone,
+robust). Hundreds of points say more than the few by which a body reaches furthest, errors of single
+stretches hardly count, and what is wrong with the kept outline is wrong in the same way each time, so
+that it does not look like motion. Once both are seen as one region, both kept outlines are laid upon
+that.
 
 Points at the image border, and those beside the other body, where the outline ends because the
 other begins, have no say.
@@ -82,9 +83,7 @@ class Joint:
         return self.path[-1][0] if self.path else self.since
 
 
-def kept_outline(
-    region: Region, others: Sequence[Region], size: tuple[int, int]
-) -> Kept | None:
+def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]) -> Kept | None:
     """The points of a region's outline that can be followed, or None when there are too few.
 
     Args:
@@ -174,9 +173,7 @@ def follow(
     first, second = laid_upon(joint.first, targets[0]), laid_upon(joint.second, targets[1])
     if first is None or second is None:
         return begun(regions, now, size) if apart else replace(joint, path=())
-    x, y = (
-        b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True)
-    )
+    x, y = (b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True))
     place = (now, x, y, *_image_motion(regions))
     path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
     if apart and now - joint.since > anew_s:

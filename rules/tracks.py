@@ -222,9 +222,7 @@ def _fixes(fixes: tuple[Fix, ...], fix: Fix) -> tuple[Fix, ...]:
     return (*(f for f in fixes if f[0] > fix[0] - 1.0), fix)[-16:]
 
 
-def _drift(
-    track: Track, region: Region, fixes: tuple[Fix, ...], dt: float
-) -> tuple[float, float]:
+def _drift(track: Track, region: Region, fixes: tuple[Fix, ...], dt: float) -> tuple[float, float]:
     """How it moves: by image motion where that is known, else by how its centroid moved.
 
     A centroid moves as well when something unseen begins to hide the body.

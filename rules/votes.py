@@ -136,9 +136,7 @@ def weights(hypotheses: tuple[Hypothesis, ...], settings: VoteSettings) -> dict[
         if h.similarity > settings.least_similarity:
             best[h.name] = max(best.get(h.name, 0.0), h.similarity)
     ranked = sorted(best.items(), key=lambda item: (-item[1], item[0]))
-    return {
-        name: settings.rank**k * _worth(s, settings) for k, (name, s) in enumerate(ranked)
-    }
+    return {name: settings.rank**k * _worth(s, settings) for k, (name, s) in enumerate(ranked)}
 
 
 def _worth(similarity: float, settings: VoteSettings) -> float:
@@ -227,9 +225,7 @@ class Votes:
             beliefs.append(believed)
             after = self._lead(ballot, believed.candidates, observation.time)
             if after.told != before.told:
-                event = _identified(
-                    mind.with_objects(believed), believed, before.told, observation
-                )
+                event = _identified(mind.with_objects(believed), believed, before.told, observation)
                 after = after if belief.confirmed else replace(after, told=before.told)
                 events += [event] if belief.confirmed else []
             ballots[object_id] = after

@@ -69,10 +69,10 @@ class Watch:
     def __call__(self, step: Step, frame: Frame) -> None:
         """Take down one step; the agent calls it."""
         self.said(step, frame)
-        for belief in step.mind.objects.values():
-            names = self.who.get(belief.region.id, ())
-            if belief.last_seen == step.time and len(names) == 1:
-                key = (belief.id, names[0])
+        for known in step.mind.objects.values():
+            names = self.who.get(known.region.id, ())
+            if known.last_seen == step.time and len(names) == 1:
+                key = (known.id, names[0])
                 self.shows[key] = self.shows.get(key, 0) + 1
         for name, masks in self._scored(step):
             belief = covering(step.mind, masks)

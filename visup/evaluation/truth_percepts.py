@@ -144,7 +144,9 @@ class SeesTruth:
     _coupled: tuple[tuple[float, frozenset[str]], ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        seeds = np.random.SeedSequence([self.noise.seed, 1]).spawn(len(self.mission.truth["labels"]))
+        seeds = np.random.SeedSequence([self.noise.seed, 1]).spawn(
+            len(self.mission.truth["labels"])
+        )
         n, dt = self.noise, 1.0 / self.mission.fps
         for name, seed in zip(sorted(self.mission.truth["labels"]), seeds, strict=True):
             rng = np.random.default_rng(seed)

@@ -8,7 +8,8 @@ the true one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,9 @@ class Namer:
         self._mistaken: str | None = None
         self._off = 0.0
 
-    def says(self, region: Region, index: int, *, alone: bool = True) -> Iterator[Hypothesis | Depth]:
+    def says(
+        self, region: Region, index: int, *, alone: bool = True
+    ) -> Iterator[Hypothesis | Depth]:
         """What is said of the object's region in one frame.
 
         Args:
@@ -107,7 +110,7 @@ class Namer:
         return str(self._rng.choice(self._others, p=self._odds))
 
     def _hypothesis(
-        self, region: Region, name: str, similarity: float, true: dict[str, object]
+        self, region: Region, name: str, similarity: float, true: Mapping[str, Any]
     ) -> Hypothesis:
         view = int(self._rng.integers(VIEWS))
         if name != self.model:
@@ -120,7 +123,7 @@ class Namer:
         direction = (float(d[0]), float(d[1]), float(d[2]))
         return Hypothesis(region.id, name, view, similarity, turn, None, direction)
 
-    def _view(self, true: dict[str, object]) -> tuple[int, NDArray[np.float64], float]:
+    def _view(self, true: Mapping[str, Any]) -> tuple[int, NDArray[np.float64], float]:
         """Number, direction and in-plane rotation of the view that it is taken for."""
         rng, turned, ray = self._rng, *self._seen(true)
         towards = turned.T @ -ray
@@ -134,11 +137,12 @@ class Namer:
         angle = np.arctan2(right[1] + up[0], right[0] - up[1])
         return view, d, float(angle + _TURN_RAD * rng.standard_normal())
 
-    def _seen(self, true: dict[str, object]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _seen(self, true: Mapping[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) from object to camera, and the unit line of sight to it."""
         from scipy.spatial.transform import Rotation
 
-        x, y, w, h = true.get("bbox") or (0, 0, *self._size)  # type: ignore[misc]
+        box: Sequence[int] = true.get("bbox") or (0, 0, *self._size)
+        x, y, w, h = box
         width, height = self._size
         focal = height / 2 / np.tan(self._fov / 2)
         ray = np.array([x + w / 2 - width / 2, y + h / 2 - height / 2, focal])
