@@ -181,7 +181,7 @@ def candidates(
     Returns:
         Most likely first; none while the best has too few votes, or fewer than a stranger has.
     """
-    if not tally or tally[0][1] < max(settings.known_votes, stranger):
+    if not tally or tally[0][1] <= 0.0 or tally[0][1] < max(settings.known_votes, stranger):
         return ()
     total = sum(v for _, v in tally)
     odds = [exp(settings.evidence * (v - tally[0][1])) for _, v in tally]
