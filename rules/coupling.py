@@ -50,6 +50,7 @@ class CouplingSettings:
         window_s: Over how long their relative speed is judged.
         rest_s: How long rest must last.
         strange: Squared distance from rest, in deviations, up to which a motion is rest.
+        unseen_s: Out of sight for longer than this, bodies are not known to have rested.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
@@ -60,6 +61,7 @@ class CouplingSettings:
     window_s: float = 0.6
     rest_s: float = 0.2
     strange: float = 3.0
+    unseen_s: float = 0.15
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.5
@@ -130,6 +132,7 @@ class Couple:
         now: Measured,
         mind: Mind,
     ) -> Pending:
+        s = self.settings
         touching = held.get(("touching", pair), Truth.UNKNOWN)
         converging = held.get(("converging", pair)) is Truth.TRUE
         converging = converging and touching is not Truth.TRUE
@@ -140,6 +143,10 @@ class Couple:
         if joint is None or touching is Truth.FALSE:
             rest_since = None
         elif joint is not before.joint:
+            last = before.joint.path_end if before.joint else mind.time
+            if mind.time - last > s.unseen_s:
+                # What was not watched is not known to have been at rest.
+                rest_since = None
             slow = self._slow(joint, mind)
             rest_since = _since(rest_since, slow and touching is Truth.TRUE, mind.time)
         return Pending(
@@ -180,7 +187,8 @@ class Couple:
 
     def _joined(self, p: Pending, pair: Pair, mind: Mind) -> bool:
         s = self.settings
-        if not _lasts(p.rest_since, s.rest_s, mind.time):
+        watched = p.joint is not None and p.joint.path_end == mind.time
+        if not watched or not _lasts(p.rest_since, s.rest_s, mind.time):
             return False
         if _host(pair, mind) is not None:
             return True

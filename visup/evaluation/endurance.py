@@ -57,9 +57,12 @@ def evaluate_endurance(
         `snapshot_kb` of one of 10,000 minds kept in a row.
     """
     settled = min(SETTLED, frames // 2)
-    at_rest, spent, mind = 0.0, [], Mind()
-    for k, (took, mind) in enumerate(_thought(3, frames, seed, mind)):
-        spent.append(took) if k % 16 == 0 else None
+    at_rest, last = 0.0, Mind()
+    spent: list[float] = []
+    for k, (took, thought) in enumerate(_thought(3, frames, seed, Mind())):
+        last = thought
+        if k % 16 == 0:
+            spent.append(took)
         if k == settled:
             at_rest = resident_mb()
         if progress and k % 5000 == 0:
@@ -67,7 +70,7 @@ def evaluate_endurance(
     end = resident_mb()
     ten = [took for took, _ in _thought(10, max(200, min(frames // 10, 2000)), seed, Mind())]
     before = resident_mb()
-    kept = [m for _, m in _thought(3, min(KEPT, frames), seed + 1, mind)]
+    kept = [m for _, m in _thought(3, min(KEPT, frames), seed + 1, last)]
     return {
         "total": {
             "frames": frames,
@@ -134,7 +137,7 @@ def script(count: int, frames: int, seed: int, start: float = 0.0) -> Iterator[O
 
 
 def _box(number: int, mask: np.ndarray, x: int, y: int) -> Region | None:
-    h, w = mask.shape
+    w = mask.shape[1]
     left, right = max(0, x), min(SIZE[0], x + w)
     if right - left < 4:
         return None
