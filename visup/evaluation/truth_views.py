@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Depth, Hypothesis, Region
+from visup.agent.viewing import picture_axes
 from visup.evaluation.truth_masks import Mission
-from visup.percepts.shape.views import picture_axes, sphere_directions
+from visup.percepts.shape.views import sphere_directions
 
 ABSENT = ("antenna", "barrel", "chair", "drill", "engine", "funnel", "guitar", "hammer", "iron")
 """Models that no mission of ours shows, for silhouettes to be mistaken for."""
