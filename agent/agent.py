@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from visup.agent.act import alert_events, faults, update_alerts
+from visup.agent.answers import understood, with_answers
 from visup.agent.behaviour import Behaviour, Outcome, Thinker
 from visup.agent.mind import Mind, Zone
 from visup.agent.perceive import Slot, in_order, perceive
@@ -82,6 +83,7 @@ class Agent:
         actors: Actor name -> model names, known before the first frame.
         zones: Parts of the scene that rules can name.
         observers: Told of each step.
+        models: Names of models that the operator may answer with, besides those spoken of.
         mind: The mental model now.
     """
 
@@ -90,10 +92,12 @@ class Agent:
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     observers: Sequence[Observer] = ()
     zones: Sequence[Zone] = ()
+    models: Sequence[str] = ()
     mind: Mind = field(init=False)
     directives: tuple[Directive, ...] = field(default=(), init=False)
     _slots: list[Slot] = field(init=False, repr=False)
     _alerts_opened: int = field(default=0, init=False, repr=False)
+    _answers: dict[int, str] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         self.mind = Mind(actors=MappingProxyType(dict(self.actors)), zones=tuple(self.zones))
@@ -138,19 +142,33 @@ class Agent:
         """Each step over frames, one at a time."""
         return (self.step(frame) for frame in frames)
 
+    def answer(self, object_id: int, name: str) -> None:
+        """Say what an object is; a fact from the next step on, told by an 'answer' event.
+
+        Args:
+            object_id: The object.
+            name: A model, an actor, or 'unknown' for none of the models.
+
+        Raises:
+            SettingsError: There is no such object, or nobody knows such a name.
+        """
+        self._answers[object_id] = understood(self.mind, object_id, name, self.models)
+
     def _reason(self, seen: Observation) -> Outcome:
         """Update, cogitate, match: all or nothing."""
         phases = (*self.thinkers.update, *self.thinkers.cogitate, *self.thinkers.match)
         begin = replace(
             self.mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )
-        outcome = Outcome(begin)
+        begin, told = with_answers(begin, self._answers)
+        self._answers = {}
+        outcome = Outcome(begin, told)
         for thinker in phases:
             try:
                 outcome = _joined(outcome, thinker(outcome.mind, seen))
             except Exception as fault:
                 # The half-made mind is dropped: beliefs stay as they were and count as unknown.
-                return _fault(begin, seen, thinker, fault)
+                return replace(_fault(begin, seen, thinker, fault), events=told)
         return outcome
 
     def _act(self, seen: Observation, thought: Outcome) -> Step:

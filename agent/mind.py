@@ -64,11 +64,14 @@ class Candidate:
         name: Model name.
         votes: Time-discounted votes (paper, section 5).
         share: Share of all votes for the object, 0 to 1.
+        confidence: How likely it is the right one, 0 to 1; what is left over those of all candidates
+            is how likely the object is none of the models known.
     """
 
     name: str
     votes: float
     share: float
+    confidence: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +160,7 @@ class ObjectBelief:
         depth: Relative depth in the units of the best candidate's model, or None when unknown.
         depth_sigma: Standard deviation of `depth`.
         pose: Which way it faces and how it spins, or None while that is not known.
+        unknown: How likely it is none of the models known, 0 to 1.
     """
 
     id: int
@@ -169,6 +173,7 @@ class ObjectBelief:
     depth: float | None = None
     depth_sigma: float | None = None
     pose: Pose | None = None
+    unknown: float = 1.0
 
     @property
     def name(self) -> str:
@@ -179,6 +184,11 @@ class ObjectBelief:
     def strength(self) -> float:
         """Vote share of the most likely identity, 0 to 1."""
         return self.candidates[0].share if self.candidates else 0.0
+
+    @property
+    def confidence(self) -> float:
+        """How likely its name is right, 0 to 1; of an unknown object, how likely none is."""
+        return self.candidates[0].confidence if self.candidates else self.unknown
 
 
 @dataclass(frozen=True, slots=True)

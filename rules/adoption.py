@@ -13,7 +13,7 @@ from visup.agent import ObjectBelief, Presence
 from visup.rules.fragments import share_within
 from visup.rules.geometry import box_iou, box_overlap, grow
 from visup.rules.objects import drop_objects, give_region
-from visup.rules.tracks import expected_box, first_sight, sides_of
+from visup.rules.tracks import border_sides, expected_box, first_sight, sides_of
 from visup.rules.work import Work
 
 PART = 0.7
@@ -71,23 +71,32 @@ def _likeness(work: Work, new: ObjectBelief, old: ObjectBelief) -> float:
     if track.merged_with is not None:
         iou = box_iou(new.region.bbox, old.region.bbox)
         return iou if iou > 0.3 else 0.0
-    ratio = new.region.area / max(track.reference, 1.0)
     if old.presence is Presence.HIDDEN and work.now - new.first_seen < work.settings.adopt_s:
         return 0.0
-    if ratio > 1.8 or (track.told == "seen" and ratio < 0.3):
+    coming = _coming(work, new, old)
+    ratio = new.region.area / max(track.reference, 1.0)
+    if (ratio > 1.8 and not coming) or (track.told == "seen" and ratio < 0.3):
         return 0.0
     # The longer it was out of sight, the less is known of where it is.
     away = min(work.now - track.whole_at, 3.0)
     place = grow(expected_box(track, work.now), round(4 + 8 * away))
-    within = box_overlap(new.region.bbox, place) / max(1, new.region.bbox[2] * new.region.bbox[3])
+    area = new.region.bbox[2] * new.region.bbox[3]
+    area = min(area, place[2] * place[3]) if coming else area
+    within = box_overlap(new.region.bbox, place) / max(1, area)
     if within < 0.5 or not _same_name(new, old):
         return 0.0
-    return within
+    return min(within, 1.0)
+
+
+def _coming(work: Work, new: ObjectBelief, old: ObjectBelief) -> bool:
+    """Whether both are cut by one side of the image: of what comes in, ever more shows."""
+    size = work.mind.frame_size
+    return bool(border_sides(new.region, size) & border_sides(old.region, size))
 
 
 def _same_name(new: ObjectBelief, old: ObjectBelief) -> bool:
     """Whether two beliefs may be of one thing: not when both have a clear and different name."""
     if not new.candidates or not old.candidates:
         return True
-    sure = new.strength > 0.6 and old.strength > 0.6
+    sure = min(new.confidence, old.confidence) > 0.9
     return not sure or new.name == old.name

@@ -1,15 +1,14 @@
 """Physical connection: when two objects become one body, and when they part (paper, section 5).
 
-Two bodies are believed coupled when, for a while,
-- they touch, came together before that, and are now at rest to each other; or
-- they touch and move together rigidly; or
-- the number of regions fell, the region that is left is like the union of the two, and it keeps
-  that shape.
+Two bodies are believed coupled when, for a while, they are at rest to each other, and
+- they touch, and came together before that; or
+- they touch and move together; or
+- the number of regions fell, and the region that is left is like the union of the two.
 
-Rest and rigid motion are judged by the velocities of both outlines in the two halves of the last
-second, so that a body that bounces off (whose mean relative velocity is zero for a moment) is not
-taken for one that was caught. Outlines that touch in the image may still be apart in space: with
-the depth of one of the two unknown this is not told apart from contact.
+Rest is judged by how far both outlines have moved relative to each other (`joint.py`), over a short
+window and over both halves of it, so that a body that bounces off (whose mean relative velocity is
+zero for a moment) is not taken for one that was caught. Outlines that touch in the image may still
+be apart in space: with the depth of one of the two unknown this is not told apart from contact.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ from visup.agent import (
     Relation,
     Truth,
 )
-from visup.rules.measure import Measured, RelationSettings, at_rest, scale
+from visup.rules.joint import Joint, begun, follow, motions
+from visup.rules.measure import Measured, RelationSettings, scale
 from visup.rules.relations import measured
-from visup.rules.rigid import shape_change
 from visup.rules.sentences import sentence
 from visup.rules.tracks import merged_pairs
 
@@ -46,20 +45,24 @@ class CouplingSettings:
     """When two bodies count as one.
 
     Attributes:
-        relations: Thresholds of rest; those of the relations.
-        rest_s: How long rest must last, beyond the window over which it is judged.
-        merged_s: How long a merged region must keep its shape.
-        merged_lag_s: How far apart the shapes are that are compared.
-        merged_change: Share of the area that may differ.
+        relations: Thresholds; those of the relations.
+        near: Gap from which on two bodies are followed, image diagonals.
+        window_s: Over how long their relative speed is judged.
+        rest_s: How long rest must last.
+        strange: Squared distance from rest, in deviations, up to which a motion is rest.
+        unseen_s: Out of sight for longer than this, bodies are not known to have rested.
+        anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
-    rest_s: float = 0.08
-    merged_s: float = 0.9
-    merged_lag_s: float = 1.0
-    merged_change: float = 0.025
+    near: float = 0.012
+    window_s: float = 0.6
+    rest_s: float = 0.2
+    strange: float = 3.0
+    unseen_s: float = 0.15
+    anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.5
 
@@ -69,18 +72,16 @@ class Pending:
     """What is remembered of one pair: seconds since when each holds, or None.
 
     Attributes:
-        converged_at: When they last were converging.
+        converged_at: When they last were converging, not touching yet.
         rest_since: Since when they touch and are at rest.
         apart_since: Since when they are apart.
-        shapes: (time, region) of the region in which they are merged, at most six.
-        rigid_since: Since when that region keeps its shape.
+        joint: How they have moved relative to each other since they are near.
     """
 
     converged_at: float | None = None
     rest_since: float | None = None
     apart_since: float | None = None
-    shapes: tuple[tuple[float, Region], ...] = ()
-    rigid_since: float | None = None
+    joint: Joint | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,46 +132,66 @@ class Couple:
         now: Measured,
         mind: Mind,
     ) -> Pending:
+        s = self.settings
         touching = held.get(("touching", pair), Truth.UNKNOWN)
         converging = held.get(("converging", pair)) is Truth.TRUE
-        rest = touching is Truth.TRUE and self._at_rest(now, pair, mind)
+        converging = converging and touching is not Truth.TRUE
         apart = touching is Truth.FALSE and held.get(("diverging", pair)) is Truth.TRUE
         apart = apart or (touching is Truth.FALSE and self._well_apart(now, pair, mind))
+        joint = self._follow(before.joint, pair, now, mind)
+        rest_since = before.rest_since
+        if joint is None or touching is Truth.FALSE:
+            rest_since = None
+        elif joint is not before.joint:
+            last = before.joint.path_end if before.joint else mind.time
+            if mind.time - last > s.unseen_s:
+                # What was not watched is not known to have been at rest.
+                rest_since = None
+            slow = self._slow(joint, mind)
+            rest_since = _since(rest_since, slow and touching is Truth.TRUE, mind.time)
         return Pending(
             mind.time if converging else before.converged_at,
-            _since(before.rest_since, rest, mind.time),
+            rest_since,
             _since(before.apart_since, apart, mind.time),
-            *self._shapes(before, pair, mind),
+            joint,
         )
 
-    def _shapes(
-        self, before: Pending, pair: Pair, mind: Mind
-    ) -> tuple[tuple[tuple[float, Region], ...], float | None]:
-        """Shapes of the merged region, four a second, and since when they are alike."""
-        s, now = self.settings, mind.time
-        host = _host(pair, mind)
-        shapes = tuple(x for x in before.shapes if now - x[0] <= s.merged_lag_s + 0.3)
-        if host is None or host.last_seen < now or (shapes and now - shapes[-1][0] < 0.25 - 1e-6):
-            return shapes, before.rigid_since if shapes else None
-        old = [r for t, r in shapes if now - t >= s.merged_lag_s - 1e-6]
-        alike = bool(old) and shape_change(old[-1], host.region) < s.merged_change
-        return (*shapes, (now, host.region))[-6:], _since(before.rigid_since, alike, now)
+    def _follow(self, before: Joint | None, pair: Pair, now: Measured, mind: Mind) -> Joint | None:
+        """How the two move relative to each other; the same as before when they are not seen."""
+        s = self.settings
+        regions = _regions(pair, mind)
+        if regions is None:
+            old = before is None or mind.time - before.path_end > s.window_s
+            return None if old else before
+        gap = now.pair("gap", *pair)
+        if regions[0] is not regions[1] and not gap <= s.near * scale(mind.frame_size):
+            return None
+        if before is None and regions[0] is regions[1]:
+            # Not seen side by side before: one is followed as it was last seen, the other with it.
+            return begun(_apart(pair, mind), mind.time, mind.frame_size)
+        return follow(
+            before, regions, mind.time, mind.frame_size, lasts_s=2 * s.window_s, anew_s=s.anew_s
+        )
 
-    def _at_rest(self, now: Measured, pair: Pair, mind: Mind) -> bool:
-        if not set(pair) <= set(now.ids):
+    def _slow(self, joint: Joint, mind: Mind) -> bool:
+        """Whether two bodies are at rest to each other."""
+        s = self.settings
+        found = motions(joint, mind.time, s.window_s)
+        if found is None:
             return False
-        i, j = (now.ids.index(x) for x in pair)
-        return bool(at_rest(now, self.settings.relations, scale(mind.frame_size))[i, j])
+        still = s.relations.still_speed * scale(mind.frame_size)
+        return all(m.strangeness(still) < s.strange for m in found)
 
     def _well_apart(self, now: Measured, pair: Pair, mind: Mind) -> bool:
         return now.pair("gap", *pair) > 0.02 * scale(mind.frame_size)
 
     def _joined(self, p: Pending, pair: Pair, mind: Mind) -> bool:
         s = self.settings
-        if _host(pair, mind) is not None and _lasts(p.rigid_since, s.merged_s, mind.time):
-            return True
-        if not _lasts(p.rest_since, s.rest_s, mind.time):
+        watched = p.joint is not None and p.joint.path_end == mind.time
+        if not watched or not _lasts(p.rest_since, s.rest_s, mind.time):
             return False
+        if _host(pair, mind) is not None:
+            return True
         together = mind.relation("moving_together", *pair)
         if together is not None and together.truth is Truth.TRUE:
             return True
@@ -197,6 +218,23 @@ def _host(pair: Pair, mind: Mind) -> ObjectBelief | None:
         if {gone, host} == set(pair):
             return mind.objects.get(host)
     return None
+
+
+def _regions(pair: Pair, mind: Mind) -> tuple[Region, Region] | None:
+    """The regions in which the two are seen now, twice the same one when they are merged."""
+    host = _host(pair, mind)
+    if host is not None:
+        return (host.region, host.region) if host.last_seen == mind.time else None
+    first, second = (mind.objects[i] for i in pair)
+    if first.last_seen < mind.time or second.last_seen < mind.time:
+        return None
+    return first.region, second.region
+
+
+def _apart(pair: Pair, mind: Mind) -> tuple[Region, Region]:
+    """The regions of two that are merged: what was last seen of the one, and the joint one."""
+    first, second = (mind.objects[i].region for i in pair)
+    return first, second
 
 
 def _since(before: float | None, holds: bool, now: float) -> float | None:

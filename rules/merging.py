@@ -19,8 +19,6 @@ def merge(work: Work) -> None:
         if track.merged_with is not None:
             _stay_merged(work, gone, track)
             continue
-        if work.now - track.seen_at > work.settings.settle_s:
-            continue
         host = next((b for b in work.seen() if _grew_by(work, b, track)), None)
         if host is not None:
             again = track.parted_at is not None and work.now - track.parted_at < 0.5
@@ -46,6 +44,9 @@ def _stay_merged(work: Work, gone: ObjectBelief, track: Track) -> None:
 def _grew_by(work: Work, host: ObjectBelief, gone: Track) -> bool:
     before = work.of.get(host.id)
     if before is None or not host.confirmed or gone.visible < work.settings.whole_share:
+        return False
+    # The host's track stands still since its last sight: both were seen until much the same time.
+    if before.seen_at - gone.seen_at > work.settings.settle_s:
         return False
     parts = gone.region.area + before.region.area
     if host.region.area < before.region.area + 0.5 * gone.region.area:

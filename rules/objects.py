@@ -65,7 +65,8 @@ def drop_objects(mind: Mind, ids: frozenset[int]) -> Mind:
         return mind
     kept = {i: b for i, b in mind.objects.items() if i not in ids}
     left = {r: o for r, o in owners(mind).items() if o not in ids}
-    mind = replace(mind, objects=MappingProxyType(kept))
+    answers = {i: name for i, name in mind.answers.items() if i not in ids}
+    mind = replace(mind, objects=MappingProxyType(kept), answers=MappingProxyType(answers))
     return mind.remember(OWNERS, MappingProxyType(left))
 
 

@@ -14,6 +14,7 @@ from visup.rules.narrative import NarrativeSettings, TellRelations
 from visup.rules.objects import ObjectSettings, UpdateObjects
 from visup.rules.pose import BelievePose, PoseSettings
 from visup.rules.presence import PresenceSettings, SeePresence
+from visup.rules.questions import Ask, QuestionSettings
 from visup.rules.relations import Relations
 from visup.rules.safety import RuleThinker
 from visup.rules.votes import Votes, VoteSettings
@@ -27,6 +28,7 @@ class RuleSettings:
     objects: ObjectSettings = field(default_factory=ObjectSettings)
     votes: VoteSettings = field(default_factory=VoteSettings)
     pose: PoseSettings = field(default_factory=PoseSettings)
+    questions: QuestionSettings = field(default_factory=QuestionSettings)
     presence: PresenceSettings = field(default_factory=PresenceSettings)
     depth: DepthSettings = field(default_factory=DepthSettings)
     relations: RelationSettings = field(default_factory=RelationSettings)
@@ -41,7 +43,7 @@ class RuleSet:
 
     Attributes:
         update: Percepts enter the mind.
-        cogitate: Presence, votes, poses, depth, relations, zones, couplings, narrative, rules.
+        cogitate: Presence, votes, questions, poses, depth, relations, zones, couplings, narrative, rules.
     """
 
     update: tuple[Thinker, ...]
@@ -67,6 +69,7 @@ def default_thinkers(
         cogitate=(
             SeePresence(s.presence),
             Votes(s.votes),
+            Ask(s.questions),
             BelievePose(s.pose),
             BelieveDepth(s.depth),
             Relations(s.relations),

@@ -146,8 +146,7 @@ def follow(track: Track, region: Region, now: float, crowded: bool, allowed_gap_
         fixes=fixes,
         whole=region.bbox if clear else track.whole,
         whole_at=now if clear else track.whole_at,
-        # Too few places in the clear tell nothing of how it moves: what is known stays.
-        drift=_drift(fixes) if clear and len(fixes) >= 3 else track.drift,
+        drift=_drift(track, region, fixes, dt) if clear else track.drift,
         reference=reference,
         visible=visible,
     )
@@ -223,7 +222,18 @@ def _fixes(fixes: tuple[Fix, ...], fix: Fix) -> tuple[Fix, ...]:
     return (*(f for f in fixes if f[0] > fix[0] - 1.0), fix)[-16:]
 
 
-def _drift(fixes: tuple[Fix, ...]) -> tuple[float, float]:
+def _drift(track: Track, region: Region, fixes: tuple[Fix, ...], dt: float) -> tuple[float, float]:
+    """How it moves: by image motion where that is known, else by how its centroid moved.
+
+    A centroid moves as well when something unseen begins to hide the body.
+    """
+    if region.velocity_sigma > 0.0:
+        share = max(1.0 - exp(-dt / 0.4), 1.0 / track.sightings)
+        old, new = track.drift, region.velocity
+        return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
+    if len(fixes) < 3:
+        # Too few places tell nothing: what is known stays.
+        return track.drift
     t, x, y = np.array(fixes).T
     t = t - t.mean()
     lever = float((t**2).sum())

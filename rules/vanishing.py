@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from visup.agent import ObjectBelief, Presence
-from visup.rules.geometry import grow, pixels_in
+from visup.rules.geometry import grow, pixels_in, shared_pixels
 from visup.rules.tracks import Track, at_border, expected_box, expected_outside, heading_out
 from visup.rules.work import Work
 
@@ -92,7 +92,7 @@ def miss(work: Work) -> None:
 
 def _cover(work: Work, belief: ObjectBelief) -> ObjectBelief | None:
     """The object whose region stands where this one should be, or beside what is left of it."""
-    track = work.of[belief.id]
+    track, s = work.of[belief.id], work.settings
     place = expected_box(track, work.now)
     best: tuple[float, ObjectBelief] | None = None
     for other in work.seen():
@@ -100,11 +100,16 @@ def _cover(work: Work, belief: ObjectBelief) -> ObjectBelief | None:
             continue
         if belief.last_seen == work.now and work.near(belief.region, other.region):
             return other
-        spot = grow(track.region.bbox, 6)
-        share = max(
-            pixels_in(other.region, place) / max(1, place[2] * place[3]),
-            pixels_in(other.region, spot) / max(1, spot[2] * spot[3]),
-        )
+        # What stands on the very pixels where it was last seen has moved there since.
+        share = shared_pixels(other.region, track.region) / max(1.0, track.region.area)
+        if track.visible < s.whole_share:
+            # Of one that was going out of sight already, the rest may be anywhere in its place.
+            spot = grow(track.region.bbox, 6)
+            share = max(
+                share,
+                pixels_in(other.region, place) / max(1, place[2] * place[3]),
+                pixels_in(other.region, spot) / max(1, spot[2] * spot[3]),
+            )
         if share > 0.3 and (best is None or share > best[0]):
             best = (share, other)
     return best[1] if best else None

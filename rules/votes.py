@@ -2,19 +2,27 @@
 
 For each object o and each model name n, in each step of length dt:
 
-    v(o, n) <- v(o, n) * exp(-dt / tau) + w,    w = visible(o) * p(o, n) * rank^k * (s - 0.4) / (1 - 0.4)
+    v(o, n) <- v(o, n) * exp(-dt / tau) + w
+    w = new * visible(o) * p(o, n) * rank^k * (s - 0.4) / (1 - 0.4)
 
 where s is the best similarity with which any view of n was hypothesised for o's region in this
 step (nothing at or below 0.4 counts; section 7.3), k the place of n among the names of this step
 (0 for the best), p(o, n) how well its views hang together over time (`pose_support`), and visible(o)
-the share of o that is in sight. The three principles:
+the share of o that is in sight. Hypotheses that follow each other fast are of the same picture:
+`new` is the time since the last ones, as a share of `apart_s`, at most 1. The three principles:
 
 1. recurrent and temporally stable hypotheses are more likely: votes add up over steps;
 2. what has not been hypothesised lately is forgotten: votes decay with `tau_s`;
 3. an occluded object keeps its votes for some time: while it is hidden, or while nobody could look,
    they decay with `tau_hidden_s` instead.
 
-An object whose best name has too few votes or too small a share stays an 'unknown object'.
+The set of names is open. Whatever is in view, the database has something that is a little like it:
+each time, the possibility that the object is none of the models gets the vote of a name of
+similarity `stranger`. While it has the most votes, because all names are weak or change all the
+time, the object is an 'unknown object'.
+
+Votes are read as evidence: the likelihood of a name is proportional to exp(`evidence` * v). What
+the operator answers is no evidence but a fact, and settles the vote.
 """
 
 from __future__ import annotations
@@ -34,10 +42,11 @@ from visup.agent import (
     Outcome,
     Presence,
 )
+from visup.agent.mind import UNKNOWN_OBJECT
 from visup.rules.objects import owners
 from visup.rules.pose import pose_support
 from visup.rules.presence import visible_share
-from visup.rules.sentences import called, spaced
+from visup.rules.sentences import called, seems, spaced
 
 VOTES = "rules.votes"
 Tally = tuple[tuple[str, float], ...]
@@ -56,23 +65,25 @@ class VoteSettings:
         most_candidates: Names kept for an object.
         least_share: Names with a smaller share of the votes are dropped.
         known_votes: Votes that the best name needs for the object to be known at all.
-        known_share: Share that the best name needs.
-        settle_share: Share at which a name is told.
-        settle_margin: Lead over the second name at which it is told.
-        settle_s: How long it must have had both.
+        stranger: Similarity that an object has to some model even when it is none of them.
+        apart_s: Hypotheses this far apart in time are of different pictures.
+        evidence: How much a vote tells, in units of log likelihood.
+        settle: Likelihood at which a name is told.
+        settle_s: How long it must have had it.
     """
 
     least_similarity: float = 0.4
-    tau_s: float = 2.0
+    tau_s: float = 6.0
     tau_hidden_s: float = 60.0
     rank: float = 0.6
     least_visible: float = 0.5
     most_candidates: int = 5
     least_share: float = 0.03
     known_votes: float = 0.3
-    known_share: float = 0.25
-    settle_share: float = 0.45
-    settle_margin: float = 0.1
+    stranger: float = 0.5
+    apart_s: float = 0.2
+    evidence: float = 2.2
+    settle: float = 0.7
     settle_s: float = 0.8
 
 
@@ -82,12 +93,16 @@ class Ballot:
 
     Attributes:
         tally: (name, votes), most votes first.
+        stranger: Votes for its being none of the models.
+        heard: Seconds of the last hypotheses about it, or None.
         leader: The name that leads clearly now, or None.
         leads_since: Seconds since when it does.
         told: The name that was told last, or None.
     """
 
     tally: Tally = ()
+    stranger: float = 0.0
+    heard: float | None = None
     leader: str | None = None
     leads_since: float = 0.0
     told: str | None = None
@@ -121,11 +136,13 @@ def weights(hypotheses: tuple[Hypothesis, ...], settings: VoteSettings) -> dict[
         if h.similarity > settings.least_similarity:
             best[h.name] = max(best.get(h.name, 0.0), h.similarity)
     ranked = sorted(best.items(), key=lambda item: (-item[1], item[0]))
+    return {name: settings.rank**k * _worth(s, settings) for k, (name, s) in enumerate(ranked)}
+
+
+def _worth(similarity: float, settings: VoteSettings) -> float:
+    """What a similarity counts, 0 to 1."""
     room = 1.0 - settings.least_similarity
-    return {
-        name: settings.rank**k * (s - settings.least_similarity) / room
-        for k, (name, s) in enumerate(ranked)
-    }
+    return max(0.0, similarity - settings.least_similarity) / room
 
 
 def count(
@@ -151,15 +168,40 @@ def count(
     return tuple((n, v) for n, v in ranked[: 2 * most] if v > 1e-4)
 
 
-def candidates(tally: Tally, settings: VoteSettings) -> tuple[Candidate, ...]:
-    """Candidates that votes allow: none while the best has too few votes or too small a share."""
+def candidates(
+    tally: Tally, settings: VoteSettings, stranger: float = 0.0
+) -> tuple[Candidate, ...]:
+    """Candidates that votes allow, each with its likelihood.
+
+    Args:
+        tally: Votes, most first.
+        settings: How many candidates are kept, and how votes are read.
+        stranger: Votes for the object's being none of the models.
+
+    Returns:
+        Most likely first; none while the best has too few votes, or fewer than a stranger has.
+    """
+    if not tally or tally[0][1] <= 0.0 or tally[0][1] < max(settings.known_votes, stranger):
+        return ()
     total = sum(v for _, v in tally)
-    if not tally or tally[0][1] < settings.known_votes:
-        return ()
-    if tally[0][1] / total < settings.known_share:
-        return ()
-    shares = (Candidate(n, v, v / total) for n, v in tally[: settings.most_candidates])
-    return tuple(c for c in shares if c.share >= settings.least_share)
+    odds = [exp(settings.evidence * (v - tally[0][1])) for _, v in tally]
+    whole = sum(odds) + exp(settings.evidence * (stranger - tally[0][1]))
+    found = (
+        Candidate(name, v, v / total, o / whole)
+        for (name, v), o in zip(tally[: settings.most_candidates], odds, strict=False)
+    )
+    return tuple(c for c in found if c.share >= settings.least_share)
+
+
+def unknown(tally: Tally, settings: VoteSettings, stranger: float) -> float:
+    """How likely an object is none of the models, 0 to 1; 1 while nothing was said of it."""
+    odds = sum(exp(settings.evidence * (v - stranger)) for _, v in tally)
+    return 1.0 / (1.0 + odds)
+
+
+def settled(name: str, tally: Tally) -> Candidate:
+    """The only candidate, once the operator has said what an object is."""
+    return Candidate(name, dict(tally).get(name, 0.0), 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,16 +220,15 @@ class Votes:
         beliefs: list[ObjectBelief] = []
         for object_id, belief in sorted(mind.objects.items()):
             before = old.of.get(object_id, Ballot())
-            tally = self._count(mind, belief, before.tally, said.get(object_id, ()), dt)
-            named = candidates(tally, self.settings)
-            belief = replace(belief, candidates=named)
-            beliefs.append(belief)
-            after = self._lead(replace(before, tally=tally), named, observation.time)
+            ballot = self._count(mind, belief, before, said.get(object_id, ()), dt)
+            believed = self._believe(mind, belief, ballot)
+            beliefs.append(believed)
+            after = self._lead(ballot, believed.candidates, observation.time)
             if after.told != before.told:
-                event = _identified(mind.with_objects(belief), belief, before.told, observation)
-                after = after if belief.confirmed else before
+                event = _identified(mind.with_objects(believed), believed, before.told, observation)
+                after = after if belief.confirmed else replace(after, told=before.told)
                 events += [event] if belief.confirmed else []
-            ballots[object_id] = replace(after, tally=tally)
+            ballots[object_id] = after
         mind = mind.with_objects(*beliefs)
         mind = mind.remember(VOTES, Ballots(observation.time, MappingProxyType(ballots)))
         return Outcome(mind, tuple(events))
@@ -196,27 +237,42 @@ class Votes:
         self,
         mind: Mind,
         belief: ObjectBelief,
-        tally: Tally,
+        ballot: Ballot,
         said: tuple[Hypothesis, ...],
         dt: float,
-    ) -> Tally:
+    ) -> Ballot:
         s = self.settings
         visible = visible_share(mind, belief.id)
         hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
         blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
-        if hidden or blind:
-            return count(tally, {}, dt, s.tau_hidden_s, s.most_candidates)
-        heard = weights(said, s)
+        tau = s.tau_hidden_s if hidden or blind else s.tau_s
+        stranger = ballot.stranger * exp(-dt / tau)
+        if hidden or blind or not said:
+            tally = count(ballot.tally, {}, dt, tau, s.most_candidates)
+            return replace(ballot, tally=tally, stranger=stranger)
+        new = 1.0 if ballot.heard is None else min(1.0, (mind.time - ballot.heard) / s.apart_s)
         # Views that do not hang together over time speak against a name (paper, figure 5).
-        likely = {n: w * pose_support(mind, belief.id, n) for n, w in heard.items()}
-        return count(tally, likely, dt, s.tau_s, s.most_candidates, visible)
+        likely = {n: w * pose_support(mind, belief.id, n) for n, w in weights(said, s).items()}
+        tally = count(ballot.tally, likely, dt, tau, s.most_candidates, new * visible)
+        stranger += new * visible * _worth(s.stranger, s)
+        return replace(ballot, tally=tally, stranger=stranger, heard=mind.time)
+
+    def _believe(self, mind: Mind, belief: ObjectBelief, ballot: Ballot) -> ObjectBelief:
+        s = self.settings
+        answer = mind.answers.get(belief.id)
+        if answer == UNKNOWN_OBJECT:
+            return replace(belief, candidates=(), unknown=1.0)
+        if answer is not None:
+            return replace(belief, candidates=(settled(answer, ballot.tally),), unknown=0.0)
+        return replace(
+            belief,
+            candidates=candidates(ballot.tally, s, ballot.stranger),
+            unknown=unknown(ballot.tally, s, ballot.stranger),
+        )
 
     def _lead(self, ballot: Ballot, named: tuple[Candidate, ...], now: float) -> Ballot:
         s = self.settings
-        leader = None
-        if named and named[0].share >= s.settle_share:
-            second = named[1].share if len(named) > 1 else 0.0
-            leader = named[0].name if named[0].share - second >= s.settle_margin else None
+        leader = named[0].name if named and named[0].confidence >= s.settle else None
         since = ballot.leads_since if leader == ballot.leader else now
         settled = leader is not None and now - since >= s.settle_s - 1e-9
         told = leader if settled else ballot.told
@@ -239,10 +295,10 @@ def _identified(
     # By its model alone: the part that it plays in a task may be another's, and lags behind.
     words = spaced(called(mind, belief.name))
     if before is None:
-        text = f"An object is believed to be the {words}."
+        text = f"An object {seems(belief.confidence)} the {words}."
     else:
         was = spaced(called(mind, before))
-        text = f"The object taken for the {was} is now believed to be the {words}."
+        text = f"The object taken for the {was} {seems(belief.confidence)} the {words}."
     data = MappingProxyType({"name": belief.name, "before": before})
     return Event(
         "identified",
@@ -250,6 +306,6 @@ def _identified(
         observation.frame_index,
         text,
         (belief.id,),
-        belief.strength,
+        belief.confidence,
         data=data,
     )

@@ -19,6 +19,7 @@ from visup.settings import WatchSettings
 from visup.supervisor import build_agent, final_verdict, open_video
 
 if TYPE_CHECKING:
+    from visup.operator import Operator
     from visup.report.records import RunData
 
 Progress = Callable[[int, int | None], None]
@@ -92,6 +93,7 @@ def supervise(
     observers: Sequence[Observer] = (),
     progress: Progress | None = None,
     video: bool = True,
+    operator: Operator | None = None,
 ) -> RunResult:
     """Watch a source from start to end.
 
@@ -101,6 +103,7 @@ def supervise(
         observers: Told of each step besides the recorders.
         progress: Told of each step.
         video: Whether to write the annotated video.
+        operator: Who answers questions; nobody by default.
 
     Returns:
         How it ended. A source that breaks off is told in `problem`; all that was seen is kept.
@@ -114,7 +117,8 @@ def supervise(
         source = stack.enter_context(open_video(settings))
         recorder = _Recorder(settings, source, folder, video, stack) if folder else None
         recording = (recorder,) if recorder else ()
-        agent.observers = (tally, *recording, *observers)
+        answering = (operator.attend(agent),) if operator else ()
+        agent.observers = (tally, *recording, *observers, *answering)
         steps = 0
         try:
             for steps, _ in enumerate(agent.steps(source), start=1):

@@ -13,6 +13,7 @@ from rich.tree import Tree
 
 from visup.agent import Frame, Mind, ObjectBelief, Relation, RelationTable
 from visup.agent.agent import Agent, Step
+from visup.agent.errors import VisupError
 from visup.narrative import line
 from visup.wording import worded_once
 
@@ -23,6 +24,8 @@ run [until WHAT]  until an event of kind WHAT, a stage, a time (12.5), the end
 regions           what moved in the last frame
 objects           who is there, with their most likely identities
 candidates ID     all identities that object ID may have
+questions         what the operator is asked
+answer ID NAME    say what object ID is
 relations [ID]    what holds between objects
 tasks             stages, actors and verdicts
 alerts            what is open
@@ -55,6 +58,8 @@ class Session:
             "regions": lambda _: regions_table(self._last),
             "objects": lambda _: objects_table(self.agent.mind),
             "candidates": self._candidates,
+            "questions": lambda _: questions_list(self.agent.mind),
+            "answer": self._answer,
             "relations": lambda words: relations_table(self.agent.mind, _number(words)),
             "tasks": lambda _: tasks_tree(self.agent.mind),
             "alerts": lambda _: alerts_list(self.agent.mind),
@@ -119,6 +124,16 @@ class Session:
         mind = self.agent.mind
         seen = sum(b.last_seen == mind.time for b in mind.objects.values())
         return Text(f"frame {mind.frame_index}, {mind.time:.2f} s, {seen} regions", style="dim")
+
+    def _answer(self, words: Sequence[str]) -> RenderableType:
+        number = _number(words)
+        if number is None or len(words) < 2:
+            return Text("answer ID NAME, such as: answer 2 arm", style="yellow")
+        try:
+            self.agent.answer(number, " ".join(words[1:]))
+        except VisupError as fault:
+            return Text(str(fault), style="yellow")
+        return Text("taken as a fact from the next step on", style="dim")
 
     def _candidates(self, words: Sequence[str]) -> RenderableType:
         number = _number(words)
@@ -215,6 +230,11 @@ def alerts_list(mind: Mind) -> RenderableType:
         f"{a.id}  {a.severity.name.lower()}  since {a.opened:.1f} s  {a.cause}" for a in mind.alerts
     ]
     return Text("\n".join(lines) or "no alert is open")
+
+
+def questions_list(mind: Mind) -> RenderableType:
+    """What waits for an answer."""
+    return Text("\n".join(q.text for q in mind.questions) or "nothing is asked")
 
 
 def behaviours_table(step: Step | None) -> RenderableType:

@@ -54,6 +54,7 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
         actors=settings.actors,
         zones=load_zones(settings.zones) if settings.zones else (),
         observers=observers,
+        models=database.names() if database is not None else (),
     )
 
 

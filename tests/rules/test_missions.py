@@ -45,7 +45,7 @@ def true_times(name: str, noise: Noise, relation: str) -> list[float]:
 
 
 FULL, HALF = Noise(seed=11), Noise(seed=12, every=2)
-ROUGH = Noise(seed=13, every=2, missing=0.15, wrong_name=0.3)
+ROUGH = Noise(seed=13, every=2, contour_px=2.0, missing=0.15, wrong=0.3)
 
 
 def test_a_capture_that_fails_is_converging_touching_diverging_and_never_coupled() -> None:

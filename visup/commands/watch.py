@@ -99,6 +99,13 @@ def watch(
     quiet: Annotated[bool, typer.Option("--quiet", help="Only the verdict.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Events as JSON, one a line.")] = False,
     video: Annotated[bool, typer.Option(help="Write the annotated video.")] = True,
+    answer: Annotated[
+        list[str] | None,
+        typer.Option("--answer", metavar="ID=NAME", help="Who an object is, such as 2=arm."),
+    ] = None,
+    answers: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Such answers, one a line.")
+    ] = None,
 ) -> None:
     """Watch a video and say whether the work goes well.
 
@@ -107,8 +114,15 @@ def watch(
     settings = settings_of(
         source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
     )
-    result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, video=video)
+    given = _answers(answer or [], answers)
+    result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, video=video, answers=given)
     raise typer.Exit(result.exit_code)
+
+
+def _answers(given: list[str], path: Path | None) -> dict[int, str]:
+    from visup.operator import parse_answers, read_answers
+
+    return {**(read_answers(path) if path else {}), **parse_answers(given)}
 
 
 def demo(
@@ -135,17 +149,22 @@ def run_and_tell(
     quiet: bool = False,
     as_json: bool = False,
     video: bool = True,
+    answers: dict[int, str] | None = None,
 ) -> RunResult:
     """Run, print the narrative as it goes and the verdict last."""
     from rich.console import Console
 
     from visup.narrative import Narrator
+    from visup.operator import Operator, typed_lines
     from visup.run import fresh_folder, supervise
 
     console = Console(highlight=False)
     folder = fresh_folder(out, settings.source)
     narrator = Narrator(console, as_json)
     silent = quiet or as_json
+    # Whoever reads events from a pipe does not type answers.
+    typed = None if silent or not console.is_terminal else typed_lines()
+    operator = Operator(answers or {}, typed, console.print)
     with progress_bar(console, "watching", shown=not silent) as progress:
         result = supervise(
             settings,
@@ -153,6 +172,7 @@ def run_and_tell(
             observers=() if quiet else (narrator,),
             progress=progress,
             video=video,
+            operator=operator,
         )
     _tell_end(console, result, as_json=as_json)
     return result

@@ -18,6 +18,7 @@ EVALUATIONS = (
     ("motion", "video/static"),
     ("motion", "video/mot"),
     ("missions", "missions"),
+    ("reasoning", "missions"),
     ("health", "video"),
     ("health", "missions"),
 )

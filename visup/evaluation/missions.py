@@ -6,7 +6,6 @@ masks are read afterwards, by the scoring alone.
 
 from __future__ import annotations
 
-import json
 import tempfile
 import time
 from collections import Counter
@@ -21,6 +20,7 @@ import numpy as np
 from visup.agent import Frame, Mind, Pose, Region, Severity, Status, TaskBelief, Verdict
 from visup.agent.agent import Step
 from visup.agent.errors import SettingsError
+from visup.evaluation.mission_files import mission_folders, read_json
 from visup.evaluation.mission_poses import Poses, spin_error, view_error
 from visup.evaluation.mission_scores import (
     UNSCORED_START_S,
@@ -125,7 +125,7 @@ def evaluate_missions(
     Raises:
         SettingsError: There is no mission, or no database and nothing to build it from.
     """
-    missions = _missions(folder)
+    missions = mission_folders(folder)
     with tempfile.TemporaryDirectory() as scratch:
         database = models or _database(folder, missions, Path(scratch), progress)
         items: dict[str, dict[str, Any]] = {}
@@ -133,19 +133,7 @@ def evaluate_missions(
             items[mission.name] = _evaluate(mission, database, limit)
             if progress:
                 progress(f"{mission.name}: {items[mission.name]['verdict']}")
-    return {"total": _total(list(items.values())), "items": items}
-
-
-def _missions(folder: Path) -> list[Path]:
-    found = [folder] if (folder / "mission.json").is_file() else []
-    found += sorted(p.parent for p in folder.glob("*/mission.json"))
-    if not found:
-        raise SettingsError(
-            "there is no mission here",
-            where=str(folder),
-            expected="mission.json, video.mp4, masks/ and truth.json, or folders that hold them",
-        )
-    return found
+    return {"total": mission_total(list(items.values())), "items": items}
 
 
 def _database(
@@ -162,7 +150,8 @@ def _database(
             where=str(folder),
             hint="give one with --models DB",
         )
-    wanted = {m for mission in missions for m in _read(mission / "mission.json")["actors"].values()}
+    told = [read_json(mission / "mission.json") for mission in missions]
+    wanted = {m for t in told for m in t["actors"].values()}
     if progress:
         progress(f"building a database from {len(meshes)} meshes")
     path = scratch / "models.db"
@@ -175,21 +164,16 @@ def _database(
     return path
 
 
-def _read(path: Path) -> dict[str, Any]:
-    data: dict[str, Any] = json.loads(path.read_text())
-    return data
-
-
 def _evaluate(mission: Path, database: Path, limit: int | None) -> dict[str, Any]:
     record = _supervise(mission, database, limit)
-    truth = _read(mission / "truth.json")
+    truth = read_json(mission / "truth.json")
     truths = truths_of(truth, float(truth["fps"]))
     overlaps = _overlaps(mission, truth["labels"], record)
     return _scores(truth, truths, record, overlaps)
 
 
 def _supervise(mission: Path, database: Path, limit: int | None) -> Record:
-    told = _read(mission / "mission.json")
+    told = read_json(mission / "mission.json")
     settings = WatchSettings(
         source=str(mission / "video.mp4"),
         tasks=(str(told["task"]),),
@@ -251,10 +235,17 @@ def _true_names(overlaps: Overlaps) -> dict[int, str]:
     return {number: name for number, (_, name) in best.items()}
 
 
-def _scores(
-    truth: Mapping[str, Any], truths: Truths, record: Record, overlaps: Overlaps
-) -> dict[str, Any]:
-    names = _true_names(overlaps)
+def told_scores(truths: Truths, record: Record, names: Mapping[int, str]) -> dict[str, Any]:
+    """Figures of all that was said: events, stages, alerts, verdict.
+
+    Args:
+        truths: What truly happened.
+        record: What was said.
+        names: Believed object's id -> the true object that it stands for.
+
+    Returns:
+        By the keys of the data's README; counts of events as `event_counts`.
+    """
 
     def true_objects(ids: Sequence[int]) -> frozenset[str]:
         return frozenset(names.get(i, "?") for i in ids)
@@ -266,11 +257,7 @@ def _scores(
     found, false = scored_alerts(alerts, truths.alerts)
     hours = max(record.last.time, 1.0) / 3600 if record.last else 1.0
     verdict = final_verdict(record.last).value if record.last else Verdict.UNKNOWN.value
-    identified, scored = _identity(truths, record, overlaps)
-    poses = _poses(truths, record, overlaps)
-    scores: dict[str, Any] = {
-        "identity": identified / scored if scored else None,
-        "identity_counts": [identified, scored],
+    return {
         "event_precision": precision,
         "event_recall": recall,
         "event_f1": f1,
@@ -285,6 +272,18 @@ def _scores(
         "verdict": verdict,
         "verdicts_right": int(verdict == truths.verdict),
         "verdicts": 1,
+    }
+
+
+def _scores(
+    truth: Mapping[str, Any], truths: Truths, record: Record, overlaps: Overlaps
+) -> dict[str, Any]:
+    identified, scored = _identity(truths, record, overlaps)
+    poses = _poses(truths, record, overlaps)
+    scores: dict[str, Any] = {
+        "identity": identified / scored if scored else None,
+        "identity_counts": [identified, scored],
+        **told_scores(truths, record, _true_names(overlaps)),
         "view_deg": view_error(truth, poses),
         "spin_error": spin_error(truth, poses),
         "fps": len(record.seen) / record.seconds if record.seconds else None,
@@ -329,7 +328,7 @@ def _poses(truths: Truths, record: Record, overlaps: Overlaps) -> Poses:
     return found
 
 
-def _total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def mission_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Figures over all missions: counts are added up, so that each frame and event weighs alike."""
     right, excess, missed = (sum(i["event_counts"][k] for i in items) for k in range(3))
     precision, recall, f1 = precision_recall_f1(right, excess, missed)

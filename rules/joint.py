@@ -1,0 +1,262 @@
+"""How two bodies that meet move relative to each other: by their outlines, and by image motion.
+
+The velocities that the segmenter reports are used where there are any; outlines always. Each outline
+is kept as it was when the two came near, and laid upon every later one: points are moved along their
+normals until they lie on it (iterated closest points, Chen and Medioni 1992, translation alone,
+robust). Hundreds of points say more than the few by which a body reaches furthest, errors of single
+stretches hardly count, and what is wrong with the kept outline is wrong in the same way each time, so
+that it does not look like motion. Once both are seen as one region, both kept outlines are laid upon
+that.
+
+Points at the image border, and those beside the other body, where the outline ends because the
+other begins, have no say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from visup.agent import Region
+from visup.rules.geometry import Floats, outline
+
+POINTS = 96
+"""Points of a kept outline."""
+
+REACH = 12.0
+"""How far a point may be from the outline on which it is laid, pixels."""
+
+BESIDE = 6.0
+"""How near the other body an outline is not trusted, pixels."""
+
+LEAST_SIGMA = 0.3
+"""No velocity in the image is believed to be known better, pixels per second."""
+
+LASTS_S = 0.2
+"""Errors of velocities are alike for so long, seconds."""
+
+LEAST_POINTS = 12
+_WILD = 1.5  # pixels beyond which a point counts less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """Points of an outline that say how a body moves.
+
+    Attributes:
+        points: (N, 2) pixels.
+        normals: (N, 2) unit vectors across the outline.
+        shift: (x, y) by which the body has moved since, pixels.
+    """
+
+    points: Floats
+    normals: Floats
+    shift: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """What is remembered of two bodies that are near each other.
+
+    Attributes:
+        first: Outline of the one, and
+        second: of the other.
+        since: Seconds when they were kept.
+        before: Relative shift up to then, pixels.
+        path: (time, x, y, vx, vy, variance): how far the second had moved relative to the first,
+            pixels, and how fast it did by image motion, pixels per second; NaN where unknown. Oldest
+            first.
+    """
+
+    first: Kept
+    second: Kept
+    since: float
+    before: tuple[float, float] = (0.0, 0.0)
+    path: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def path_end(self) -> float:
+        """Seconds of the last sight of both."""
+        return self.path[-1][0] if self.path else self.since
+
+
+def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]) -> Kept | None:
+    """The points of a region's outline that can be followed, or None when there are too few.
+
+    Args:
+        region: The region.
+        others: Bodies near it.
+        size: (width, height) of the image, pixels.
+    """
+    points = evenly(outline(region), POINTS)
+    tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    length = np.linalg.norm(tangent, axis=1)
+    normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
+    x, y = points.T
+    free = (x > 3) & (y > 3) & (x < size[0] - 4) & (y < size[1] - 4) & (length > 0)
+    for other in others:
+        beside = cKDTree(outline(other)).query(points, distance_upper_bound=BESIDE)[0]
+        free &= ~np.isfinite(beside)
+    return Kept(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
+
+
+def evenly(points: Floats, count: int) -> Floats:
+    """A closed outline (N, 2) as `count` points evenly spaced along it."""
+    closed = np.concatenate([points, points[:1]])
+    steps = np.linalg.norm(np.diff(closed, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    at = np.linspace(0.0, along[-1], count, endpoint=False)
+    return np.stack([np.interp(at, along, closed[:, k]) for k in (0, 1)], axis=1)
+
+
+def laid_upon(kept: Kept, target: Floats) -> Kept | None:
+    """A kept outline moved onto a later one.
+
+    Args:
+        kept: The outline, with its shift so far.
+        target: (M, 2) the later outline, pixels; points no further apart than a few pixels.
+
+    Returns:
+        The same with the new shift; None when too little of it finds its place.
+    """
+    tree = cKDTree(target)
+    shift = np.array(kept.shift)
+    for _ in range(4):
+        at = kept.points + shift
+        far, nearest = tree.query(at, distance_upper_bound=REACH)
+        found = np.isfinite(far)
+        if found.sum() < max(LEAST_POINTS, 0.5 * len(at)):
+            return None
+        normals = kept.normals[found]
+        across = ((target[nearest[found]] - at[found]) * normals).sum(axis=1)
+        weight = 1.0 / np.maximum(np.abs(across), _WILD)
+        square = (normals * weight[:, None]).T @ normals
+        # An outline with but one direction says nothing of motion along it.
+        if np.linalg.cond(square) > 50.0:
+            return None
+        step = np.linalg.solve(square, (normals * (weight * across)[:, None]).sum(axis=0))
+        shift = shift + step
+        if np.abs(step).max() < 0.02:
+            break
+    return replace(kept, shift=(float(shift[0]), float(shift[1])))
+
+
+def follow(
+    joint: Joint | None,
+    regions: tuple[Region, Region],
+    now: float,
+    size: tuple[int, int],
+    *,
+    lasts_s: float,
+    anew_s: float,
+) -> Joint | None:
+    """What is known of two bodies after another sight of them.
+
+    Args:
+        joint: What was known.
+        regions: Of the first and the second; twice the same when they are one region.
+        now: Seconds.
+        size: (width, height) of the image, pixels.
+        lasts_s: How far back the path is kept.
+        anew_s: Outlines older than this are kept anew, as bodies turn.
+
+    Returns:
+        The same with a further place on its path; None when the two cannot be followed.
+    """
+    apart = regions[0] is not regions[1]
+    if joint is None:
+        return begun(regions, now, size) if apart else None
+    targets = [evenly(outline(r), max(POINTS, len(outline(r)))) for r in regions]
+    first, second = laid_upon(joint.first, targets[0]), laid_upon(joint.second, targets[1])
+    if first is None or second is None:
+        return begun(regions, now, size) if apart else replace(joint, path=())
+    x, y = (b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True))
+    place = (now, x, y, *_image_motion(regions))
+    path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
+    if apart and now - joint.since > anew_s:
+        fresh = begun(regions, now, size)
+        if fresh is not None:
+            return replace(fresh, before=(x, y), path=path)
+    return replace(joint, first=first, second=second, path=path)
+
+
+def begun(regions: tuple[Region, Region], now: float, size: tuple[int, int]) -> Joint | None:
+    """Two bodies followed from now on; None when too little of them is in the clear."""
+    first = kept_outline(regions[0], regions[1:], size)
+    second = kept_outline(regions[1], regions[:1], size)
+    if first is None or second is None:
+        return None
+    return Joint(first, second, now, path=((now, 0.0, 0.0, *_image_motion(regions)),))
+
+
+def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
+    """Relative velocity as the segmenter reports it, and the variance of each component."""
+    a, b = regions
+    if a is b or a.velocity_sigma <= 0.0 or b.velocity_sigma <= 0.0:
+        return (np.nan, np.nan, np.nan)
+    variance = max(a.velocity_sigma, LEAST_SIGMA) ** 2 + max(b.velocity_sigma, LEAST_SIGMA) ** 2
+    return b.velocity[0] - a.velocity[0], b.velocity[1] - a.velocity[1], variance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Relative velocity over some time: (2,) pixels per second, and its covariance (2, 2)."""
+
+    velocity: Floats
+    covariance: Floats
+
+    @property
+    def speed(self) -> float:
+        """Pixels per second."""
+        return float(np.hypot(*self.velocity))
+
+    def strangeness(self, slow: float) -> float:
+        """How ill the motion suits bodies at rest, as a squared distance; 2 is usual for those.
+
+        Args:
+            slow: Speed that still is rest, pixels per second. What is hardly known in a direction,
+                as the motion of a long arm along itself, weighs little.
+        """
+        allowed = self.covariance + slow**2 * np.eye(2)
+        return float(self.velocity @ np.linalg.solve(allowed, self.velocity))
+
+
+def motions(joint: Joint, now: float, window_s: float) -> tuple[Motion, Motion, Motion] | None:
+    """How two bodies move relative to each other.
+
+    Args:
+        joint: What is known of them.
+        now: Seconds.
+        window_s: Over how long.
+
+    Returns:
+        Motion over the window and over its two halves; None while too little is known.
+    """
+    recent = np.array([p for p in joint.path if p[0] > now - window_s - 1e-6])
+    if len(recent) < 6 or recent[-1, 0] - recent[0, 0] < 0.7 * window_s:
+        return None
+    # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
+    # longer, and is believed to be as large.
+    steps = np.diff(recent[:, 1:3], axis=0)
+    noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
+    middle = len(recent) // 2
+    first, second = recent[: middle + 1], recent[middle:]
+    return _motion(recent, noise), _motion(first, noise), _motion(second, noise)
+
+
+def _motion(path: Floats, noise: Floats) -> Motion:
+    """The slope of the places, joined with the mean of the velocities, each by its precision."""
+    t = path[:, 0] - path[:, 0].mean()
+    lever = max(float(t @ t), 1e-9)
+    slope, spread = t @ path[:, 1:3] / lever, noise / lever
+    flow = path[np.isfinite(path[:, 5]), 3:]
+    if not len(flow):
+        return Motion(slope, spread)
+    independent = max(1.0, (path[-1, 0] - path[0, 0]) / LASTS_S)
+    precision = np.linalg.inv(spread)
+    certain = independent / flow[:, 2].mean() * np.eye(2)
+    spread = np.linalg.inv(precision + certain)
+    return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread)

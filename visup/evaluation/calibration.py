@@ -1,0 +1,53 @@
+"""How well confidence agrees with being right: reliability and expected calibration error.
+
+Of all that is said with 80 % confidence, 80 % should be right. Confidences are put into bins; the error
+is the mean distance of a bin's share right from its mean confidence, each weighed by its size
+(Naeini, Cooper and Hauskrecht, "Obtaining Well Calibrated Probabilities Using Bayesian Binning", 2015).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+BINS = 10
+
+Counts = list[list[float]]
+"""For each bin: how many, the sum of their confidences, how many were right."""
+
+
+@dataclass(slots=True)
+class Calibration:
+    """Counts of what was said, by how sure it was."""
+
+    _bins: Counts = field(default_factory=lambda: [[0.0, 0.0, 0.0] for _ in range(BINS)])
+
+    def add(self, confidence: float, right: bool) -> None:
+        """Count one statement; `confidence` is 0 to 1."""
+        row = self._bins[min(BINS - 1, max(0, int(confidence * BINS)))]
+        row[0] += 1
+        row[1] += confidence
+        row[2] += right
+
+    def join(self, counts: Sequence[Sequence[float]]) -> None:
+        """Count what another counted."""
+        for row, other in zip(self._bins, counts, strict=True):
+            for k, value in enumerate(other):
+                row[k] += value
+
+    def counts(self) -> Counts:
+        """What was counted, for `join`."""
+        return [list(row) for row in self._bins]
+
+    def error(self) -> float | None:
+        """Expected calibration error, 0 to 1, or None when nothing was counted."""
+        total = sum(n for n, _, _ in self._bins)
+        return sum(abs(said - right) for _, said, right in self._bins) / total if total else None
+
+    def table(self) -> list[dict[str, float]]:
+        """One row for each bin that holds anything: count, mean confidence, share right."""
+        return [
+            {"count": n, "confidence": said / n, "right": right / n}
+            for n, said, right in self._bins
+            if n
+        ]
