@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.tasks.actions import Meaning
@@ -31,6 +31,7 @@ from visup.tasks.sentences import outcome
 from visup.tasks.settings import TaskSettings
 from visup.tasks.tree import Task
 from visup.tasks.verify import BAD, Watch, entered, over, update
+from visup.tasks.vocabulary import Look
 
 CONTRARY, IDLE, UNOBSERVED, WAITING = 1.0, 0.2, 0.05, 0.02  # cost per second of one step
 STAYED = 0.5  # cost of staying, once, when what comes next was seen to begin
@@ -73,11 +74,19 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Follower:
-    """What following the readings of one task needs: the task, meanings of actions, patience."""
+    """What following the readings of one task needs.
+
+    Attributes:
+        task: The task.
+        actions: Meanings of its actions, with those of comparisons and zones (see `vocabulary`).
+        settings: Patience.
+        looks: Whether what is no plain relation of the mind holds.
+    """
 
     task: Task
     actions: Mapping[str, Meaning]
     settings: TaskSettings
+    looks: Mapping[str, Look] = field(default_factory=dict)
 
     def start(self, now: float) -> tuple[Reading, ...]:
         """The readings in which the task begins now."""
@@ -128,7 +137,7 @@ class Follower:
     def _cost(self, leaf: Leaf[Watch], seen: Sighting, done: bool) -> float:
         if not seen.observed:
             return UNOBSERVED
-        if seen.contrary is not None and seen.holds is not Truth.TRUE:
+        if seen.contrary is not None and (seen.stern or seen.holds is not Truth.TRUE):
             return CONTRARY
         if seen.helps is not None or done or self._over(leaf):
             return 0.0
@@ -169,7 +178,7 @@ class Follower:
         skipped = sum(self._skipped(x) for x in way.left)
         if self._seen(reading, way, see, now):
             return skipped
-        nearer = all(self._enters(see(x.step).helps, now) for x in way.entered)
+        nearer = all(self._comes(x.step, see(x.step), now) for x in way.entered)
         return skipped + GUESSED if nearer else None
 
     def _seen(self, reading: Reading, way: Move[Watch], see: See, now: float) -> bool:
@@ -193,6 +202,10 @@ class Follower:
         """Whether a sign of a step has lasted long enough."""
         return sign is not None and now - sign.since >= self.settings.enter_s - 1e-9
 
+    def _comes(self, step: Step, seen: Sighting, now: float) -> bool:
+        """Whether a step is seen to come nearer; one whose course says when it begins only begins."""
+        return step.sign("begins") is None and self._enters(seen.helps, now)
+
     def _goes_on(self, step: Step, left: tuple[Leaf[Watch], ...]) -> bool:
         """Whether a step asks for what is going on already: it can only begin once that ceased."""
         return any(step.same_as(x.step) and not x.watch.ceased for x in left)
@@ -214,8 +227,9 @@ class Follower:
         see: See,
         now: float,
     ) -> Reading:
+        opened = self._seen(reading, way, see, now)
         fresh = [
-            self._look(x, see(x.step), now, 0.0, False) if x in way.entered else x
+            self._look(_opened(x, opened), see(x.step), now, 0.0, False) if x in way.entered else x
             for x in leaves(state)
         ]
         under_way = {x.step.stage for x in fresh}
@@ -247,6 +261,10 @@ class Follower:
         least = ranked[0].cost
         kept = (replace(r, cost=r.cost - least) for r in ranked if r.cost - least <= WORST)
         return tuple(kept)
+
+
+def _opened(leaf: Leaf[Watch], opened: bool) -> Leaf[Watch]:
+    return replace(leaf, watch=replace(leaf.watch, opened=True)) if opened else leaf
 
 
 def _steps(way: Move[Watch]) -> tuple[Step, ...]:
