@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AnySet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
@@ -175,7 +175,7 @@ class _Check:
             told.add(name)
             near = closest(name, self.actions)
             shown = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
-            width = Span(span.line, span.column, span.line, span.column + len(name))
+            width = replace(span, end_line=span.line, end_column=span.column + len(name))
             at = span if self.is_head(span) else width
             hint = f"did you mean `{near}`?" if near else None
             what = f"unknown action `{name}`"
@@ -294,11 +294,9 @@ class _Check:
     def idle_actors(self) -> Iterator[TaskFault]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
         for actor in self.parsed.task.actors:
-            if (
-                actor.name not in named
-                and not actor.span.file
-                and not any(_slip(n, actor.name) for n in named)
-            ):
+            if actor.span.file or actor.name in named:
+                continue  # an included file may offer more than is used
+            if not any(_slip(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
                 hint = did_you_mean(actor.name, named)
                 yield self.fault("E213", what, actor.span, "an action with this actor", hint)

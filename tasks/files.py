@@ -64,7 +64,7 @@ def _no_such(name: str) -> TaskError:
     known = (
         [*shipped, *(p.name for p in sorted(beside.glob("*.task")))] if beside.is_dir() else shipped
     )
-    close = get_close_matches(Path(name).name, known, n=1) or get_close_matches(
+    close = get_close_matches(Path(name).name, known, n=1, cutoff=0.75) or get_close_matches(
         Path(name).stem, shipped, n=1
     )
     hint = None

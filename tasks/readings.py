@@ -57,6 +57,7 @@ class Reading:
         finished: When the task was done by it, or None.
         met: Steps that may come next and whose entry was seen, with the time when it last was.
         stayed: Whether it has paid for staying where it is.
+        gone_on: Whether it has left a step.
     """
 
     state: State[Watch]
@@ -65,11 +66,12 @@ class Reading:
     finished: float | None = None
     met: tuple[tuple[tuple[Step, ...], float], ...] = ()
     stayed: bool = False
+    gone_on: bool = False
 
     @property
     def begun(self) -> bool:
         """Whether anything of the task was seen by it."""
-        return bool(self.past) or any(x.watch.begun is not None for x in leaves(self.state))
+        return self.gone_on or any(x.watch.begun is not None for x in leaves(self.state))
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +245,8 @@ class Follower:
             if ending.stage not in under_way or failed:
                 told[ending.stage] = ending
         cost = reading.cost + price
-        return Reading(with_leaves(state, iter(fresh)), cost, tuple(told.values()))
+        now_at = with_leaves(state, iter(fresh))
+        return Reading(now_at, cost, tuple(told.values()), gone_on=True)
 
     def _ending(self, leaf: Leaf[Watch], now: float) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""

@@ -27,6 +27,12 @@ def stage_names(task: Task) -> tuple[str, ...]:
     return tuple(names)
 
 
+def stages_inside(task: Task, name: str) -> frozenset[str]:
+    """The names of all stages that a stage comes to, itself with them."""
+    stage = task.stage(name)
+    return frozenset(s.name for s in _reached(task, stage)) if stage else frozenset()
+
+
 def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
     """The actors of the actions that one stage asks for itself, in the order of the text."""
     rule = task.stage(stage)

@@ -17,6 +17,7 @@ from visup.agent import (
 )
 from visup.rules.sentences import describe
 from visup.tasks.sentences import stage_sentence, verdict_sentence
+from visup.tasks.structure import stages_inside
 from visup.tasks.tree import Task
 from visup.tasks.verify import BAD
 
@@ -51,7 +52,7 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
             if first and kind == "stage_started" and event.objects:
                 event = replace(event, text=_introduction(stage, now, mind))
             if kind == "stage_started":
-                event = replace(event, text=_with_own_words(event.text, stage.stage, task))
+                event = replace(event, text=event.text + _own_words(stage.stage, before, task))
             yield event
     if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
         yield _verdict_event(now, mind)
@@ -112,14 +113,15 @@ def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
     return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
 
 
-def _with_own_words(text: str, name: str, task: Task) -> str:
-    """A sentence with what the task file itself says of the stage."""
-    stage = task.stage(name)
-    return (
-        f"{text} {stage.text[:1].upper()}{stage.text[1:].rstrip('.')}."
-        if stage and stage.text
-        else text
-    )
+def _own_words(name: str, before: TaskBelief, task: Task) -> str:
+    """What the task file itself says of a stage that begins, and of those that begin with it."""
+    begun = {s.stage for s in before.stages if s.status is not Status.PENDING}
+    groups = [s for s in task.stages if s.text and s.name != name]
+    inside = ((g, stages_inside(task, g.name)) for g in groups)
+    texts = [g.text for g, names in inside if name in names and not names & begun]
+    own = task.stage(name)
+    texts += [own.text] if own and own.text else []
+    return "".join(f" {_capital(t).rstrip('.')}." for t in texts)
 
 
 def _verdict_event(belief: TaskBelief, mind: Mind) -> Event:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from visup.agent.errors import ManyErrors, Place, TaskError
 from visup.tasks import load_task, parse_task, shipped_tasks
+from visup.tasks.actions import Meaning
 from visup.tasks.diagnostics import examine
 from visup.tasks.faults import CODES, TaskFault, closest
 from visup.tasks.load import read_text
@@ -40,21 +41,37 @@ def test_good_files_have_the_stages_and_actors_that_they_say(path: Path) -> None
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda p: p.stem)
-def test_bad_files_are_told_as_written_beside_them(path: Path) -> None:
+def test_bad_files_are_told_as_written_beside_them(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(path.parent)  # where they look for what they include
     _, faults = examine(text_of(path), path.name)
     assert "".join(f"{f}\n" for f in faults) == path.with_suffix(".txt").read_text("utf-8")
 
 
-def test_bad_files_with_one_mistake_give_one_message() -> None:
+def test_bad_files_with_one_mistake_give_one_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(HERE / "bad")
     several = {"three_mistakes": 3, "everything": 6, "typographic": 2}
     for path in BAD:
         _, faults = examine(text_of(path), path.name)
         assert len(faults) == several.get(path.stem, 1), path.stem
 
 
-def test_every_code_is_shown_by_a_bad_file() -> None:
+def test_every_code_is_shown_by_a_bad_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(HERE / "bad")
     shown = {f.code for p in BAD for f in examine(text_of(p), p.name)[1]}
-    assert shown == set(CODES)
+    assert shown | {"E231"} == set(CODES)
+
+
+def test_an_action_that_needs_percepts_which_nothing_gives_is_told() -> None:
+    text = "<dock> ::= depth_difference(arm, satellite) < 10 % coupled(arm, satellite)"
+    assert examine(text)[1] == []
+    _, faults = examine(text, percepts=frozenset({"region", "health"}))
+    assert [f.code for f in faults] == ["E231"]
+    assert "`depth` and `hypothesis`" in faults[0].message
+    mine = {"gripped": Meaning("gripped", ("gripped",), arity=1, needs=frozenset({"gripper"}))}
+    _, faults = examine("<t> ::= gripped(part)", actions=mine)
+    assert [f.code for f in faults] == ["E231"]
 
 
 def test_three_mistakes_are_raised_together() -> None:
