@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from importlib.resources import files
+from os.path import normpath
 from pathlib import Path
 
 from visup.agent.errors import TaskError
@@ -47,7 +48,7 @@ def read_beside(path: str, including: str) -> tuple[str, str]:
     Raises:
         TaskError: When there is no such file or task, or it is not text.
     """
-    beside = Path(including).parent / path
+    beside = Path(normpath(Path(including).parent / path))  # so that a file has one name
     name = str(beside) if not path or beside.exists() or path not in shipped_tasks() else path
     return name, read_text(name)
 

@@ -33,6 +33,9 @@ def join_included(parsed: Parsed, source: Source, read: Read) -> Parsed:
     return _Joiner(source, read).join(parsed, (source.file,))
 
 
+DEEPEST = 30  # files that include one another in a row
+
+
 @dataclass
 class _Joiner:
     source: Source
@@ -51,8 +54,10 @@ class _Joiner:
         except TaskError as e:
             what = f"`{include.path}` cannot be included: {e.what}"
             return self.fault("E221", what, include, e.expected, e.hint)
-        if file in chain:
-            circle = " includes ".join(f"`{f}`" for f in (*chain[chain.index(file) :], file))
+        if file in chain or len(chain) > DEEPEST:
+            circle = " includes ".join(
+                f"`{f}`" for f in (*chain[chain.index(file) if file in chain else 0 :], file)
+            )
             hint = "move what both need to a third file"
             return self.fault("E222", f"files include each other: {circle}", include, None, hint)
         if file in self.taken:

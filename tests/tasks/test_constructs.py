@@ -51,12 +51,12 @@ def test_a_stage_ends_when_its_file_says_so() -> None:
 def test_a_stage_that_was_left_before_its_end_was_seen_has_failed() -> None:
     text = (
         "<t> ::= <near> <caught>\n"
-        "<near> ::= converging(arm, satellite) ends when touching(arm, satellite)\n"
+        "<near> ::= converging(arm, satellite) ends when gone(arm)\n"
         "<caught> ::= coupled(arm, satellite)"
     )
     played = watch(text, Script((NEARS, HOLDS)), 15.0)
     assert status(played, "near") is Status.FAILED
-    assert "ends when touching(arm, satellite)" in str([e.text for e in played.events])
+    assert "ends when gone(arm)" in str([e.text for e in played.events])
 
 
 def test_a_stage_begins_when_its_file_says_so_and_not_before() -> None:
