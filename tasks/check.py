@@ -209,7 +209,7 @@ class _Check:
         references = [c for _, c in self.courses if isinstance(c, Reference)]
         references += [r for i in self.parsed.task.invariants for r in i.during]
         for r in references:
-            if r.stage not in known:
+            if r.stage not in known and not self.parsed.lacking:
                 found.setdefault(r.stage, r)
         return found
 

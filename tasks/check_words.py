@@ -103,7 +103,7 @@ class WordCheck:
             if not amount.parameter:
                 yield from self.amount(amount, wanted)
             elif amount.parameter not in known:
-                if not self.parsed.faults or amount.parameter not in self.parsed.defined:
+                if not self.parsed.lacking and amount.parameter not in self.parsed.defined:
                     hint = did_you_mean(amount.parameter, known)
                     what = f"parameter `{amount.parameter}` is not declared"
                     expected = f"`parameter {amount.parameter} is 90 s`"
@@ -165,7 +165,8 @@ class WordCheck:
                 continue
             for actor, kind in zip(actors, meaning.kinds, strict=True):
                 said = str(actor)
-                if kind == "zone" and said not in zones and said not in self.parsed.defined:
+                known = said in zones or said in self.parsed.defined or self.parsed.lacking
+                if kind == "zone" and not known:
                     what = f"`{name}` speaks of a zone, and `{said}` is none"
                     hint = did_you_mean(said, zones)
                     yield self.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)

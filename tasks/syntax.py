@@ -47,6 +47,11 @@ class Parsed:
     defined: frozenset[str] = frozenset()
     used: frozenset[str] = frozenset()
 
+    @property
+    def lacking(self) -> bool:
+        """Whether a file that it includes could not be read, so that names may be missing."""
+        return any(f.code in ("E221", "E222") for f in self.faults)
+
 
 def parse(text: str, source: Source) -> Parsed:
     """Read a cleaned text; where it is not in the grammar, statement by statement.

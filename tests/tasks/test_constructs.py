@@ -54,7 +54,7 @@ def test_a_stage_that_was_left_before_its_end_was_seen_has_failed() -> None:
         "<near> ::= converging(arm, satellite) ends when gone(arm)\n"
         "<caught> ::= coupled(arm, satellite)"
     )
-    played = watch(text, Script((NEARS, HOLDS)), 15.0)
+    played = watch(text, Script((NEARS, HOLDS)), 20.0)
     assert status(played, "near") is Status.FAILED
     assert "ends when gone(arm)" in str([e.text for e in played.events])
 
