@@ -77,6 +77,20 @@ def read_statements(text: str) -> list[object]:
     return cast("list[object]", _parser().parse(text))
 
 
+def tokens(text: str) -> list[Token]:
+    """The words of a text that is in the language, in their order.
+
+    Raises:
+        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+    """
+    found: list[Token] = []
+    reader = _parser().parse_interactive(text)
+    for token in reader.iter_parse():
+        found.append(token)
+    reader.feed_eof()
+    return found
+
+
 def collect(statements: Several[object], file: str) -> Task:
     """The tree that some statements make."""
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from visup.tasks.conditions import Comparison, Fact, action_of, facts_of
 from visup.tasks.tree import Action, Actors, Course, Judged, Reference, Stage, Task, walk
+from visup.tasks.units import value
 
 
 def tasks_of(file: Task) -> tuple[Task, ...]:
@@ -46,6 +48,30 @@ def task_actors(task: Task) -> tuple[str, ...]:
     staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
     watched = [a for i in task.invariants for f in facts_of(i.condition) for a in keyed(task, f)[1]]
     return tuple(dict.fromkeys((*staged, *watched)))
+
+
+def undrawn(task: Task) -> tuple[str, ...]:
+    """The zones that a task names without corners: someone else must have drawn them."""
+    return tuple(z.name for z in task.zones if not z.corners)
+
+
+def sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) -> dict[str, float]:
+    """The real sizes that some tasks declare, by model.
+
+    Args:
+        tasks: Tasks without mistakes; where two disagree the first goes before.
+        bound: Actor -> models, as the user bound them; it goes before the declarations.
+
+    Returns:
+        Model name -> largest extent, metres.
+    """
+    found: dict[str, float] = {}
+    for task in tasks:
+        for actor in task.actors:
+            if actor.size is not None:
+                for model in bound.get(actor.name, task.models(actor.name)):
+                    found.setdefault(model, value(task.amount(actor.size)))
+    return found
 
 
 def keyed(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
