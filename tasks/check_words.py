@@ -10,6 +10,7 @@ from math import isinf
 
 from visup.tasks.actions import Meaning
 from visup.tasks.conditions import Amount, Comparison, Name, Span, facts_of
+from visup.tasks.describe import written
 from visup.tasks.faults import Source, TaskFault, did_you_mean
 from visup.tasks.syntax import Parsed
 from visup.tasks.tree import Actors, Course, Judged, Task, Timed, walk
@@ -149,8 +150,7 @@ class WordCheck:
                 continue
             if meaning.measures and id(span) not in compared:
                 what = f"`{name}` is a quantity and is not compared with anything"
-                unit = next((u for u, (d, _) in UNITS.items() if d == meaning.measures), "")
-                yield self.fault("E227", what, span, f"such as `{name}(...) < 5 {unit}`")
+                yield self.fault("E227", what, span, f"such as `{written(meaning)}`")
             elif not meaning.measures and id(span) in compared:
                 what = f"`{name}` is no quantity, so it cannot be compared"
                 some = sorted(m.name for m in self.actions.values() if m.measures)

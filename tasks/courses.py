@@ -95,7 +95,12 @@ class Counted:
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        said = [_within(self.item, CLAUSED, Counted)]
+        return f"{_within(self.item, CLAUSED, Counted)} {self.times}"
+
+    @property
+    def times(self) -> str:
+        """How often, as it is written."""
+        said = []
         if self.least != 1 or self.most is None:
             said.append(f"at least {self.least} {_times(self.least)}")
         if self.most is not None:

@@ -59,6 +59,11 @@ def shipped_tasks() -> tuple[str, ...]:
     return tuple(sorted(e.name[: -len(".task")] for e in entries if e.name.endswith(".task")))
 
 
+def textmate_grammar() -> str:
+    """The TextMate grammar of task files, as JSON text."""
+    return files("visup.tasks").joinpath("tasks.tmLanguage.json").read_text(encoding="utf-8")
+
+
 def _no_such(name: str) -> TaskError:
     shipped = shipped_tasks()
     beside = Path(name).parent

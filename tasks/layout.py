@@ -198,5 +198,3 @@ def _tight(before: _Word, word: _Word) -> bool:
     if word.kind in TIGHT_BEFORE or before.kind == "LPAR":
         return True
     return word.kind == "LPAR" and before.kind == "NAME"
-
-

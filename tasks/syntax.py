@@ -50,7 +50,7 @@ class Parsed:
     @property
     def lacking(self) -> bool:
         """Whether a file that it includes could not be read, so that names may be missing."""
-        return any(f.code in ("E221", "E222") for f in self.faults)
+        return any(f.code in ("E130", "E221", "E222") for f in self.faults)
 
 
 def parse(text: str, source: Source) -> Parsed:

@@ -83,7 +83,10 @@ def _behaviours(
 ) -> list[Behaviour]:
     seeing: list[Behaviour] = [HealthBehaviour(), MotionBehaviour()]
     if database is not None:
-        seeing += [ShapeBehaviour(database), DepthBehaviour(database, settings.fov_vertical_deg, sizes_m)]
+        seeing += [
+            ShapeBehaviour(database),
+            DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
+        ]
     registry = discover() if settings.plugins else None
     named = [registry.make(name) for name in settings.plugins] if registry else []
     own = [b for path in settings.behaviours for b in from_file(path)]

@@ -246,7 +246,9 @@ def test_a_measured_size_goes_before_that_of_the_database(database: Counting) ->
         hypothesis=[Hypothesis(1, view.name, view.number, 0.9)],
     )
     (plain,) = DepthBehaviour(database, 40.0).perceive(frame(0.0), seen, ())
-    (twice,) = DepthBehaviour(database, 40.0, {view.name: 2 * extent}).perceive(frame(0.0), seen, ())
+    (twice,) = DepthBehaviour(database, 40.0, {view.name: 2 * extent}).perceive(
+        frame(0.0), seen, ()
+    )
     (other,) = DepthBehaviour(database, 40.0, {"nobody": 3.0}).perceive(frame(0.0), seen, ())
     assert twice.value.depth == pytest.approx(2 * plain.value.depth)
     assert twice.value.sigma == pytest.approx(2 * plain.value.sigma)

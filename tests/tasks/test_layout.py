@@ -16,7 +16,6 @@ from visup.tasks.read import read as read_clean
 from visup.tasks.tree import Task
 
 
-
 def read(text: str) -> Task:
     return read_clean(clean(text, Source(text, ""))[0])
 
@@ -53,7 +52,9 @@ def test_the_layout_is_stable_and_changes_neither_meaning_nor_comments(
     once = formatted(text)
     assert read(once) == read(text)
     assert formatted(once) == once
-    assert [line[line.index("# note") :] for line in once.split("\n") if "# note" in line] == comments
+    assert [
+        line[line.index("# note") :] for line in once.split("\n") if "# note" in line
+    ] == comments
 
 
 @pytest.mark.parametrize("name", shipped_tasks())
