@@ -56,6 +56,7 @@ def courses(task: Task) -> Iterator[Course]:
     It stops by itself when a task has so many that `MOST_LOOKED_AT` beginnings were looked at.
     """
     told: set[Course] = set()
+    looked_at: set[object] = set()
     todo: deque[tuple[Course, Place]] = deque(((), p) for p in beginnings(task))
     for _ in range(MOST_LOOKED_AT):
         if not todo:
@@ -67,7 +68,11 @@ def courses(task: Task) -> Iterator[Course]:
                 yield before
         else:
             now = (*before, place.moment)
-            todo.extend((now, p) for p in followings(task, place))
+            for following in followings(task, place):
+                key = (now, None if following.state is None else form(following.state))
+                if key not in looked_at:  # several ways may have led there
+                    looked_at.add(key)
+                    todo.append((now, following))
 
 
 def sample(task: Task, rng: Random) -> tuple[Course, bool]:

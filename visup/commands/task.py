@@ -72,7 +72,7 @@ def format_files(
     differ = False
     for file in files:
         text = sys.stdin.read() if file == "-" else read_text(file)
-        new = _formatted(text, "<stdin>" if file == "-" else file)
+        new = laid_out(text, "<stdin>" if file == "-" else file)
         differ = differ or new != text
         if file == "-" and not only_check:
             typer.echo(new, nl=False)
@@ -176,7 +176,7 @@ def lsp() -> None:
     serve()
 
 
-def _formatted(text: str, file: str) -> str:
+def laid_out(text: str, file: str) -> str:
     """A text in the layout of visup.
 
     Raises:
