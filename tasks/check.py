@@ -161,7 +161,7 @@ class _Check:
     def reserved(self) -> Iterator[TaskFault]:
         task = self.parsed.task
         named = [a for _, actors, _ in self.asked for a in actors]
-        named += [Name(a.name, a.span) for a in (*task.actors, *task.zones, *task.parameters)]
+        named += [Name(a.name, a.span) for a in task.declared]
         for name in named:
             if str(name) in WORDS:
                 what = f"`{name}` is a word of the language"

@@ -15,10 +15,12 @@ from visup.tasks.tree import (
     Actors,
     AnyOrder,
     Choice,
+    Counted,
     Course,
     Hold,
     Judged,
     Reference,
+    Repeated,
     Sequence,
     Span,
     Task,
@@ -139,7 +141,9 @@ class _Forms:
             return self._number((type(course).__name__, frozenset(inner)))
         if isinstance(course, Sequence):
             return self._number(tuple(inner))
-        return self._number((replace(course, item=NOTHING), inner[0]))
+        if isinstance(course, Judged | Timed | Counted | Repeated):
+            return self._number((replace(course, item=NOTHING), inner[0]))
+        return None
 
     def _number(self, form: object) -> int:
         return self._numbers.setdefault(form, len(self._numbers))

@@ -92,7 +92,7 @@ def meaning(text: str, file: str, word: Word) -> str | None:
         return f"```\n{stage}\n```" if stage else None
     if word.kind == "action" and action is not None:
         return described(action)
-    for declared in (*task.actors, *task.zones, *task.parameters):
+    for declared in task.declared:
         if declared.name == word.name:
             return f"`{declared}`"
     if word.kind == "name" and any(w.name == word.name for w in _actors(text)):
@@ -105,10 +105,9 @@ def definition(text: str, file: str, word: Word) -> Span | None:
     task, _ = examine(text, file)
     if word.kind == "include":
         return None
-    declared = task.stages if word.kind == "stage" else ()
-    others = () if word.kind == "stage" else (*task.actors, *task.zones, *task.parameters)
-    found = (d.span for d in (*declared, *others) if d.name == word.name)
-    return next(found, None)
+    if word.kind == "stage":
+        return next((s.span for s in task.stages if s.name == word.name), None)
+    return next((d.span for d in task.declared if d.name == word.name), None)
 
 
 def same_names(text: str, word: Word) -> list[Word]:

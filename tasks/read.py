@@ -83,11 +83,9 @@ def tokens(text: str) -> list[Token]:
     Raises:
         lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
     """
-    found: list[Token] = []
     reader = _parser().parse_interactive(text)
-    for token in reader.iter_parse():
-        found.append(token)
-    reader.feed_eof()
+    found = list(reader.iter_parse())
+    reader.feed_eof(found[-1] if found else None)  # type: ignore[no-untyped-call]
     return found
 
 

@@ -210,6 +210,11 @@ class Task:
     root: str = ""
 
     @property
+    def declared(self) -> tuple[Actor | ZoneDeclaration | Parameter, ...]:
+        """Declarations of actors, zones and parameters."""
+        return (*self.actors, *self.zones, *self.parameters)
+
+    @property
     def roots(self) -> tuple[str, ...]:
         """The tasks of the file: the rules marked with `task`, else the first one."""
         marked = tuple(dict.fromkeys(s.name for s in self.stages if s.is_task))

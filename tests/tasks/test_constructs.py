@@ -40,7 +40,11 @@ def first(played: Played, kind: str, stage: str) -> float:
 
 
 def test_a_stage_ends_when_its_file_says_so() -> None:
-    text = "<t> ::= <near> <far>\n<near> ::= converging(arm, satellite){}\n<far> ::= diverging(arm, satellite)"
+    text = (
+        "<t> ::= <near> <far>\n"
+        "<near> ::= converging(arm, satellite){}\n"
+        "<far> ::= diverging(arm, satellite)"
+    )
     script = Script((Spell("converging", 0.5, 9.0), Spell("touching", 4.0, 9.0)))
     assert status(watch(text.format(""), script, 8.0), "near") is Status.PROGRESSING
     ended = watch(text.format(" ends when touching(arm, satellite) for 1 s"), script, 8.0)
@@ -60,7 +64,11 @@ def test_a_stage_that_was_left_before_its_end_was_seen_has_failed() -> None:
 
 
 def test_a_stage_begins_when_its_file_says_so_and_not_before() -> None:
-    text = "<t> ::= <near> <caught>\n<near> ::= converging(arm, satellite)\n<caught> ::= coupled(arm, satellite){}"
+    text = (
+        "<t> ::= <near> <caught>\n"
+        "<near> ::= converging(arm, satellite)\n"
+        "<caught> ::= coupled(arm, satellite){}"
+    )
     script = Script((NEARS, MEETS, HOLDS))
     usual = watch(text.format(""), script, 12.0)
     late = watch(text.format(" begins when coupled(arm, satellite) for 1 s"), script, 12.0)
@@ -215,7 +223,7 @@ def test_a_zone_is_entered_and_left(declared: str) -> None:
     drawn = Zone("berth", ((100, 100), (200, 100), (200, 200), (100, 200)))
     path = {0.0: (20.0, 150.0), 3.0: (150.0, 150.0)}
     there = moved(6.0, path, text, zones=(drawn,)).tasks[0]
-    assert [s.status for s in there.stages][0] is Status.DONE
+    assert there.stages[0].status is Status.DONE
     gone = moved(9.0, {**path, 6.0: (198.5, 300.0)}, text, zones=(drawn,)).tasks[0]
     assert gone.verdict is Verdict.SUCCEEDED
     half = moved(9.0, {**path, 6.0: (198.5, 150.0)}, text, zones=(drawn,)).tasks[0]
@@ -314,7 +322,8 @@ def test_included_files_are_read_beside_their_file_and_faults_told_where_they_ar
     )
     main = tmp_path / "main.task"
     main.write_text(
-        'include "parts/common.task"\n<t> ::= <near> within patience <caught>\ninclude "dock"\n<caught> ::= coupled(arm, satellite)'
+        'include "parts/common.task"\n<t> ::= <near> within patience <caught>\n'
+        'include "dock"\n<caught> ::= coupled(arm, satellite)'
     )
     task = load_task(main)
     assert task.name == "t"

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from tests.tasks.test_diagnostics import GOOD, text_of
 from tests.tasks.trees import tasks
 from visup.tasks.cleaning import clean
+from visup.tasks.faults import Source
 from visup.tasks.files import read_text, shipped_tasks
 from visup.tasks.layout import WIDTH, formatted
-from visup.tasks.faults import Source
 from visup.tasks.read import read as read_clean
 from visup.tasks.tree import Task
 
@@ -26,7 +26,8 @@ LAW = settings(max_examples=60, deadline=None)
 def scattered(text: str, seed: int) -> tuple[str, list[str]]:
     """The same task with blanks, line ends and comments thrown in between its words."""
     rng = random.Random(seed)
-    comments, out = [], []
+    comments: list[str] = []
+    out: list[str] = []
     for line in text.split("\n"):
         words = line.split(" ") if '"' not in line else [line]
         for word in words:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 
 def tasks(
-    count: Annotated[int, typer.Option(min=0, help="How many damaged files are read.")] = 10_000,
+    count: Annotated[int, typer.Option(min=0, help="How many damaged files are read.")] = 100_000,
     seed: Annotated[int, typer.Option(help="Seed of the first; one more for each file.")] = 0,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the figures too.")] = None,
 ) -> None:
@@ -18,10 +17,12 @@ def tasks(
     from rich.console import Console
     from rich.table import Table
 
-    from visup.evaluation.record import environment
+    from visup.commands.evaluate import writable
+    from visup.evaluation.record import write_record
     from visup.evaluation.task_files import fuzz, long_files, seconds
     from visup.tasks.files import read_text
 
+    writable(json_file)
     found = fuzz(count, seed)
     times = {f"long_{name}_s": seconds(text) for name, text in long_files()}
     times["usual_ms"] = 1000 * seconds(read_text("inspect"), 20)
@@ -47,7 +48,6 @@ def tasks(
         if seeds:
             console.print(f"{name}: seeds {seeds[:10]}")
     if json_file is not None:
-        data = {**environment({"count": count, "seed": seed}), "total": figures, "items": {}}
-        json_file.write_text(json.dumps(data, indent=2), encoding="utf-8")
+        write_record(json_file, {"total": figures, "items": {}}, {"count": count, "seed": seed})
     if found.failures:
         raise typer.Exit(1)

@@ -11,6 +11,7 @@ import typer
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
 from visup.commands.relations import relations
+from visup.commands.eval_tasks import tasks
 from visup.commands.views import views
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ app.command("scale")(scale)
 app.command("robustness")(robustness)
 app.command("views")(views)
 app.command("relations")(relations)
+app.command("tasks")(tasks)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]

@@ -7,7 +7,7 @@ from pathlib import Path
 from lsprotocol import types as lsp
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
-from pygls.workspace import TextDocument
+from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
 from visup import __version__
 from visup.agent.errors import Place, VisupError
@@ -138,7 +138,7 @@ def _diagnostic(document: TextDocument, fault: TaskFault) -> lsp.Diagnostic:
 
 
 def _word(
-    server: LanguageServer, params: lsp.TextDocumentPositionParams
+    server: LanguageServer, params: lsp.HoverParams | lsp.DefinitionParams | lsp.RenameParams
 ) -> tuple[TextDocument, Word | None]:
     document = server.workspace.get_text_document(params.text_document.uri)
     return document, word_at(document.source, *_from(document, params.position))
@@ -174,6 +174,6 @@ def _from(document: TextDocument, position: lsp.Position) -> tuple[int, int]:
 
 
 def _range(document: TextDocument, span: Span) -> lsp.Range:
-    start = lsp.Position(span.line - 1, span.column - 1)
-    end = lsp.Position(max(span.line, span.end_line) - 1, span.end_column - 1)
-    return document.range_to_client_units(lsp.Range(start, end))
+    start = ServerTextPosition(span.line - 1, span.column - 1)
+    end = ServerTextPosition(max(span.line, span.end_line) - 1, span.end_column - 1)
+    return document.range_to_client_units(ServerTextRange(start, end))
