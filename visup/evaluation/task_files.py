@@ -157,9 +157,9 @@ def _words(text: str, rng: random.Random) -> str:
     return " ".join(words)
 
 
-def long_files() -> Iterator[tuple[str, str]]:
-    """(name, text) of files of 10,000 lines: flat, each stage referring to the next, all mistaken."""
-    n = LINES - 1
+def long_files(lines: int = LINES) -> Iterator[tuple[str, str]]:
+    """(name, text) of long files: flat, each stage referring to the next, all mistaken."""
+    n = lines - 1
     flat = [f"<s{i}> ::= converging(arm, satellite) for 5 s within 60 s" for i in range(n)]
     yield "flat", "\n".join([f"<t> ::= {' '.join(f'<s{i}>' for i in range(n))}", *flat])
     chain = [f"<s{i}> ::= converging(arm, satellite) for 5 s <s{i + 1}>" for i in range(n)]
