@@ -105,7 +105,7 @@ class WordCheck:
                 yield from self.amount(amount, wanted)
             elif amount.parameter not in known:
                 if not self.parsed.lacking and amount.parameter not in self.parsed.defined:
-                    hint = did_you_mean(amount.parameter, known)
+                    hint = did_you_mean(amount.parameter, known) if len(known) < MANY else None
                     what = f"parameter `{amount.parameter}` is not declared"
                     expected = f"`parameter {amount.parameter} is 90 s`"
                     yield self.fault("E223", what, amount.span, expected, hint)
@@ -194,8 +194,7 @@ class WordCheck:
             for one in declared:
                 if one.name not in named and not one.span.file:
                     what = f"{kind} `{one.name}` is declared but not used"
-                    hint = did_you_mean(one.name, named)
-                    yield self.fault("E225", what, one.span, None, hint)
+                    yield self.fault("E225", what, one.span)
 
     def unobserved(self) -> Iterator[TaskFault]:
         """Actions that need percepts that will not be at hand, each told once."""
@@ -211,6 +210,7 @@ class WordCheck:
                 yield self.fault("E231", what, span, hint=hint)
 
 
+MANY = 500  # so many names are not compared with one another
 WORDS = {
     "angular_speed": "speed of turning",
     "size": "real size",

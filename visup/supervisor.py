@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from visup.agent import Behaviour, Mind, Severity, Verdict
@@ -46,14 +46,15 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
             be, or an actor is bound that no task has or to a model that the database lacks.
     """
     tasks = [t for name in settings.tasks for t in load_tasks(name)]
-    _check_zones(tasks)
+    zones = load_zones(settings.zones) if settings.zones else ()
+    _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     return Agent(
         behaviours=_behaviours(settings, database, sizes(tasks, settings.actors)),
         thinkers=_thinkers(settings, tasks),
         actors=settings.actors,
-        zones=load_zones(settings.zones) if settings.zones else (),
+        zones=zones,
         observers=observers,
     )
 
@@ -100,14 +101,16 @@ def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 
-def _check_zones(tasks: Sequence[Task]) -> None:
+def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
     """A zone that nobody has drawn could never be seen to be entered or left."""
     for task in tasks:
         for zone in undrawn(task):
+            if zone in drawn:
+                continue
             raise SettingsError(
-                f"zone `{zone}` of task `{task.name}` has no corners",
+                f"zone `{zone}` of task `{task.name}` is drawn nowhere",
                 where=task.file,
-                expected=f"`zone {zone} is (100, 50) (300, 50) (300, 200)`, in pixels",
+                expected=f"`zone {zone} is (100, 50) (300, 50) (300, 200)`, or a zones file with it",
             )
 
 

@@ -11,7 +11,9 @@ from visup.tasks.load import shipped_tasks
 from visup.tasks.read import read
 
 PAGE = (Path(__file__).parents[2] / "docs/task-language.md").read_text("utf-8")
-BLOCKS = [b for b in re.findall(r"```\n(.*?)```", PAGE, re.S) if "^" not in b and not b.startswith("$")]
+BLOCKS = [
+    b for b in re.findall(r"```\n(.*?)```", PAGE, re.S) if "^" not in b and not b.startswith("$")
+]
 
 
 @pytest.mark.parametrize("block", BLOCKS)

@@ -10,8 +10,8 @@ import typer
 
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
-from visup.commands.relations import relations
 from visup.commands.eval_tasks import tasks
+from visup.commands.relations import relations
 from visup.commands.views import views
 
 if TYPE_CHECKING:
