@@ -135,6 +135,8 @@ class _Check:
         names = [str(n) for n in stage.body.names]
         if names[0] in self.actions:
             return "action"
+        if len(names) == 3 and names[1] in self.actions:
+            return "infix"
         defined = self.defined
         meant = all(n in defined and n != stage.name for n in names)
         return "stages" if meant else ""
@@ -152,6 +154,10 @@ class _Check:
                 case "action":
                     meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
                     what = f"the actors of `{names[0]}` stand without brackets"
+                    yield self.fault("E219", what, stage.body.span, meant)
+                case "infix":
+                    what = f"`{names[1]}` stands between its actors"
+                    meant = f"`{names[1]}({names[0]}, {names[2]})`"
                     yield self.fault("E219", what, stage.body.span, meant)
                 case "stages":
                     meant = f"`{' '.join(f'<{n}>' for n in names)}`"

@@ -64,6 +64,21 @@ def _not_in_language(text: str) -> Mistake | None:
     return None
 
 
+def _heading(text: str) -> Mistake | None:
+    m = re.match(r"\s*((task|actor|stage|zone|parameter)s?)\s*:(?!:=)", text, re.I)
+    if m is None:
+        return None
+    meant = {
+        "task": "`task <dock> ::= ...`",
+        "stage": "`<approach> ::= ...`",
+        "zone": "`zone berth is (100, 50) (300, 50) (300, 200)`",
+        "parameter": "`parameter patience is 90 s`",
+    }
+    expected = meant.get(m[2].lower(), "`actor satellite is spartan or hubble`")
+    what = f"`{m[1]}:` does not begin a statement"
+    return Mistake("E127", m.start(1), m.end() - m.start(1), what, expected)
+
+
 def _definer(text: str) -> Mistake | None:
     m = re.match(rf"\s*<[ ]*{NAME}[ ]*>\s*(?!::=(?!=))(::==+|:=|==|=>|=|::(?!=)|:|->|→)", text)
     if m is None:
@@ -145,6 +160,9 @@ def _actor(text: str) -> Mistake | None:
         return Mistake("E124", size.start(), 4, what, "such as `size 1.6 m`")
     if m[2] == "is":
         hint = "several models are parted by `or`" if re.search(r"[,|/]|\band\b", text) else None
+        spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
+        if hint is None and spaced is not None:
+            hint = f"the name of a model has no blanks, such as `{spaced[1]}_{spaced[2]}`"
         what = f"actor `{m[1]}` is declared with something that is not a model"
         if not text[m.end() :].strip(" "):
             what = f"actor `{m[1]}` is declared without a model"
@@ -193,6 +211,10 @@ def _invariant(text: str) -> Mistake | None:
     m = re.match(r"\s*(never|always)\b", text)
     if m is None:
         return None
+    place = re.search(r"\b(?:in|while|at)\s+(?=<)", text)
+    if place is not None:
+        what = f"`{place[0].strip()}` stands where `during` should"
+        return Mistake("E125", place.start(), len(place[0].strip()), what, "`during <approach>`")
     what = f"`{m[1]}` is not followed by a condition"
     expected = f"`{m[1]} touching(arm, radiator)`, perhaps with `during <stage>`"
     return Mistake("E125", m.start(1), len(m[1]), what, expected)
@@ -200,9 +222,11 @@ def _invariant(text: str) -> Mistake | None:
 
 RECOGNISERS: tuple[Recogniser, ...] = (
     _foreign_comment,
+    _heading,
     _include,
     _zone,
     _parameter,
+    signs,
     _not_in_language,
     _definer,
     _bare_head,
@@ -213,7 +237,6 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     open_angle,
     brackets,
     action_in_angles,
-    signs,
     times,
     any_order,
     _invariant,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from visup.tasks.actions import ACTIONS
 from visup.tasks.chunk import NAME, WORDS, Mistake
 
 
@@ -55,6 +56,12 @@ def operators(text: str) -> Mistake | None:
     if m is not None:
         what = f"`{m[0]}` is written once in this language"
         return Mistake("E122", m.start(), 2, what, f"`{m[0][0]}`")
+    m = re.search(r"(!|~|¬)(?=\s*[\w(<])", text)
+    if m is not None:
+        hint = (
+            "a stage asks for what should be: `decoupled`, `apart`, `gone`; conditions have `not`"
+        )
+        return Mistake("E122", m.start(), 1, f"`{m[0]}` is not part of the language", None, hint)
     m = re.search(r"[>)\w]\s+(/)\s+[<(\w]", text)
     if m is not None:
         return Mistake("E122", m.start(1), 1, "`/` does not part alternatives", "`|`")
@@ -75,6 +82,11 @@ def empty_part(text: str) -> Mistake | None:
 
 def no_brackets(text: str) -> Mistake | None:
     """An action whose actors stand behind it without brackets."""
+    m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME})[ ]+({NAME})", text)
+    if m is not None and m[2] in ACTIONS:
+        what = f"`{m[2]}` stands between its actors"
+        expected = f"`{m[2]}({m[1]}, {m[3]})`"
+        return Mistake("E219", m.start(1), m.end(3) - m.start(1), what, expected)
     m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME}(?:\s*,\s*{NAME})+)", text)
     if m is None or m[1] in WORDS:
         return None
@@ -107,6 +119,10 @@ def clause(text: str) -> Mistake | None:
     if m is not None:
         what = f"`{m[1]}` is not followed by a duration"
         return Mistake("E115", m.start(1), len(m[1]), what, f"such as `{m[1]} 5 s`")
+    m = re.search(r"([<>]=?)\s*(\d+(?:\.\d+)?)(?![\d.]|\s*[^\W\d]|\s*%)", text)
+    if m is not None:
+        what = f"`{m[2]}` has no unit"
+        return Mistake("E116", m.start(2), len(m[2]), what, "a unit, such as `5 px` or `3 px/s`")
     m = re.search(r"\b(for|within)\s+(\d+(?:\.\d+)?)(?![\d.]|[ ]*[^\W\d])", text)
     if m is not None:
         what = f"`{m[0]}` has no unit"
@@ -160,6 +176,15 @@ def signs(text: str) -> Mistake | None:
 
 def times(text: str) -> Mistake | None:
     """A number of times that is not complete, or written otherwise."""
+    m = re.search(r"\b(for|within)\s+(at\s+(?:least|most))\b", text)
+    if m is not None:
+        what = f"`{m[1]}` already says that, without `{m[2]}`"
+        return Mistake("E115", m.start(2), len(m[2]), what, f"such as `{m[1]} 5 s`")
+    m = re.search(r"\brepeat(?:ed|s)?\b(?!\s*[(>])", text)
+    if m is not None:
+        what = f"`{m[0]}` is not how repetitions are written"
+        expected = "`?`, `*`, `+` or `at least 2 times at most 3 times`"
+        return Mistake("E134", m.start(), len(m[0]), what, expected)
     m = re.search(r"\bat\s+(least|most)\b(?!\s+\d{1,6}\s+times?\b)", text)
     if m is not None:
         what = f"`at {m[1]}` is not followed by a whole number and `times`"
@@ -193,7 +218,7 @@ def joining_word(text: str) -> Mistake | None:
     words = "and|then|or|with|next|followed"
     if re.search(r"\bwhen\b|^\s*(?:never|always)\b", text):
         words = "then|with|next|followed"  # conditions have `and` and `or`
-    m = re.search(rf"[>)?*+]\s+({words})\b(?=\s+[<\w(])", text, re.I)
+    m = re.search(rf"(?:[>)?*+]|\d\s*[\w/%]+)\s+({words})\b(?=\s+[<\w(])", text, re.I)
     if m is None:
         return None
     hint = "in turn is `<a> <b>`, either is `<a> | <b>`, at the same time is `<a> & <b>`"

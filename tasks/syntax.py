@@ -210,8 +210,13 @@ def _unexpected(error: UnexpectedInput, chunk: Chunk, source: Source) -> TaskFau
         what,
         source.place(line, column, max(1, len(found))),
         expected=_said(allowed or set()),
-        hint=did_you_mean(found, KEYWORDS) if found.isidentifier() else None,
+        hint=did_you_mean(found, KEYWORDS) if _slipped(found) else None,
     )
+
+
+def _slipped(found: str) -> bool:
+    """Whether a word may be a slip of the pen for a word of the language."""
+    return found.isidentifier() and found not in KEYWORDS
 
 
 def _said(terminals: set[str]) -> str | None:
