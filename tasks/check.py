@@ -35,6 +35,7 @@ from visup.tasks.tree import (
     walk,
 )
 
+MANY = 500  # so many names are not compared with one another
 ALIKE = 0.85  # two names that are so alike are taken to be meant as one
 
 
@@ -285,17 +286,18 @@ class _Check:
         counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
         task = self.parsed.task
         declared = {a.name for a in task.actors} | {z.name for z in task.zones}
+        sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
+        if len(sure) > MANY:
+            return
         for _, actors, _ in self.asked:
             for actor in actors:
                 name = str(actor)
                 if name in declared or counts[name] > 1:
                     continue
-                for other in (*declared, *counts):
-                    if (other in declared or counts[other] > 1) and _slip(name, other):
-                        what = f"actor `{name}` is named only here"
-                        hint = f"did you mean `{other}`?"
-                        yield self.fault("E214", what, actor.span, hint=hint)
-                        break
+                meant = next((o for o in sure if _slip(name, o)), None)
+                if meant is not None:
+                    what = f"actor `{name}` is named only here"
+                    yield self.fault("E214", what, actor.span, hint=f"did you mean `{meant}`?")
 
     def idle_actors(self) -> Iterator[TaskFault]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
