@@ -9,7 +9,12 @@ farther, approaching and receding remain right.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import cv2
+from scipy.spatial.distance import pdist
 
 from visup.agent.behaviour import Contract
 from visup.agent.errors import SettingsError
@@ -32,6 +37,8 @@ class DepthBehaviour:
     Args:
         database: Tells the real area of views whose hypotheses carry no scale; may be None.
         fov_vertical_deg: Vertical field of view, degrees; 40 is assumed when None.
+        sizes_m: Model name -> its largest extent as someone has measured it, metres; it goes before the
+            size that the model has in the database.
 
     Raises:
         SettingsError: The field of view is not between 0 and 180 degrees.
@@ -40,7 +47,10 @@ class DepthBehaviour:
     contract = Contract("depth", gives=("depth",), needs=("region", "hypothesis"))
 
     def __init__(
-        self, database: ModelDatabase | None = None, fov_vertical_deg: float | None = None
+        self,
+        database: ModelDatabase | None = None,
+        fov_vertical_deg: float | None = None,
+        sizes_m: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self.fov_vertical_deg = FOV_VERTICAL_DEG if fov_vertical_deg is None else fov_vertical_deg
         if not 0.0 < self.fov_vertical_deg < 180.0:
@@ -50,6 +60,8 @@ class DepthBehaviour:
             )
         views = database.views if database is not None else ()
         self._areas = {(v.name, v.number): v.area for v in views if v.area is not None}
+        known = extents(database, sizes_m) if database is not None else {}
+        self._enlarged = {n: sizes_m[n] / extent for n, extent in known.items()}
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]
@@ -61,7 +73,26 @@ class DepthBehaviour:
             if not region.cut and region.area > 0:
                 own = [h for h in hypotheses if h.region_id == region.id]
                 for depth in region_depths(region, own, focal, self._areas):
+                    by = self._enlarged.get(depth.name, 1.0)
+                    if by != 1.0:  # what is twice as big looks the same from twice as far
+                        depth = replace(depth, depth=depth.depth * by, sigma=depth.sigma * by)
                     yield Percept("depth", depth, frame.time, self.contract.name)
+
+
+def extents(database: ModelDatabase, names: Collection[str]) -> dict[str, float]:
+    """The largest extent of some models over all their views, in model units.
+
+    Models whose size is not known, or that the database does not have, are left out.
+    """
+    found: dict[str, float] = {}
+    for number, view in enumerate(database.views):
+        if view.name in names and view.area is not None and not view.cut:
+            contour = database.shapes[number].contour
+            area = abs(float(cv2.contourArea(contour)))
+            if area > 0:
+                extent = float(pdist(contour).max()) * math.sqrt(view.area / area)
+                found[view.name] = max(found.get(view.name, 0.0), extent)
+    return found
 
 
 def focal_px(height: int, fov_vertical_deg: float) -> float:

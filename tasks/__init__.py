@@ -7,7 +7,7 @@ mean), `course.py` (where one can be in a task), `verify.py` (how a step stands)
 joins them).
 """
 
-from visup.tasks.load import load_task, parse_task, shipped_tasks
+from visup.tasks.load import load_task, load_tasks, parse_task, shipped_tasks
 from visup.tasks.tree import Action, Actor, Choice, Sequence, Stage, Task, Together
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Task",
     "Together",
     "load_task",
+    "load_tasks",
     "parse_task",
     "shipped_tasks",
 ]

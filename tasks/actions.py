@@ -1,14 +1,23 @@
 """What each action means: when it holds, begins, progresses, is over, and what is its contrary.
 
-All of it stands in one table, `ACTIONS`; a plug-in adds an action by handing a longer mapping to
-`task_thinker` and `parse_task`. The words in the table are names of relations in the mind.
+The actions of tasks stand in one table, `ACTIONS`; the words in it are names of relations in the
+mind. `known_actions` adds the words and quantities of rules (`vocabulary.py`) and what installed
+packages offer under the entry point group `visup.actions`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
+
+from visup.agent.errors import TaskError
+
+GROUP = "visup.actions"
+ALL_PERCEPTS = frozenset({"region", "hypothesis", "depth", "health"})
+"""Kinds of percept that visup's own behaviours give."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +38,10 @@ class Meaning:
         contrary: Relations that say that it fails.
         expects: Further relations that are no reason for worry while it is asked for.
         text: "are `converging`": what is said of the actors when it holds.
+        takes: 'object' or 'zone' for each actor; all objects when empty.
+        measures: What a quantity measures ('length', 'time', ...); empty for a relation.
+        needs: Kinds of percept without which it is never observed.
+        about: One clause for people who choose among actions.
     """
 
     name: str
@@ -42,6 +55,15 @@ class Meaning:
     contrary: tuple[str, ...] = ()
     expects: tuple[str, ...] = ()
     text: str = ""
+    takes: tuple[str, ...] = ()
+    measures: str = ""
+    needs: frozenset[str] = frozenset({"region"})
+    about: str = ""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What each of its actors is: 'object' or 'zone'."""
+        return self.takes or ("object",) * self.arity
 
     @property
     def begins(self) -> tuple[str, ...]:
@@ -61,6 +83,7 @@ _TABLE = (
         lasts=True,
         contrary=("diverging",),
         text="converging",
+        about="they draw nearer",
     ),
     Meaning(
         "diverging",
@@ -68,6 +91,7 @@ _TABLE = (
         lasts=True,
         contrary=("converging",),
         text="diverging",
+        about="they draw apart",
     ),
     Meaning(
         "keeping_distance",
@@ -75,6 +99,7 @@ _TABLE = (
         lasts=True,
         contrary=("converging", "diverging"),
         text="keeping their distance",
+        about="their distance stays, or they move as one",
     ),
     Meaning(
         "moving_together",
@@ -82,6 +107,7 @@ _TABLE = (
         lasts=True,
         contrary=("converging", "diverging"),
         text="moving together",
+        about="they move as one",
     ),
     Meaning(
         "touching",
@@ -91,6 +117,7 @@ _TABLE = (
         contrary=("diverging",),
         expects=("converging",),
         text="touching",
+        about="they touch",
     ),
     Meaning(
         "coupled",
@@ -101,6 +128,7 @@ _TABLE = (
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),
         text="coupled",
+        about="they are rigidly connected",
     ),
     Meaning(
         "decoupled",
@@ -110,14 +138,92 @@ _TABLE = (
         progress=("diverging",),
         expects=("diverging", "touching"),
         text="decoupled",
+        about="they are known not to be connected",
     ),
-    Meaning("apart", holds=("apart",), hold_s=0.5, expects=("diverging",), text="apart"),
-    Meaning("present", holds=("present",), arity=1, hold_s=0.5, text="present"),
-    Meaning("gone", holds=("gone",), arity=1, hold_s=0.5, text="gone"),
+    Meaning(
+        "apart",
+        holds=("apart",),
+        hold_s=0.5,
+        expects=("diverging",),
+        text="apart",
+        about="they are known not to touch",
+    ),
+    Meaning(
+        "present",
+        holds=("present",),
+        arity=1,
+        hold_s=0.5,
+        text="present",
+        about="it is in the scene, seen or hidden",
+    ),
+    Meaning(
+        "gone", holds=("gone",), arity=1, hold_s=0.5, text="gone", about="it has left the scene"
+    ),
+    Meaning(
+        "inside",
+        holds=("inside",),
+        arity=2,
+        hold_s=0.5,
+        text="inside",
+        takes=("object", "zone"),
+        about="its centre is in the zone",
+    ),
+    Meaning(
+        "outside",
+        holds=("outside",),
+        arity=2,
+        hold_s=0.5,
+        text="outside",
+        takes=("object", "zone"),
+        about="nothing of its outline is in the zone",
+    ),
 )
 
 ACTIONS: Mapping[str, Meaning] = MappingProxyType({m.name: m for m in _TABLE})
-"""The actions that visup knows."""
+"""The actions that visup supervises with a meaning of their own."""
+
+
+@lru_cache(maxsize=1)
+def known_actions() -> Mapping[str, Meaning]:
+    """All that a task may ask for, by name: `ACTIONS`, the words of rules, those of plug-ins.
+
+    Raises:
+        TaskError: A plug-in's action cannot be loaded, or its name is taken.
+    """
+    from visup.tasks.vocabulary import words  # rules bring NumPy with them
+
+    known: Mapping[str, Meaning] = {**{m.name: m for m in words()}, **ACTIONS}
+    for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
+        known = with_actions(known, [_loaded(point)])
+    return MappingProxyType(known)
+
+
+def with_actions(known: Mapping[str, Meaning], more: Iterable[Meaning]) -> dict[str, Meaning]:
+    """Some actions and more of them.
+
+    Raises:
+        TaskError: The name of one is taken.
+    """
+    joined = dict(known)
+    for meaning in more:
+        if meaning.name in joined:
+            raise TaskError(f"there is an action called `{meaning.name}` already")
+        joined[meaning.name] = meaning
+    return joined
+
+
+def _loaded(point: EntryPoint) -> Meaning:
+    try:
+        made = point.load()
+    except Exception as fault:
+        said = f"{type(fault).__name__}: {fault}"
+        raise TaskError(
+            f"action `{point.name}` cannot be loaded: {said}", where=point.value
+        ) from fault
+    if not isinstance(made, Meaning):
+        expected = f"a `Meaning` (entry point group `{GROUP}`)"
+        raise TaskError(f"`{point.name}` is no action", where=point.value, expected=expected)
+    return made
 
 
 def contradict(a: Meaning, b: Meaning) -> bool:

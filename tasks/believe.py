@@ -11,14 +11,17 @@ from visup.agent import (
     StageBelief,
     Status,
     TaskBelief,
+    Truth,
     Verdict,
 )
-from visup.tasks.actions import Meaning
+from visup.tasks.conditions import Condition
 from visup.tasks.course import Leaf, Step, leaves, moves
-from visup.tasks.observe import Relations, Sighting, observe
+from visup.tasks.observe import NEVER, Relations, Sighting, observe
 from visup.tasks.readings import Follower, Reading, confidence
 from visup.tasks.sentences import evidence, outcome
+from visup.tasks.signs import Conditions
 from visup.tasks.structure import stage_names
+from visup.tasks.tree import Hold
 from visup.tasks.verify import BAD, Watch, entered
 
 NEAR = 1.0  # readings that cost so little more than the best have a say in what is expected
@@ -40,26 +43,53 @@ class Scene:
     Args:
         mind: What is believed.
         bindings: Who plays which actor.
-        actions: Meanings of actions.
+        follower: The task with the meanings of its actions.
+        before: Since when what is no plain relation of the mind has been true, by key.
     """
 
     def __init__(
-        self, mind: Mind, bindings: tuple[Binding, ...], actions: Mapping[str, Meaning]
+        self,
+        mind: Mind,
+        bindings: tuple[Binding, ...],
+        follower: Follower,
+        before: Mapping[str, float] = NEVER,
     ) -> None:
         self.mind = mind
         self.bindings = bindings
-        self._actions = actions
+        self._actions = follower.actions
         self._objects = {b.actor: b.object_id for b in bindings}
-        self._relations = Relations(mind)
+        self._relations = Relations(mind, follower.looks, before)
+        self._conditions = Conditions(follower.task, self._holds, self._relations)
         self._seen: dict[tuple[str, tuple[str, ...]], Sighting] = {}
+        self._judged: dict[Step, Sighting] = {}
 
     def see(self, step: Step) -> Sighting:
-        """What is seen now of the action of a step."""
-        key = (step.action, step.actors)
+        """What is seen now of a step."""
+        if not step.signs:
+            return self._look(step.action, step.actors)
+        if step not in self._judged:
+            seen = self._look(step.action, step.actors)
+            self._judged[step] = self._conditions.apply(step, seen)
+        return self._judged[step]
+
+    def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
+        """Whether a condition holds, and has for as long as it must."""
+        return self._conditions.relation(condition, lasting).truth
+
+    @property
+    def since(self) -> tuple[tuple[str, float], ...]:
+        """Since when what is no plain relation of the mind has been true, for the next step."""
+        return tuple(self._relations.after.items())
+
+    def _look(self, action: str, actors: tuple[str, ...]) -> Sighting:
+        key = (action, actors)
         if key not in self._seen:
-            objects = tuple(self._objects.get(a) for a in step.actors)
-            self._seen[key] = observe(self._actions[step.action], objects, self._relations)
+            objects = tuple(self._objects.get(a) for a in actors)
+            self._seen[key] = observe(self._actions[action], objects, self._relations)
         return self._seen[key]
+
+    def _holds(self, action: str, actors: tuple[str, ...]) -> Truth:
+        return self._look(action, actors).holds
 
     def found(self, actors: tuple[str, ...]) -> bool:
         """Whether each of some actors is played by an object."""
@@ -94,7 +124,7 @@ def believe(
             tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task)),
             bindings=scene.bindings,
             expected=_expected(follower, scene, follower.start(now)),
-            evidence=interrupted or _missing(scene),
+            evidence=interrupted or _missing(follower, scene),
         )
     best, sure = readings[0], confidence(readings)
     stages = _stages(follower, best, now, sure)
@@ -173,8 +203,9 @@ def reading_stage(reading: Reading) -> str:
     return leaves(reading.state)[0].step.stage
 
 
-def _missing(scene: Scene) -> str:
-    missing = [b.actor for b in scene.bindings if b.object_id is None]
+def _missing(follower: Follower, scene: Scene) -> str:
+    unbound = (b.actor for b in scene.bindings if b.object_id is None)
+    missing = [a for a in unbound if not follower.task.actor(a).optional]
     return f"not found yet: {', '.join(missing)}" if missing else "nothing of it has been seen yet"
 
 

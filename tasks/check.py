@@ -8,20 +8,26 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Set as AnySet
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
-from visup.tasks.actions import Meaning
+from visup.tasks.actions import ACTIONS, Meaning
+from visup.tasks.check_alike import AlikeCheck
 from visup.tasks.check_courses import CourseCheck
+from visup.tasks.check_words import WordCheck
 from visup.tasks.chunk import WORDS
+from visup.tasks.conditions import action_of, facts_of
 from visup.tasks.faults import Source, TaskFault, closest, did_you_mean
 from visup.tasks.language import Grammar
 from visup.tasks.syntax import Parsed
 from visup.tasks.tree import (
     Action,
     Actors,
+    Comparison,
     Course,
+    Judged,
     Name,
     Reference,
     Span,
@@ -29,23 +35,27 @@ from visup.tasks.tree import (
     walk,
 )
 
+MANY = 500  # so many names are not compared with one another
 ALIKE = 0.85  # two names that are so alike are taken to be meant as one
 
 
-def check(parsed: Parsed, source: Source, actions: Mapping[str, Meaning]) -> list[TaskFault]:
+def check(
+    parsed: Parsed, source: Source, actions: Mapping[str, Meaning], percepts: AnySet[str]
+) -> list[TaskFault]:
     """All mistakes of meaning in what could be read of a file.
 
     Args:
         parsed: The tree, and what is known of the statements that did not parse.
         source: For places.
         actions: The actions that a task may ask for.
+        percepts: The kinds of percept that will be at hand.
 
     Returns:
         Faults in no particular order.
     """
     if not parsed.task.stages:
         return []
-    return list(_Check(parsed, source, actions).faults())
+    return list(_Check(parsed, source, actions, percepts).faults())
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,7 @@ class _Check:
     parsed: Parsed
     source: Source
     actions: Mapping[str, Meaning]
+    percepts: AnySet[str]
 
     @cached_property
     def grammar(self) -> Grammar:
@@ -69,14 +80,23 @@ class _Check:
     def asked(self) -> list[tuple[str, tuple[Name, ...], Span]]:
         """Every action that the file names, with its actors: (action, actors, place)."""
         task = self.parsed.task
-        asked = [(c.name, c.actors, c.span) for _, c in self.courses if isinstance(c, Action)]
+        facts = [c for _, c in self.courses if isinstance(c, Action | Comparison)]
+        signs = (s for _, c in self.courses if isinstance(c, Judged) for s in c.signs)
+        conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
+        facts += [f for c in conditions for f in facts_of(c)]
+        actions = map(action_of, facts)
+        asked = [(a.name, a.actors, a.span) for a in actions]
         asked += [
             (s.name, s.body.names, s.span)
             for s in task.stages
             if isinstance(s.body, Actors) and not self.misread(s)
         ]
-        asked += [(i.action.name, i.action.actors, i.action.span) for i in task.invariants]
         return asked
+
+    @cached_property
+    def heads(self) -> set[int]:
+        """Identities of the places of heads."""
+        return {id(s.span) for s in self.parsed.task.stages}
 
     def faults(self) -> Iterator[TaskFault]:
         yield from self.plain_lists()
@@ -90,7 +110,14 @@ class _Check:
             yield from self.slips()
             yield from self.idle_actors()
         whole = not (self.undefined or self.parsed.faults)
-        yield from CourseCheck(self.parsed.task, self.source, self.actions, whole).faults()
+        yield from CourseCheck(
+            self.parsed.task, self.source, self.actions, whole, self.grammar
+        ).faults()
+        yield from WordCheck(
+            self.parsed, self.source, self.actions, self.percepts, self.asked
+        ).faults()
+        if whole:
+            yield from AlikeCheck(self.parsed.task, self.source, self.grammar).faults()
 
     def fault(
         self,
@@ -109,8 +136,15 @@ class _Check:
         names = [str(n) for n in stage.body.names]
         if names[0] in self.actions:
             return "action"
-        defined = {s.name for s in self.parsed.task.stages} - {stage.name}
-        return "stages" if all(n in defined for n in names) else ""
+        if len(names) == 3 and names[1] in self.actions:
+            return "infix"
+        defined = self.defined
+        meant = all(n in defined and n != stage.name for n in names)
+        return "stages" if meant else ""
+
+    @cached_property
+    def defined(self) -> set[str]:
+        return {s.name for s in self.parsed.task.stages}
 
     def plain_lists(self) -> Iterator[TaskFault]:
         for stage in self.parsed.task.stages:
@@ -122,14 +156,19 @@ class _Check:
                     meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
                     what = f"the actors of `{names[0]}` stand without brackets"
                     yield self.fault("E219", what, stage.body.span, meant)
+                case "infix":
+                    what = f"`{names[1]}` stands between its actors"
+                    meant = f"`{names[1]}({names[0]}, {names[2]})`"
+                    yield self.fault("E219", what, stage.body.span, meant)
                 case "stages":
                     meant = f"`{' '.join(f'<{n}>' for n in names)}`"
                     what = "stages are referred to without angle brackets"
                     yield self.fault("E220", what, stage.body.span, meant)
 
     def reserved(self) -> Iterator[TaskFault]:
+        task = self.parsed.task
         named = [a for _, actors, _ in self.asked for a in actors]
-        named += [Name(a.name, a.span) for a in self.parsed.task.actors]
+        named += [Name(a.name, a.span) for a in task.declared]
         for name in named:
             if str(name) in WORDS:
                 what = f"`{name}` is a word of the language"
@@ -142,8 +181,8 @@ class _Check:
                 continue
             told.add(name)
             near = closest(name, self.actions)
-            shown = f"an action: {', '.join(sorted(self.actions))}"
-            width = Span(span.line, span.column, span.line, span.column + len(name))
+            shown = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
+            width = replace(span, end_line=span.line, end_column=span.column + len(name))
             at = span if self.is_head(span) else width
             hint = f"did you mean `{near}`?" if near else None
             what = f"unknown action `{name}`"
@@ -152,7 +191,7 @@ class _Check:
             yield self.fault("E201", what, at, shown, hint)
 
     def is_head(self, span: Span) -> bool:
-        return any(s.span is span for s in self.parsed.task.stages)
+        return id(span) in self.heads
 
     def actors_of_actions(self) -> Iterator[TaskFault]:
         for name, actors, span in self.asked:
@@ -161,7 +200,10 @@ class _Check:
                 continue
             if len(actors) != meaning.arity:
                 what = f"`{name}` is given {_count(len(actors), 'actor')}"
-                yield self.fault("E205", what, span, _count(meaning.arity, "actor"))
+                expected = _count(meaning.arity, "actor")
+                if "zone" in meaning.kinds:
+                    expected = "an actor and a zone"
+                yield self.fault("E205", what, span, expected)
             elif len({str(a) for a in actors}) < len(actors):
                 what = f"`{name}` between `{actors[0]}` and itself"
                 yield self.fault("E211", what, span, "different actors")
@@ -172,9 +214,9 @@ class _Check:
         known = {s.name for s in self.parsed.task.stages} | self.parsed.defined
         found: dict[str, Reference] = {}
         references = [c for _, c in self.courses if isinstance(c, Reference)]
-        references += [i.during for i in self.parsed.task.invariants if i.during]
+        references += [r for i in self.parsed.task.invariants for r in i.during]
         for r in references:
-            if r.stage not in known:
+            if r.stage not in known and not self.parsed.lacking:
                 found.setdefault(r.stage, r)
         return found
 
@@ -209,14 +251,14 @@ class _Check:
         for stage in self.parsed.task.stages:
             if stage.name in first:
                 what = f"stage `<{stage.name}>` is defined twice"
-                hint = f"it is also defined in line {first[stage.name].line}; join both with `|`"
+                hint = f"it is also defined in {_line(first[stage.name])}; join both with `|`"
                 yield self.fault("E203", what, stage.span, "one rule for each stage", hint)
             first.setdefault(stage.name, stage.span)
         declared: dict[str, Span] = {}
         for actor in self.parsed.task.actors:
             if actor.name in declared:
                 what = f"actor `{actor.name}` is declared twice"
-                hint = f"it is also declared in line {declared[actor.name].line}"
+                hint = f"it is also declared in {_line(declared[actor.name])}"
                 yield self.fault("E212", what, actor.span, "`or` between its models", hint)
             declared.setdefault(actor.name, actor.span)
 
@@ -230,35 +272,46 @@ class _Check:
             if isinstance(s.body, Actors) and self.misread(s)
             for n in s.body.names
         }
+        roots = self.parsed.task.roots
         for stage in self.grammar.unreached():
-            if stage.name not in missing | misread:
-                what = f"task `{self.parsed.task.name}` never comes to stage `<{stage.name}>`"
+            if stage.name not in missing | misread and not stage.span.file:
+                what = f"task `{roots[0]}` never comes to stage `<{stage.name}>`"
+                if len(roots) > 1:
+                    what = f"no task of the file comes to stage `<{stage.name}>`"
                 hint = "refer to it from another stage, or take it out; the first rule is the task"
                 yield self.fault("E204", what, stage.span, hint=hint)
 
     def slips(self) -> Iterator[TaskFault]:
         """Actors that are named once and look like another that is declared or named more often."""
         counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
-        declared = {a.name for a in self.parsed.task.actors}
+        task = self.parsed.task
+        declared = {a.name for a in task.actors} | {z.name for z in task.zones}
+        sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
+        if len(sure) > MANY:
+            return
         for _, actors, _ in self.asked:
             for actor in actors:
                 name = str(actor)
                 if name in declared or counts[name] > 1:
                     continue
-                for other in (*declared, *counts):
-                    if (other in declared or counts[other] > 1) and _slip(name, other):
-                        what = f"actor `{name}` is named only here"
-                        hint = f"did you mean `{other}`?"
-                        yield self.fault("E214", what, actor.span, hint=hint)
-                        break
+                meant = next((o for o in sure if _slip(name, o)), None)
+                if meant is not None:
+                    what = f"actor `{name}` is named only here"
+                    yield self.fault("E214", what, actor.span, hint=f"did you mean `{meant}`?")
 
     def idle_actors(self) -> Iterator[TaskFault]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
         for actor in self.parsed.task.actors:
-            if actor.name not in named and not any(_slip(n, actor.name) for n in named):
+            if actor.span.file or actor.name in named:
+                continue  # an included file may offer more than is used
+            if not any(_slip(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
                 hint = did_you_mean(actor.name, named)
                 yield self.fault("E213", what, actor.span, "an action with this actor", hint)
+
+
+def _line(span: Span) -> str:
+    return f"line {span.line}{' of ' + span.file if span.file else ''}"
 
 
 def _slip(name: str, other: str) -> bool:

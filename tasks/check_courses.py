@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
 
 from visup.tasks.actions import Meaning, contradict
+from visup.tasks.conditions import Fact
 from visup.tasks.faults import Source, TaskFault
+from visup.tasks.graphs import reach
 from visup.tasks.language import Grammar
 from visup.tasks.tree import (
-    SECONDS_PER_UNIT,
     Action,
     Actors,
+    AnyOrder,
+    Counted,
     Course,
     Deadline,
-    Duration,
     Hold,
+    Invariant,
+    Judged,
+    Reference,
     Repeated,
     Span,
     Task,
@@ -24,12 +30,9 @@ from visup.tasks.tree import (
     Together,
     walk,
 )
+from visup.tasks.units import value
 
-UNITS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "m": "min", "mins": "min",
-    "minute": "min", "minutes": "min", "hr": "h", "hrs": "h", "hour": "h", "hours": "h",
-    "msec": "ms", "msecs": "ms", "millisecond": "ms", "milliseconds": "ms",
-}  # fmt: skip
+MOST_IN_ANY_ORDER = 6
 
 
 @dataclass(frozen=True)
@@ -41,17 +44,14 @@ class CourseCheck:
         source: For places.
         actions: The actions that it may ask for.
         whole: Whether every stage that it mentions is there.
+        grammar: The grammar of the task.
     """
 
     task: Task
     source: Source
     actions: Mapping[str, Meaning]
     whole: bool
-
-    @cached_property
-    def grammar(self) -> Grammar:
-        """The grammar of the task."""
-        return Grammar(self.task)
+    grammar: Grammar
 
     @cached_property
     def courses(self) -> list[Course]:
@@ -62,7 +62,8 @@ class CourseCheck:
     def faults(self) -> Iterator[TaskFault]:
         """All faults of the courses."""
         yield from self.endless()
-        yield from self.durations()
+        yield from self.signs()
+        yield from self.counts()
         yield from self.clauses()
         yield from self.together()
         yield from self.invariants()
@@ -93,24 +94,6 @@ class CourseCheck:
             hint = f"offer a way out, such as `( ... <{stage.name}> )?` or `| ...`"
             yield self.fault("E207", what, stage.span, "a course without the stage itself", hint)
 
-    def durations(self) -> Iterator[TaskFault]:
-        """Durations of nothing, or in unknown units."""
-        for course in self.courses:
-            if not isinstance(course, Timed):
-                continue
-            for duration in (c.duration for c in course.clauses):
-                yield from self.duration(duration)
-
-    def duration(self, duration: Duration) -> Iterator[TaskFault]:
-        """What is wrong with one duration."""
-        if duration.unit not in SECONDS_PER_UNIT:
-            meant = UNITS.get(duration.unit.casefold())
-            hint = f"did you mean `{meant}`?" if meant else None
-            what = f"`{duration.unit}` is not a unit of time"
-            yield self.fault("E218", what, duration.span, "`ms`, `s`, `min` or `h`", hint)
-        elif duration.amount <= 0:
-            yield self.fault("E217", f"`{duration}` is no time at all", duration.span)
-
     def clauses(self) -> Iterator[TaskFault]:
         """Clauses said twice, that contradict each other, or that hold nothing."""
         for course in self.courses:
@@ -124,7 +107,7 @@ class CourseCheck:
                     yield self.fault("E208", f"`{word}` is said twice", span, f"one `{word}`")
             least = self.grammar.least_time(course)
             for deadline in deadlines[:1]:
-                if float("inf") > least > deadline.duration.seconds > 0:
+                if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
                     what = f"what takes at least {least:g} s cannot be over {deadline}"
                     yield self.fault("E208", what, deadline.span, "a longer `within`")
             if holds and self.grammar.follows_on(course.item):
@@ -138,12 +121,18 @@ class CourseCheck:
         for course in self.courses:
             if not isinstance(course, Together):
                 continue
-            parts = [self.grammar.sole_action(p) for p in course.parts]
+            parts = [self.grammar.sole_fact(p) for p in course.parts]
             for i, a in enumerate(parts):
                 for b in parts[i + 1 :]:
-                    if a and b and self.contradict(a, b):
+                    if a and b and self.excluding(a, b):
                         what = f"`{a}` and `{b}` can never hold at the same time"
                         yield self.fault("E209", what, course.span, hint="in turn is `a b`")
+
+    def excluding(self, a: Fact, b: Fact) -> bool:
+        """Whether two facts can never hold at the same time."""
+        if isinstance(a, Action) and isinstance(b, Action):
+            return self.contradict(a, b)
+        return False
 
     def contradict(self, a: Action, b: Action) -> bool:
         """Whether two actions can never hold at the same time."""
@@ -155,29 +144,70 @@ class CourseCheck:
     def invariants(self) -> Iterator[TaskFault]:
         """Invariants that the task itself breaks."""
         for invariant in self.task.invariants:
-            for stage, action in self.grammar.asked:
-                if invariant.during and invariant.during.stage != stage:
-                    continue
-                same = (action.name, {*action.actors}) == (
-                    invariant.action.name,
-                    {*invariant.action.actors},
-                )
-                breaks = same if invariant.when == "never" else False
-                breaks = breaks or (
-                    invariant.when == "always" and self.contradict(invariant.action, action)
-                )
-                if breaks:
-                    what = f"`{invariant}`, but stage `<{stage}>` asks for `{action}`"
+            meant = self.meant(invariant.during)
+            for stage, fact in self.grammar.asked:
+                if stage in meant and self.breaks(invariant, fact):
+                    what = f"`{invariant}`, but stage `<{stage}>` asks for `{fact}`"
                     hint = "say for which stage it is meant with `during <stage>`"
                     yield self.fault("E210", what, invariant.span, hint=hint)
                     break
 
+    def meant(self, during: tuple[Reference, ...]) -> AnySet[str]:
+        """The stages for which an invariant is meant, with those inside them."""
+        if not during:
+            return self.grammar.stages.keys()
+        known = [r.stage for r in during if r.stage in self.grammar.stages]
+        return reach(self.grammar.mentions, known)
+
+    def breaks(self, invariant: Invariant, fact: Fact) -> bool:
+        """Whether a stage that asks for something breaks an invariant."""
+        said = invariant.condition
+        if not isinstance(said, Action) or not isinstance(fact, Action):
+            return invariant.when == "never" and str(said) == str(fact)
+        if invariant.when == "never":
+            return (fact.name, {*fact.actors}) == (said.name, {*said.actors})
+        return self.contradict(said, fact)
+
+    def signs(self) -> Iterator[TaskFault]:
+        """Signs said twice, or that hold for nothing in particular."""
+        for course in self.courses:
+            if not isinstance(course, Judged):
+                continue
+            told: set[str] = set()
+            for sign in course.signs:
+                if sign.kind in told:
+                    what = f"`{sign.kind} when` is said twice"
+                    hint = "join the conditions with `or` or `and`"
+                    yield self.fault("E235", what, sign.span, f"one `{sign.kind} when`", hint)
+                told.add(sign.kind)
+                if sign.kind in ("begins", "ends") and self.grammar.follows_on(course.item):
+                    what = f"`{sign.kind} when` stands behind things that follow one another"
+                    hint = f"put it behind the one that {sign.kind} so"
+                    expected = "one action, or several at the same time"
+                    yield self.fault("E232", what, sign.span, expected, hint)
+
+    def counts(self) -> Iterator[TaskFault]:
+        """Numbers of times that contradict each other, and orders that are too many."""
+        for course in self.courses:
+            if isinstance(course, Counted) and course.most is not None:
+                if course.most == 0:
+                    yield self.fault("E233", "`at most 0 times` asks for nothing", course.span)
+                elif course.most < course.least:
+                    what = f"at least {course.least} and at most {course.most} times is never"
+                    yield self.fault("E233", what, course.span, "a greater `at most`")
+            if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
+                what = f"{len(course.items)} things in any order have too many orders to follow"
+                hint = "put those together that follow one another"
+                expected = f"at most {MOST_IN_ANY_ORDER}"
+                yield self.fault("E234", what, course.span, expected, hint)
+
     def repetitions(self) -> Iterator[TaskFault]:
         """Repetitions of what may be left out."""
         for course in self.courses:
-            if not isinstance(course, Repeated) or course.mark == "?":
+            mark = "at least" if isinstance(course, Counted) else getattr(course, "mark", "?")
+            if not isinstance(course, Repeated | Counted) or mark == "?":
                 continue
             if self.grammar.may_be_left_out(course.item):
-                what = f"`{course.mark}` repeats what may be left out, so it has no end"
+                what = f"`{mark}` repeats what may be left out, so it has no end"
                 hint = "leave the `?` or `*` inside away"
                 yield self.fault("E215", what, course.span, hint=hint)

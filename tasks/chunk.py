@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 NAME = r"[^\W\d]\w*"
-WORDS = ("actor", "is", "or", "never", "always", "during", "for", "within")
+WORDS = (
+    "actor", "is", "or", "never", "always", "during", "for", "within", "include", "parameter",
+    "zone",
+)  # fmt: skip
+SAID = re.compile(r'"[^"\n]*"')
+
+
+def without_texts(text: str) -> str:
+    """A text with what stands in double quotes blank, so that no word of it is taken for code."""
+    return SAID.sub(lambda m: " " * len(m[0]), text) if '"' in text else text
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """A statement that does not parse, and where it begins in its file (counted from 1)."""
+    """A statement that does not parse, and where it begins in its file (counted from 1).
+
+    Attributes:
+        text: The statement, texts in quotes blank.
+        line: Its line.
+        column: Its column.
+        raw: The statement as it was written.
+    """
 
     text: str
     line: int
     column: int
+    raw: str = ""
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column in the file of an offset in the statement."""

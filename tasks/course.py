@@ -14,20 +14,28 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
+from visup.tasks.conditions import Fact
+from visup.tasks.structure import keyed
 from visup.tasks.tree import (
     Action,
     Actors,
+    AnyOrder,
     Choice,
+    Clause,
+    Comparison,
+    Counted,
     Course,
-    Deadline,
     Hold,
+    Judged,
     Reference,
     Repeated,
     Sequence,
+    Sign,
     Task,
     Timed,
     Together,
 )
+from visup.tasks.units import value
 
 W = TypeVar("W")
 DEEPEST = 200
@@ -54,11 +62,13 @@ class Step:
     """One action that a course asks for.
 
     Attributes:
-        action: Its name.
+        action: Its name; for a comparison or a zone its key (see `structure.keyed`).
         actors: Who should do it.
         stage: The innermost stage that asks for it.
         hold_s: Seconds for which it must hold, or None when the course does not say.
         deadlines: Each `within` that has the action inside.
+        signs: By what it begins, ends, progresses or fails, where the course says so; one of a kind.
+        inside: Every stage that has the action inside, the innermost with them.
     """
 
     action: str
@@ -66,6 +76,12 @@ class Step:
     stage: str
     hold_s: float | None = None
     deadlines: tuple[Due, ...] = ()
+    signs: tuple[Sign, ...] = ()
+    inside: frozenset[str] = frozenset()
+
+    def sign(self, kind: str) -> Sign | None:
+        """What the course says of how it begins, ends, progresses or fails, or None."""
+        return next((s for s in self.signs if s.kind == kind), None)
 
     def same_as(self, other: Step) -> bool:
         """Whether both ask the same action of the same actors."""
@@ -82,12 +98,14 @@ class Leaf(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class Todo:
-    """A course not yet begun, with what surrounds it: its stage, `for` and `within`."""
+    """A course not yet begun, with what surrounds it: its stages, its clauses and signs."""
 
     course: Course
     stage: str
     hold_s: float | None = None
     deadlines: tuple[Due, ...] = ()
+    signs: tuple[Sign, ...] = ()
+    inside: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,9 +197,8 @@ def enter(
     if depth > DEEPEST:
         return
     match todo.course:
-        case Action(name=name, actors=actors):
-            names = tuple(str(a) for a in actors)
-            yield Leaf(Step(name, names, todo.stage, todo.hold_s, todo.deadlines), watch)
+        case Action() | Comparison():
+            yield from _enter_fact(task, todo, todo.course, watch)
         case Reference(stage=name):
             yield from _enter_stage(task, replace(todo, stage=name), todo.stage, watch, now, depth)
         case Sequence(items=items):
@@ -192,10 +209,21 @@ def enter(
                 yield from enter(task, replace(todo, course=option), watch, now, depth)
         case Together(parts=parts):
             yield from _enter_together(task, todo, parts, watch, now, depth)
+        case AnyOrder(items=items):
+            for i, item in enumerate(items):
+                others = (*items[:i], *items[i + 1 :])
+                rest = others[0] if len(others) == 1 else AnyOrder(others)
+                yield from _enter_then(task, todo, item, rest, watch, now, depth)
         case Timed(item=item, clauses=clauses):
-            yield from enter(
-                task, _timed(replace(todo, course=item), clauses, now), watch, now, depth
-            )
+            timed = _timed(task, replace(todo, course=item), clauses, now)
+            yield from enter(task, timed, watch, now, depth)
+        case Judged(item=item, signs=signs):
+            kinds = {s.kind for s in signs}
+            kept = tuple(s for s in todo.signs if s.kind not in kinds)
+            judged = replace(todo, course=item, signs=(*kept, *signs))
+            yield from enter(task, judged, watch, now, depth)
+        case Counted():
+            yield from _enter_counted(task, todo, todo.course, watch, now, depth)
         case Repeated(item=item, mark=mark):
             if mark == "?":
                 yield from enter(task, replace(todo, course=item), watch, now, depth)
@@ -230,12 +258,39 @@ def moves(task: Task, state: State[W], watch: W, now: float) -> Iterator[Move[W]
             yield from _moves_both(task, parts, watch, now)
 
 
+def _enter_fact(task: Task, todo: Todo, fact: Fact, watch: W) -> Iterator[State[W] | None]:
+    key, actors = keyed(task, fact)
+    step = Step(key, actors, todo.stage, todo.hold_s, todo.deadlines, todo.signs, todo.inside)
+    yield Leaf(step, watch)
+    if any(task.actor(a).optional for a in actors):
+        yield None
+
+
+def _enter_counted(
+    task: Task, todo: Todo, counted: Counted, watch: W, now: float, depth: int
+) -> Iterator[State[W] | None]:
+    """Once, and after it as often as is left to do."""
+    if counted.most == 0:
+        yield None
+        return
+    if counted.most == 1:
+        yield from enter(task, replace(todo, course=counted.item), watch, now, depth)
+    else:
+        most = None if counted.most is None else counted.most - 1
+        again = Counted(counted.item, max(0, counted.least - 1), most)
+        yield from _enter_then(task, todo, counted.item, again, watch, now, depth)
+    if counted.least == 0:
+        yield None
+
+
 def _enter_stage(
     task: Task, todo: Todo, asked_in: str, watch: W, now: float, depth: int
 ) -> Iterator[State[W] | None]:
     stage = task.stage(todo.stage)
     if stage is None:
         return
+    if not isinstance(stage.body, Actors):
+        todo = replace(todo, inside=todo.inside | {stage.name})
     if isinstance(stage.body, Actors):
         # An action in the strict form is asked for by the stage that refers to it.
         action = Action(stage.name, stage.body.names)
@@ -251,7 +306,7 @@ def _enter_then(
     for state in enter(task, replace(todo, course=first), watch, now, depth):
         if state is None:
             # `first` is left out; a repetition of nothing would never end.
-            if not isinstance(rest, Repeated) or rest.item != first:
+            if not isinstance(rest, Repeated | Counted) or rest.item != first:
                 yield from enter(task, later, watch, now, depth)
         else:
             yield Then(state, later)
@@ -282,12 +337,12 @@ def _moves_both(task: Task, parts: tuple[State[W], ...], watch: W, now: float) -
         yield Move(None, tuple(leaf for m in together for leaf in m.left))
 
 
-def _timed(todo: Todo, clauses: tuple[Hold | Deadline, ...], now: float) -> Todo:
+def _timed(task: Task, todo: Todo, clauses: tuple[Clause, ...], now: float) -> Todo:
     for clause in clauses:
+        seconds = value(task.amount(clause.duration))
         if isinstance(clause, Hold):
-            todo = replace(todo, hold_s=clause.duration.seconds)
+            todo = replace(todo, hold_s=seconds)
         else:
-            seconds = clause.duration.seconds
             due = Due(seconds, todo.stage, now + seconds)
             todo = replace(todo, deadlines=(*todo.deadlines, due))
     return todo

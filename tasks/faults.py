@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from difflib import get_close_matches
 
 from visup.agent.errors import Place, TaskError
@@ -38,6 +39,12 @@ CODES = {
     "E127": "a part of the language that visup does not have",
     "E128": "brackets nested too deep",
     "E129": "a file without a rule",
+    "E130": "an include without a file name in quotes",
+    "E131": "a zone that is not drawn rightly",
+    "E132": "a parameter that is not complete",
+    "E133": "`when` without a condition, or a sign without `when`",
+    "E134": "a number of times that is not complete",
+    "E135": "`any order` without its list",
     "E201": "an unknown action",
     "E202": "a stage that is not defined",
     "E203": "a stage defined twice",
@@ -58,6 +65,21 @@ CODES = {
     "E218": "an unknown unit",
     "E219": "actors of an action without brackets",
     "E220": "stages referred to without angle brackets",
+    "E221": "an included file that cannot be read",
+    "E222": "files that include each other",
+    "E223": "a parameter that is not declared",
+    "E224": "a name declared twice",
+    "E225": "a declaration that nothing uses",
+    "E226": "an amount of the wrong kind",
+    "E227": "a quantity that is not compared",
+    "E228": "a comparison of what is no quantity",
+    "E229": "a zone where an actor belongs, or the other way round",
+    "E230": "stages that no observation can tell apart",
+    "E231": "an action that can never be observed",
+    "E232": "`begins` or `ends` on things that follow one another",
+    "E233": "numbers of times that contradict each other",
+    "E234": "too many things in any order",
+    "E235": "a sign said twice",
 }
 """Every code with what it stands for; a code never changes its meaning."""
 
@@ -94,10 +116,14 @@ class Source:
     Args:
         text: The whole text, as the user wrote it.
         file: Its name, for messages.
+
+    Attributes:
+        included: The files that it includes, by name.
     """
 
     def __init__(self, text: str, file: str) -> None:
         self.file = file
+        self.included: dict[str, Source] = {}
         self._lines = text.split("\n")
 
     def place(self, line: int, column: int, length: int = 1) -> Place:
@@ -111,6 +137,8 @@ class Source:
 
     def at(self, span: Span) -> Place:
         """The place of a node; of a node over several lines, its part of the first."""
+        if span.file:
+            return self.included[span.file].at(replace(span, file=""))
         one_line = span.end_line == span.line
         length = span.end_column - span.column if one_line else 10_000
         return self.place(span.line, span.column, length)

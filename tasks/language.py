@@ -1,16 +1,26 @@
-"""What a grammar says as a whole: what is reached, what may be left out, what can end, how soon."""
+"""What a grammar says as a whole: what is reached, what may be left out, what can end, how soon.
+
+Each question about all stages is answered in time linear in the size of the file: stages are
+looked at after those that they refer to, and only circles need a second look.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
+from visup.tasks.conditions import Fact, action_of
+from visup.tasks.graphs import circles, reach, sorted_by_need
 from visup.tasks.tree import (
     Action,
     Actors,
+    AnyOrder,
     Choice,
+    Comparison,
+    Counted,
     Course,
-    Deadline,
     Hold,
+    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -20,6 +30,7 @@ from visup.tasks.tree import (
     Together,
     walk,
 )
+from visup.tasks.units import value
 
 NEVER = float("inf")
 
@@ -36,36 +47,35 @@ class Grammar:
         self.stages: dict[str, Stage] = {}
         for stage in task.stages:
             self.stages.setdefault(stage.name, stage)
+        self._optional = {a.name for a in task.actors if a.optional}
 
     @cached_property
-    def asked(self) -> list[tuple[str, Action]]:
-        """Every action that a stage asks for, with the name of the stage."""
+    def asked(self) -> list[tuple[str, Fact]]:
+        """Everything that a stage asks for, with the name of the stage."""
         found = []
         for stage in self.stages.values():
             if isinstance(stage.body, Actors):
                 continue
             for course in walk(stage.body):
-                action = self._as_action(course)
-                if action is not None:
-                    found.append((stage.name, action))
+                fact = self._as_fact(course)
+                if fact is not None:
+                    found.append((stage.name, fact))
         return found
 
     @cached_property
+    def mentions(self) -> Mapping[str, tuple[str, ...]]:
+        """Stage -> the stages that it refers to, in the order of the text."""
+        return {name: self._mentions(stage) for name, stage in self.stages.items()}
+
+    @cached_property
     def reached(self) -> frozenset[str]:
-        """Stages that the task can come to, itself with them."""
-        seen: set[str] = set()
-        todo = [self.task.name]
-        while todo:
-            name = todo.pop()
-            if name not in seen and name in self.stages:
-                seen.add(name)
-                todo += self._mentions(name)
-        return frozenset(seen)
+        """Stages that the tasks of the file can come to, themselves with them."""
+        return reach(self.mentions, [r for r in self.task.roots if r in self.stages])
 
     def unreached(self) -> list[Stage]:
         """Stages that the task never comes to; of those that lead to each other only the first."""
         lost = [s for s in self.stages.values() if s.name not in self.reached]
-        named = {n for s in lost for n in self._mentions(s.name) if n != s.name}
+        named = {n for s in lost for n in self.mentions[s.name] if n != s.name}
         roots = [s for s in lost if s.name not in named]
         return roots or lost[:1]
 
@@ -75,20 +85,15 @@ class Grammar:
 
     def begin_with_themselves(self) -> list[Stage]:
         """Stages that come to themselves before any action; of each circle only the first."""
-        first = {name: self._first_of(name) for name in self.stages}
-        found: list[Stage] = []
-        told: set[str] = set()
-        for name, stage in self.stages.items():
-            circle = _closure(first, name)
-            if name in circle and name not in told:
-                found.append(stage)
-                told |= {n for n in circle if name in _closure(first, n)}
-        return found
+        order = {name: i for i, name in enumerate(self.stages)}
+        firsts = {name: tuple(self._first_of(stage)) for name, stage in self.stages.items()}
+        found = [min(circle, key=order.__getitem__) for circle in circles(firsts)]
+        return [self.stages[n] for n in sorted(found, key=order.__getitem__)]
 
     def never_end(self) -> list[Stage]:
         """Stages all of whose courses go on for ever, the first only."""
         lasting = [s for n, s in self.stages.items() if self._least_times[n] == NEVER]
-        named = {n for s in lasting for n in self._mentions(s.name)}
+        named = {n for s in lasting for n in self.mentions[s.name]}
         own = [s for s in lasting if s.name in named]
         return (own or lasting)[:1]
 
@@ -98,30 +103,30 @@ class Grammar:
 
     def follows_on(self, course: Course) -> bool:
         """Whether a course has things in it that follow one another."""
-        return self._follows_on(course, frozenset())
+        return self._has_turns(walk(course), self._turning)
 
-    def sole_action(self, course: Course) -> Action | None:
-        """The action that a course asks for when it asks for no more than one, or None."""
+    def sole_fact(self, course: Course) -> Fact | None:
+        """The action or comparison that a course asks for when it asks for no more, or None."""
         seen = set()
         while True:
             match course:
-                case Timed(item=item):
+                case Timed(item=item) | Judged(item=item):
                     course = item
                 case Reference(stage=name):
-                    action = self._as_action(course)
+                    fact = self._as_fact(course)
                     stage = self.stages.get(name)
-                    if action is not None or stage is None or name in seen:
-                        return action
+                    if fact is not None or stage is None or name in seen:
+                        return fact
                     if isinstance(stage.body, Actors):
-                        return action
+                        return fact
                     seen.add(name)
                     course = stage.body
                 case _:
-                    return self._as_action(course)
+                    return self._as_fact(course)
 
-    def _as_action(self, course: Course) -> Action | None:
-        """An action, or what a reference to an action in the strict form stands for."""
-        if isinstance(course, Action):
+    def _as_fact(self, course: Course) -> Fact | None:
+        """A fact, or what a reference to an action in the strict form stands for."""
+        if isinstance(course, Action | Comparison):
             return course
         if isinstance(course, Reference):
             stage = self.stages.get(course.stage)
@@ -129,71 +134,80 @@ class Grammar:
                 return Action(stage.name, stage.body.names, course.span)
         return None
 
-    def _mentions(self, name: str) -> list[str]:
-        body = self.stages[name].body
-        if isinstance(body, Actors):
-            return []
-        return [c.stage for c in walk(body) if isinstance(c, Reference) and c.stage in self.stages]
+    def _mentions(self, stage: Stage) -> tuple[str, ...]:
+        if isinstance(stage.body, Actors):
+            return ()
+        named = (c.stage for c in walk(stage.body) if isinstance(c, Reference))
+        return tuple(dict.fromkeys(n for n in named if n in self.stages))
 
     @cached_property
-    def _empty_stages(self) -> frozenset[str]:
-        empty: frozenset[str] = frozenset()
-        while True:
-            more = frozenset(
-                n
-                for n, s in self.stages.items()
-                if not isinstance(s.body, Actors) and self._empty(s.body, empty)
-            )
-            if more == empty:
-                return empty
-            empty = more
+    def _bottom_up(self) -> list[tuple[str, Course]]:
+        """Stages with a course, each after those that it refers to, as far as there are no circles."""
+        named = ((n, self.stages[n].body) for n in sorted_by_need(self.mentions))
+        return [(n, body) for n, body in named if not isinstance(body, Actors)]
 
-    def _empty(self, course: Course, stages: frozenset[str]) -> bool:
+    @cached_property
+    def _empty_stages(self) -> set[str]:
+        empty: set[str] = set()
+        while True:
+            before = len(empty)
+            for name, body in self._bottom_up:
+                if name not in empty and self._empty(body, empty):
+                    empty.add(name)
+            if len(empty) == before:
+                return empty
+
+    def _empty(self, course: Course, stages: set[str]) -> bool:
         match course:
             case Reference(stage=name):
-                return name in stages
+                fact = self._as_fact(course)
+                return name in stages if fact is None else self._empty(fact, stages)
+            case Action() | Comparison():
+                return any(str(a) in self._optional for a in action_of(course).actors)
             case Choice(options=options):
                 return any(self._empty(o, stages) for o in options)
-            case Sequence(items=parts) | Together(parts=parts):
+            case Sequence(items=parts) | Together(parts=parts) | AnyOrder(items=parts):
                 return all(self._empty(p, stages) for p in parts)
-            case Timed(item=item):
+            case Timed(item=item) | Judged(item=item):
                 return self._empty(item, stages)
             case Repeated(item=item, mark=mark):
                 return mark != "+" or self._empty(item, stages)
-        return False
+            case Counted(item=item, least=least):
+                return least == 0 or self._empty(item, stages)
 
-    def _first_of(self, name: str) -> frozenset[str]:
-        body = self.stages[name].body
-        return frozenset() if isinstance(body, Actors) else self._first(body)
+    def _first_of(self, stage: Stage) -> set[str]:
+        return set() if isinstance(stage.body, Actors) else set(self._first(stage.body))
 
-    def _first(self, course: Course) -> frozenset[str]:
+    def _first(self, course: Course) -> Iterable[str]:
         """Stages that a course may come to before any action."""
         match course:
             case Reference(stage=name):
-                return frozenset({name} & self.stages.keys())
-            case Choice(options=parts) | Together(parts=parts):
-                return frozenset().union(*(self._first(p) for p in parts))
-            case Timed(item=item) | Repeated(item=item):
+                return [name] if name in self.stages else []
+            case Choice(options=parts) | Together(parts=parts) | AnyOrder(items=parts):
+                return [n for p in parts for n in self._first(p)]
+            case Timed(item=item) | Repeated(item=item) | Counted(item=item) | Judged(item=item):
                 return self._first(item)
             case Sequence(items=items):
-                found: frozenset[str] = frozenset()
+                found: list[str] = []
                 for item in items:
-                    found |= self._first(item)
+                    found += self._first(item)
                     if not self.may_be_left_out(item):
                         break
                 return found
-        return frozenset()
+        return []
 
     @cached_property
     def _least_times(self) -> dict[str, float]:
         """Least seconds of each stage: the least fixed point from above, as in shortest paths."""
         times = dict.fromkeys(self.stages, NEVER)
+        times |= {n: 0.0 for n, s in self.stages.items() if isinstance(s.body, Actors)}
         for _ in range(len(times) + 1):
-            before = dict(times)
-            for name, stage in self.stages.items():
-                body = stage.body
-                times[name] = 0.0 if isinstance(body, Actors) else self._least(body, times)
-            if times == before:
+            changed = False
+            for name, body in self._bottom_up:
+                least = self._least(body, times)
+                changed = changed or least != times[name]
+                times[name] = least
+            if not changed:
                 break
         return times
 
@@ -203,37 +217,39 @@ class Grammar:
                 return times.get(name, 0.0)
             case Choice(options=options):
                 return min(self._least(o, times) for o in options)
-            case Sequence(items=items):
+            case Sequence(items=items) | AnyOrder(items=items):
                 return sum(self._least(i, times) for i in items)
             case Together(parts=parts):
                 return max(self._least(p, times) for p in parts)
             case Repeated(item=item, mark=mark):
                 return self._least(item, times) if mark == "+" else 0.0
+            case Counted(item=item, least=least):
+                return least * self._least(item, times) if least else 0.0
+            case Judged(item=item):
+                return self._least(item, times)
             case Timed(item=item, clauses=clauses):
-                holds = [c.duration.seconds for c in clauses if isinstance(c, Hold)]
-                return max(self._least(item, times), *holds, 0.0)
+                amounts = (self.task.amount(c.duration) for c in clauses if isinstance(c, Hold))
+                return max(self._least(item, times), *map(value, amounts), 0.0)
         return 0.0
 
-    def _follows_on(self, course: Course, seen: frozenset[str]) -> bool:
-        if any(isinstance(c, Sequence | Repeated) for c in walk(course)):
-            return True
-        for c in walk(course):
-            if isinstance(c, Timed) and any(isinstance(x, Deadline) for x in c.clauses):
-                continue
-            if isinstance(c, Reference) and c.stage in self.stages and c.stage not in seen:
-                body = self.stages[c.stage].body
-                if not isinstance(body, Actors) and self._follows_on(body, seen | {c.stage}):
-                    return True
-        return False
+    @cached_property
+    def _turning(self) -> frozenset[str]:
+        """Stages that have things in them that follow one another."""
+        users: dict[str, list[str]] = {}
+        for name, named in self.mentions.items():
+            for other in named:
+                users.setdefault(other, []).append(name)
+        bodies = ((n, s.body) for n, s in self.stages.items())
+        own = [
+            n
+            for n, body in bodies
+            if not isinstance(body, Actors) and self._has_turns(walk(body), frozenset())
+        ]
+        return reach({n: tuple(users.get(n, ())) for n in self.stages}, own)
 
-
-def _closure(graph: dict[str, frozenset[str]], start: str) -> set[str]:
-    """All that can be come to from a node, itself only along a circle."""
-    seen: set[str] = set()
-    todo = list(graph.get(start, ()))
-    while todo:
-        node = todo.pop()
-        if node not in seen:
-            seen.add(node)
-            todo += graph.get(node, ())
-    return seen
+    def _has_turns(self, courses: Iterable[Course], turning: frozenset[str]) -> bool:
+        return any(
+            isinstance(c, Sequence | Repeated | Counted | AnyOrder)
+            or (isinstance(c, Reference) and c.stage in turning)
+            for c in courses
+        )

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
-from importlib.resources import files
 from pathlib import Path
 
 from visup.agent.errors import TaskError
-from visup.tasks.actions import ACTIONS, Meaning
+from visup.tasks.actions import Meaning
 from visup.tasks.diagnostics import examine, raise_all
+from visup.tasks.files import read_text, shipped_tasks
+from visup.tasks.structure import tasks_of
 from visup.tasks.tree import Task
 
+__all__ = ["load_task", "load_tasks", "parse_task", "read_text", "shipped_tasks"]
 
-def parse_task(text: str, file: str = "<text>", actions: Mapping[str, Meaning] = ACTIONS) -> Task:
+
+def parse_task(
+    text: str, file: str = "<text>", actions: Mapping[str, Meaning] | None = None
+) -> Task:
     """The task that a text describes.
 
     Args:
         text: A task file.
-        file: Its name, for messages.
-        actions: The actions that it may ask for.
+        file: Its name, for messages; what it includes is looked for beside it.
+        actions: The actions that it may ask for; None for all that are known.
 
     Returns:
-        The tree, free of mistakes.
+        The tree, free of mistakes. Of a file with several tasks it is the whole file, whose `name` is that
+        of the first (see `structure.tasks_of`).
 
     Raises:
         TaskError: When it has one mistake.
@@ -33,54 +38,53 @@ def parse_task(text: str, file: str = "<text>", actions: Mapping[str, Meaning] =
     return task
 
 
-def load_task(path_or_name: str | Path, actions: Mapping[str, Meaning] = ACTIONS) -> Task:
+def load_task(path_or_name: str | Path, actions: Mapping[str, Meaning] | None = None) -> Task:
     """The task in a file, or the shipped task of that name.
 
     Args:
-        path_or_name: A path, or a name such as `dock`.
-        actions: The actions that it may ask for.
+        path_or_name: A path, or a name such as `dock`; `file.task:NAME` takes one task of several.
+        actions: The actions that it may ask for; None for all that are known.
 
     Returns:
         The tree, free of mistakes.
 
     Raises:
+        TaskError: When there is no such file or task, it has one mistake, or it holds several tasks.
+        ManyErrors: When it has several mistakes.
+    """
+    tasks = load_tasks(path_or_name, actions)
+    if len(tasks) > 1:
+        names = ", ".join(f"`{path_or_name}:{t.name}`" for t in tasks)
+        what = f"the file holds {len(tasks)} tasks"
+        raise TaskError(what, where=str(path_or_name), expected=f"one of them: {names}")
+    return tasks[0]
+
+
+def load_tasks(
+    path_or_name: str | Path, actions: Mapping[str, Meaning] | None = None
+) -> tuple[Task, ...]:
+    """The tasks in a file, or the shipped task of that name.
+
+    Args:
+        path_or_name: See `load_task`.
+        actions: The actions that it may ask for; None for all that are known.
+
+    Raises:
         TaskError: When there is no such file or task, or it has one mistake.
         ManyErrors: When it has several.
     """
-    return parse_task(read_text(path_or_name), str(path_or_name), actions)
+    path, wanted = _parted(path_or_name)
+    tasks = tasks_of(parse_task(read_text(path), path, actions))
+    chosen = tuple(t for t in tasks if not wanted or t.name == wanted)
+    if not chosen:
+        names = ", ".join(t.name for t in tasks)
+        raise TaskError(f"there is no task `{wanted}` in it", where=path, expected=names)
+    return chosen
 
 
-def read_text(path_or_name: str | Path) -> str:
-    """The text of a task file, or of the shipped task of that name.
-
-    Raises:
-        TaskError: When there is no such file or task, or it is not text.
-    """
-    path = Path(path_or_name)
-    if str(path_or_name) in shipped_tasks() and not path.exists():
-        resource = files("visup.tasks").joinpath(f"{path_or_name}.task")
-        return resource.read_text(encoding="utf-8")
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise _no_such(str(path_or_name)) from None
-    except UnicodeDecodeError as e:
-        what = f"it is not text: byte {e.start} is not UTF-8"
-        raise TaskError(what, where=str(path), expected="a task file in UTF-8") from e
-    except OSError as e:
-        what = f"cannot be read: {e.strerror or e}"
-        raise TaskError(what, where=str(path), expected="a task file") from e
-
-
-def shipped_tasks() -> tuple[str, ...]:
-    """Names of the tasks that ship with visup, in alphabetical order."""
-    entries = files("visup.tasks").iterdir()
-    return tuple(sorted(e.name[: -len(".task")] for e in entries if e.name.endswith(".task")))
-
-
-def _no_such(name: str) -> TaskError:
-    shipped = shipped_tasks()
-    close = get_close_matches(Path(name).stem, shipped, n=1)
-    hint = f"did you mean the shipped task `{close[0]}`?" if close else None
-    expected = f"a file, or a shipped task: {', '.join(shipped)}"
-    return TaskError("there is no such task file", where=name, expected=expected, hint=hint)
+def _parted(path_or_name: str | Path) -> tuple[str, str]:
+    """The path, and the name of the task behind the last colon, or empty."""
+    path, colon, name = str(path_or_name).rpartition(":")
+    if colon and name.isidentifier() and not Path(path_or_name).exists():
+        return path, name
+    return str(path_or_name), ""

@@ -7,7 +7,7 @@ with the greatest total weight is taken, each object playing one actor at most.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -91,9 +91,12 @@ def _held_weight(weight: float, belief: ObjectBelief, settings: TaskSettings) ->
 
 
 def unexplained(
-    mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
+    mind: Mind,
+    bindings: Sequence[Binding],
+    settings: TaskSettings = DEFAULT_SETTINGS,
+    optional: Collection[str] = (),
 ) -> tuple[int, ...]:
-    """Objects in view that no actor explains, by id.
+    """Objects in view that no actor explains, by id; nobody waits for `optional` actors.
 
     With every actor bound that is any further object. With an actor still unbound, an object that
     is not identified yet may be it, and so may one that could be any of the actors, or whose identity
@@ -101,7 +104,7 @@ def unexplained(
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
-    if all(b.object_id is not None for b in bindings):
+    if all(b.object_id is not None for b in bindings if b.actor not in optional):
         return tuple(o.id for o in others)
     known = {m for b in bindings for m in b.models}
     return tuple(

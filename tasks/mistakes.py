@@ -12,6 +12,7 @@ from visup.tasks.chunk import NAME, WORDS, Chunk, Mistake, Recogniser
 from visup.tasks.faults import Source, TaskFault
 from visup.tasks.slips import (
     action_in_angles,
+    any_order,
     brackets,
     clause,
     commas,
@@ -20,9 +21,12 @@ from visup.tasks.slips import (
     joining_word,
     mixed_names,
     no_actors,
+    no_brackets,
     open_angle,
     operators,
     repeat_in_front,
+    signs,
+    times,
 )
 
 
@@ -46,16 +50,33 @@ def _foreign_comment(text: str) -> Mistake | None:
 
 
 def _not_in_language(text: str) -> Mistake | None:
-    m = re.match(r"\s*(include|import|task|zone|param|parameter|stage)\b(?=[ ]+[\w<\"'./])", text)
+    m = re.match(r"\s*(import|param|stage)\b(?=[ ]+[\w<\"'./])", text)
     if m is not None:
         what = f"`{m[1]}` is not part of the language of task files"
-        return Mistake("E127", m.start(1), len(m[1]), what, "a rule, `actor`, `never` or `always`")
-    m = re.search(r"\b(?:at\s+(?:least|most)\b|(?:until|unless|after|before)\b)", text)
+        meant = {"import": '`include "common.task"`', "stage": "`<approach> ::= ...`"}
+        expected = meant.get(m[1], "`parameter patience is 90 s`")
+        return Mistake("E127", m.start(1), len(m[1]), what, expected)
+    m = re.search(r"(?<=[\s)>])(?:until|unless|after|before|while|if)\b(?!\s*[,)])", text)
     if m is not None:
-        what = f"`{' '.join(m[0].split())}` is not part of the language of task files"
-        hint = "repetitions are written `?`, `*`, `+`; times `for` and `within`"
+        what = f"`{m[0]}` is not part of the language of task files"
+        hint = "in turn is `<a> <b>`, at the same time `<a> & <b>`; a stage `ends when ...`"
         return Mistake("E127", m.start(), len(m[0]), what, hint=hint)
     return None
+
+
+def _heading(text: str) -> Mistake | None:
+    m = re.match(r"\s*((task|actor|stage|zone|parameter)s?)\s*:(?!:=)", text, re.I)
+    if m is None:
+        return None
+    meant = {
+        "task": "`task <dock> ::= ...`",
+        "stage": "`<approach> ::= ...`",
+        "zone": "`zone berth is (100, 50) (300, 50) (300, 200)`",
+        "parameter": "`parameter patience is 90 s`",
+    }
+    expected = meant.get(m[2].lower(), "`actor satellite is spartan or hubble`")
+    what = f"`{m[1]}:` does not begin a statement"
+    return Mistake("E127", m.start(1), m.end() - m.start(1), what, expected)
 
 
 def _definer(text: str) -> Mistake | None:
@@ -126,14 +147,22 @@ def _word_as_name(text: str) -> Mistake | None:
 
 
 def _actor(text: str) -> Mistake | None:
-    m = re.match(rf"\s*actor\b\s*({NAME})?\s*(\S*)", text)
+    m = re.match(rf"\s*(?:optional\s+)?actor\b\s*({NAME})?\s*(\S*)", text)
     if m is None:
         return None
     expected = "`actor satellite is spartan or hubble`"
     if m[1] is None or m[1] in WORDS:
-        return Mistake("E124", m.start(), 5, "the name of the actor is missing", expected)
+        start = m.end() - len(m[0].lstrip())
+        return Mistake("E124", start, 5, "the name of the actor is missing", expected)
+    size = re.search(r"\bsize\b(?!\s*\d+(?:\.\d+)?\s*[^\W\d])", text)
+    if size is not None:
+        what = "`size` is not followed by a number and a unit"
+        return Mistake("E124", size.start(), 4, what, "such as `size 1.6 m`")
     if m[2] == "is":
         hint = "several models are parted by `or`" if re.search(r"[,|/]|\band\b", text) else None
+        spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
+        if hint is None and spaced is not None:
+            hint = f"the name of a model has no blanks, such as `{spaced[1]}_{spaced[2]}`"
         what = f"actor `{m[1]}` is declared with something that is not a model"
         if not text[m.end() :].strip(" "):
             what = f"actor `{m[1]}` is declared without a model"
@@ -142,17 +171,62 @@ def _actor(text: str) -> Mistake | None:
     return Mistake("E124", m.start(1), len(m[1]), what, expected)
 
 
+def _include(text: str) -> Mistake | None:
+    m = re.match(r"\s*(include)\b", text)
+    if m is None:
+        return None
+    what = "`include` is not followed by a file name in double quotes"
+    return Mistake("E130", m.start(1), 7, what, '`include "common.task"`')
+
+
+def _zone(text: str) -> Mistake | None:
+    m = re.match(rf"\s*(zone)\b\s*({NAME})?\s*(is\b)?", text)
+    if m is None:
+        return None
+    what = "the name of the zone is missing"
+    if m[2]:
+        corners = len(re.findall(r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)", text))
+        what = f"zone `{m[2]}` is drawn with something that is no corner"
+        what = f"zone `{m[2]}` has fewer than three corners" if corners < 3 else what
+        what = what if m[3] else f"`is` is missing after zone `{m[2]}`"
+    start = m.start(2) if m[2] else m.start(1)
+    expected = f"`zone {m[2] or 'berth'} is (100, 50) (300, 50) (300, 200)`, in pixels"
+    return Mistake("E131", start, len(m[2] or m[1]), what, expected)
+
+
+def _parameter(text: str) -> Mistake | None:
+    m = re.match(rf"\s*(parameter)\b\s*({NAME})?\s*(is\b)?", text)
+    if m is None:
+        return None
+    what = "the name of the parameter is missing"
+    if m[2]:
+        what = f"parameter `{m[2]}` is not given a number and a unit"
+        what = what if m[3] else f"`is` is missing after parameter `{m[2]}`"
+    start = m.start(2) if m[2] else m.start(1)
+    expected = f"`parameter {m[2] or 'patience'} is 90 s`"
+    return Mistake("E132", start, len(m[2] or m[1]), what, expected)
+
+
 def _invariant(text: str) -> Mistake | None:
     m = re.match(r"\s*(never|always)\b", text)
     if m is None:
         return None
-    what = f"`{m[1]}` is not followed by one action"
+    place = re.search(r"\b(?:in|while|at)\s+(?=<)", text)
+    if place is not None:
+        what = f"`{place[0].strip()}` stands where `during` should"
+        return Mistake("E125", place.start(), len(place[0].strip()), what, "`during <approach>`")
+    what = f"`{m[1]}` is not followed by a condition"
     expected = f"`{m[1]} touching(arm, radiator)`, perhaps with `during <stage>`"
     return Mistake("E125", m.start(1), len(m[1]), what, expected)
 
 
 RECOGNISERS: tuple[Recogniser, ...] = (
     _foreign_comment,
+    _heading,
+    _include,
+    _zone,
+    _parameter,
+    signs,
     _not_in_language,
     _definer,
     _bare_head,
@@ -163,8 +237,11 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     open_angle,
     brackets,
     action_in_angles,
+    times,
+    any_order,
     _invariant,
     operators,
+    no_brackets,
     no_actors,
     empty_part,
     _word_as_name,

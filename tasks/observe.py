@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
+from visup.rules.facts import Facts
 from visup.tasks.actions import Meaning
+from visup.tasks.vocabulary import Look
+
+NOTHING: Mapping[str, Look] = MappingProxyType({})
+NEVER: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +26,8 @@ class Sighting:
         entry: A true relation by which it begins, or None.
         not_yet: Whether the entry does not count yet (`while_not`).
         contrary: A true relation that says that it fails, or None.
+        stern: Whether the contrary counts although the action holds: the course itself says so.
+        over: Whether what its course says of its end is seen; None when the course says nothing.
         observed: Whether anything at all is known about it; False while an actor is not found
             or its object is hidden.
     """
@@ -28,6 +37,8 @@ class Sighting:
     entry: Relation | None = None
     not_yet: bool = False
     contrary: Relation | None = None
+    stern: bool = False
+    over: Truth | None = None
     observed: bool = False
 
 
@@ -35,10 +46,25 @@ UNSEEN = Sighting()
 
 
 class Relations:
-    """All relations of a mind at one moment, found by name and objects."""
+    """All relations of a mind at one moment, found by name and objects.
 
-    def __init__(self, mind: Mind) -> None:
+    Args:
+        mind: The mind.
+        looks: Words and keys that are not plain relations of the mind (see `vocabulary`).
+        before: Since when what `lasting` was told of has been true, by key.
+    """
+
+    def __init__(
+        self,
+        mind: Mind,
+        looks: Mapping[str, Look] = NOTHING,
+        before: Mapping[str, float] = NEVER,
+    ) -> None:
         self._mind = mind
+        self._looks = looks
+        self._before = before
+        self._looked: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self.after: dict[str, float] = {}
 
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
         """The relation of that name between these objects; one of unknown truth when there is none.
@@ -46,12 +72,41 @@ class Relations:
         `decoupled`, `apart`, `present` and `gone` follow from what else is believed unless some
         rule gives them itself.
         """
+        if name in self._looks:
+            return self._look(name, objects)
         found = self._mind.relation(name, *objects)
         if found is not None and found.truth is not Truth.UNKNOWN:
             return found
         derive = DERIVED.get(name)
         derived = derive(self._mind, self, objects) if derive else None
         return derived or found or Relation(name, objects, Truth.UNKNOWN, self._mind.time)
+
+    @property
+    def time(self) -> float:
+        """Seconds of this moment."""
+        return self._mind.time
+
+    @cached_property
+    def _facts(self) -> Facts:
+        return Facts(self._mind)
+
+    def _look(self, name: str, objects: tuple[int, ...]) -> Relation:
+        key = (name, objects)
+        if key not in self._looked:
+            truth = self._looks[name](self._facts, objects)
+            self._looked[key] = self.lasting(name, objects, truth)
+        return self._looked[key]
+
+    def lasting(self, name: str, objects: tuple[int, ...], truth: Truth) -> Relation:
+        """A relation of that truth, with the time since when it has been true without a break.
+
+        While it cannot be observed the time is kept: not seen is not "no".
+        """
+        key = f"{name} {objects}"
+        since = self._before.get(key, self._mind.time)
+        if truth is Truth.TRUE or (truth is Truth.UNKNOWN and key in self._before):
+            self.after[key] = since
+        return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
 
     def first_true(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
         """The first of some relations that is true, or None."""
@@ -68,6 +123,8 @@ class Relations:
         """
         for name in names:
             relation = self._mind.relation(name, *objects)
+            if name in self._looks:
+                relation = self._look(name, objects)
             if relation is not None and relation.truth is Truth.TRUE:
                 return relation
         return None

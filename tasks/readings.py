@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.tasks.actions import Meaning
@@ -31,6 +31,7 @@ from visup.tasks.sentences import outcome
 from visup.tasks.settings import TaskSettings
 from visup.tasks.tree import Task
 from visup.tasks.verify import BAD, Watch, entered, over, update
+from visup.tasks.vocabulary import Look
 
 CONTRARY, IDLE, UNOBSERVED, WAITING = 1.0, 0.2, 0.05, 0.02  # cost per second of one step
 STAYED = 0.5  # cost of staying, once, when what comes next was seen to begin
@@ -56,6 +57,7 @@ class Reading:
         finished: When the task was done by it, or None.
         met: Steps that may come next and whose entry was seen, with the time when it last was.
         stayed: Whether it has paid for staying where it is.
+        gone_on: Whether it has left a step.
     """
 
     state: State[Watch]
@@ -64,20 +66,29 @@ class Reading:
     finished: float | None = None
     met: tuple[tuple[tuple[Step, ...], float], ...] = ()
     stayed: bool = False
+    gone_on: bool = False
 
     @property
     def begun(self) -> bool:
         """Whether anything of the task was seen by it."""
-        return bool(self.past) or any(x.watch.begun is not None for x in leaves(self.state))
+        return self.gone_on or any(x.watch.begun is not None for x in leaves(self.state))
 
 
 @dataclass(frozen=True, slots=True)
 class Follower:
-    """What following the readings of one task needs: the task, meanings of actions, patience."""
+    """What following the readings of one task needs.
+
+    Attributes:
+        task: The task.
+        actions: Meanings of its actions, with those of comparisons and zones (see `vocabulary`).
+        settings: Patience.
+        looks: Whether what is no plain relation of the mind holds.
+    """
 
     task: Task
     actions: Mapping[str, Meaning]
     settings: TaskSettings
+    looks: Mapping[str, Look] = field(default_factory=dict)
 
     def start(self, now: float) -> tuple[Reading, ...]:
         """The readings in which the task begins now."""
@@ -128,7 +139,7 @@ class Follower:
     def _cost(self, leaf: Leaf[Watch], seen: Sighting, done: bool) -> float:
         if not seen.observed:
             return UNOBSERVED
-        if seen.contrary is not None and seen.holds is not Truth.TRUE:
+        if seen.contrary is not None and (seen.stern or seen.holds is not Truth.TRUE):
             return CONTRARY
         if seen.helps is not None or done or self._over(leaf):
             return 0.0
@@ -169,7 +180,7 @@ class Follower:
         skipped = sum(self._skipped(x) for x in way.left)
         if self._seen(reading, way, see, now):
             return skipped
-        nearer = all(self._enters(see(x.step).helps, now) for x in way.entered)
+        nearer = all(self._comes(x.step, see(x.step), now) for x in way.entered)
         return skipped + GUESSED if nearer else None
 
     def _seen(self, reading: Reading, way: Move[Watch], see: See, now: float) -> bool:
@@ -193,6 +204,10 @@ class Follower:
         """Whether a sign of a step has lasted long enough."""
         return sign is not None and now - sign.since >= self.settings.enter_s - 1e-9
 
+    def _comes(self, step: Step, seen: Sighting, now: float) -> bool:
+        """Whether a step is seen to come nearer; one whose course says when it begins only begins."""
+        return step.sign("begins") is None and self._enters(seen.helps, now)
+
     def _goes_on(self, step: Step, left: tuple[Leaf[Watch], ...]) -> bool:
         """Whether a step asks for what is going on already: it can only begin once that ceased."""
         return any(step.same_as(x.step) and not x.watch.ceased for x in left)
@@ -214,8 +229,9 @@ class Follower:
         see: See,
         now: float,
     ) -> Reading:
+        opened = self._seen(reading, way, see, now)
         fresh = [
-            self._look(x, see(x.step), now, 0.0, False) if x in way.entered else x
+            self._look(_opened(x, opened), see(x.step), now, 0.0, False) if x in way.entered else x
             for x in leaves(state)
         ]
         under_way = {x.step.stage for x in fresh}
@@ -229,7 +245,8 @@ class Follower:
             if ending.stage not in under_way or failed:
                 told[ending.stage] = ending
         cost = reading.cost + price
-        return Reading(with_leaves(state, iter(fresh)), cost, tuple(told.values()))
+        now_at = with_leaves(state, iter(fresh))
+        return Reading(now_at, cost, tuple(told.values()), gone_on=True)
 
     def _ending(self, leaf: Leaf[Watch], now: float) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
@@ -247,6 +264,10 @@ class Follower:
         least = ranked[0].cost
         kept = (replace(r, cost=r.cost - least) for r in ranked if r.cost - least <= WORST)
         return tuple(kept)
+
+
+def _opened(leaf: Leaf[Watch], opened: bool) -> Leaf[Watch]:
+    return replace(leaf, watch=replace(leaf.watch, opened=True)) if opened else leaf
 
 
 def _steps(way: Move[Watch]) -> tuple[Step, ...]:

@@ -66,6 +66,11 @@ def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Sta
         return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
     if step.hold_s is not None and not watch.fulfilled:
         return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
+    end = step.sign("ends")
+    if end is not None and not watch.fulfilled:
+        if watch.denied:
+            return Status.FAILED, f"`{step.stage}` ends when {end.condition}, which was not so"
+        return Status.UNKNOWN, f"whether {end.condition} could not be seen"
     if meaning.lasts and watch.begun is None:
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
     if meaning.lasts or watch.held:

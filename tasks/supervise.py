@@ -26,16 +26,19 @@ from visup.agent import (
     Truth,
     Verdict,
 )
-from visup.tasks.actions import ACTIONS, Meaning
+from visup.tasks.actions import Meaning, known_actions
 from visup.tasks.believe import Scene, believe
-from visup.tasks.course import Step, leaves
+from visup.tasks.conditions import facts_of
+from visup.tasks.course import leaves
 from visup.tasks.matching import match, strength, unexplained
 from visup.tasks.readings import Follower, Reading
 from visup.tasks.settings import DEFAULT_SETTINGS, TaskSettings
-from visup.tasks.structure import stage_names
+from visup.tasks.structure import keyed, stage_names
 from visup.tasks.tell import stage_concerns, stage_events
 from visup.tasks.tree import Invariant, Task
+from visup.tasks.units import value
 from visup.tasks.verify import BAD
+from visup.tasks.vocabulary import vocabulary
 
 MEMORY = "tasks"
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
@@ -57,6 +60,7 @@ class TaskMemory:
         broken_since: Since when each invariant has been broken, or None.
         rival: A matching that would change who plays whom, by actor; empty when there is none.
         rival_since: Since when it has been the better one.
+        lasting: Since when what is no plain relation of the mind has been true, by key.
     """
 
     time: float
@@ -68,19 +72,20 @@ class TaskMemory:
     broken_since: tuple[float | None, ...] = ()
     rival: tuple[int | None, ...] = ()
     rival_since: float = 0.0
+    lasting: tuple[tuple[str, float], ...] = ()
 
 
 def task_thinker(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
-    actions: Mapping[str, Meaning] = ACTIONS,
+    actions: Mapping[str, Meaning] | None = None,
 ) -> Thinker:
     """The thinker that supervises some tasks.
 
     Args:
         tasks: The active tasks, checked (see `parse_task`).
         settings: Patience and thresholds.
-        actions: Meanings of actions, with those of plug-ins.
+        actions: Meanings of actions; None for all that are known, with those of plug-ins.
 
     Returns:
         A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
@@ -89,7 +94,7 @@ def task_thinker(
         'stage_unknown', 'invariant_broken' and 'verdict', and concerns 'stage_failing' and
         'invariant_broken'.
     """
-    followers = tuple(Follower(t, actions, settings) for t in tasks)
+    followers = tuple(_follower(t, actions or known_actions(), settings) for t in tasks)
 
     def think(mind: Mind, observation: Observation) -> Outcome:
         memories = _recall(mind, followers)
@@ -117,6 +122,11 @@ def finish(belief: TaskBelief) -> Verdict:
     return belief.verdict
 
 
+def _follower(task: Task, actions: Mapping[str, Meaning], settings: TaskSettings) -> Follower:
+    words = vocabulary(task, actions)
+    return Follower(task, words.meanings, settings, words.looks)
+
+
 @dataclass(frozen=True, slots=True)
 class _Step:
     memory: TaskMemory
@@ -141,13 +151,13 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
     """One step of one task: bind its actors, follow its readings, judge, tell."""
     settings, now = follower.settings, mind.time
     bindings, rival, rival_since = _bind(follower, memory, mind)
-    scene = Scene(mind, bindings, follower.actions)
+    scene = Scene(mind, bindings, follower, dict(memory.lasting))
     readings = memory.readings or _start(follower, scene)
     if readings:
         dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.readings else 0.0
         readings = follower.follow(readings, scene.see, now, dt)
     broken = _broken(follower, scene, memory)
-    strange = _strange(scene, memory, settings)
+    strange = _strange(follower, scene, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
     if {b.object_id for b in bindings} & set(strangers):
         interrupted, strangers = "", ()
@@ -157,10 +167,19 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     belief = replace(belief, unexplained=lasting)
     new = TaskMemory(
-        now, readings, belief, interrupted, strangers, strange, broken, rival, rival_since
+        now,
+        readings,
+        belief,
+        interrupted,
+        strangers,
+        strange,
+        broken,
+        rival,
+        rival_since,
+        scene.since,
     )
     events = (
-        *stage_events(memory.belief, belief, mind),
+        *stage_events(memory.belief, belief, mind, follower.task),
         *_invariant_events(follower, memory, new, mind),
     )
     return _Step(new, events, (*stage_concerns(belief), *_invariant_concerns(follower, new, scene)))
@@ -206,12 +225,11 @@ def _start(follower: Follower, scene: Scene) -> tuple[Reading, ...]:
     return readings if found else ()
 
 
-def _strange(
-    scene: Scene, memory: TaskMemory, settings: TaskSettings
-) -> tuple[tuple[int, float], ...]:
+def _strange(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[tuple[int, float], ...]:
     """Objects that are unexplained now, each with the time since when."""
     before = dict(memory.strange_since)
-    now = unexplained(scene.mind, scene.bindings, settings)
+    optional = {a.name for a in follower.task.actors if a.optional}
+    now = unexplained(scene.mind, scene.bindings, follower.settings, optional)
     return tuple((i, before.get(i, scene.mind.time)) for i in now)
 
 
@@ -229,7 +247,7 @@ def _interrupted(
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
     for invariant, since in zip(follower.task.invariants, broken, strict=True):
-        if since is not None and scene.mind.time - since >= follower.settings.contrary_s:
+        if since is not None and scene.mind.time - since >= _patience(follower, invariant):
             return f"`{invariant}` does not hold", ()
     return "", ()
 
@@ -238,25 +256,39 @@ def _broken(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[float
     """Since when each invariant has been broken, or None; what is not seen is not broken."""
     before = memory.broken_since
     return tuple(
-        (since if since is not None else scene.mind.time)
-        if _breaks(i, scene, memory.belief.current)
-        else None
+        (since if since is not None else scene.mind.time) if _breaks(i, scene, memory) else None
         for i, since in zip(follower.task.invariants, before, strict=True)
     )
 
 
-def _breaks(invariant: Invariant, scene: Scene, current: str | None) -> bool:
-    if invariant.during is not None and invariant.during.stage != current:
+def _breaks(invariant: Invariant, scene: Scene, memory: TaskMemory) -> bool:
+    holds = scene.holds(invariant.condition, None)
+    if invariant.during and not {r.stage for r in invariant.during} & _under_way(memory):
         return False
-    actors = tuple(map(str, invariant.action.actors))
-    holds = scene.see(Step(invariant.action.name, actors, "")).holds
     return holds is (Truth.TRUE if invariant.when == "never" else Truth.FALSE)
+
+
+def _under_way(memory: TaskMemory) -> frozenset[str]:
+    """The stages under way by the best reading, with those in which they stand."""
+    if not memory.readings or memory.readings[0].finished is not None:
+        return frozenset()
+    steps = [x.step for x in leaves(memory.readings[0].state)]
+    return frozenset().union(*(s.inside for s in steps))
+
+
+def _patience(follower: Follower, invariant: Invariant) -> float:
+    """For how long an invariant must be broken to count, seconds."""
+    if invariant.lasting is None:
+        return follower.settings.contrary_s
+    return value(follower.task.amount(invariant.lasting.duration))
 
 
 def _invariant_concerns(follower: Follower, memory: TaskMemory, scene: Scene) -> Iterator[Concern]:
     for invariant, since in zip(follower.task.invariants, memory.broken_since, strict=True):
-        if since is not None and memory.time - since >= follower.settings.contrary_s:
-            objects = scene.objects(tuple(map(str, invariant.action.actors)))
+        if since is not None and memory.time - since >= _patience(follower, invariant):
+            facts = facts_of(invariant.condition)
+            actors = (a for f in facts for a in keyed(follower.task, f)[1])
+            objects = scene.objects(tuple(dict.fromkeys(actors)))
             cause = f"`{invariant}` has not held since {since:.1f} s."
             key = f"{follower.task.name}: {invariant}"
             yield Concern("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
@@ -265,8 +297,8 @@ def _invariant_concerns(follower: Follower, memory: TaskMemory, scene: Scene) ->
 def _invariant_events(
     follower: Follower, memory: TaskMemory, new: TaskMemory, mind: Mind
 ) -> Iterator[Event]:
-    patience = follower.settings.contrary_s
     for i, invariant in enumerate(follower.task.invariants):
+        patience = _patience(follower, invariant)
         since = new.broken_since[i]
         if since is not None and memory.time - since < patience <= new.time - since:
             text = f"Task `{follower.task.name}`: `{invariant}` has not held since {since:.1f} s."

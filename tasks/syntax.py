@@ -1,117 +1,34 @@
-"""Mistakes of syntax: cleaning, splitting at rules, and naming what went wrong in each."""
+"""Mistakes of syntax: splitting at statements, and naming what went wrong in each."""
 
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from visup.agent.errors import Place
-from visup.tasks.chunk import Chunk
+from visup.tasks.chunk import WORDS, Chunk, without_texts
 from visup.tasks.faults import Source, TaskFault, did_you_mean
 from visup.tasks.mistakes import name_mistake
-from visup.tasks.read import read
-from visup.tasks.tree import Actor, Invariant, Stage, Task
+from visup.tasks.read import collect, read, read_statements
+from visup.tasks.tree import Task
 
 NAME = r"[^\W\d]\w*"
 HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
 OPENS = re.compile(  # a line that begins a statement, well written or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
-    r"|(?:actor|never|always|include|import|task|zone|param|parameter|stage)\b(?![ ]*\())"
+    r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage)\b(?![ ]*\())"
 )
-UNFINISHED = re.compile(r"(?:::=|[|&(,]|\b(?:for|within|is|or|during))\s*$")
+MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
+DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
+UNFINISHED = re.compile(
+    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional))\s*$"
+)
 DEEPEST = 60
-
-LIKE = {
-    "：": ":", "＝": "=", "＜": "<", "＞": ">", "（": "(", "）": ")", "，": ",", "｜": "|",
-    "＊": "*", "＋": "+", "？": "?", "＆": "&", "‹": "<", "›": ">", "⟨": "<", "⟩": ">",
-    "〈": "<", "〉": ">", "¦": "|", "∣": "|", "\u00a0": " ", "\u2009": " ", "\u202f": " ",
-    "\u200b": " ", "\ufeff": " ", "\u3000": " ", "–": "-", "—": "-", "−": "-",
-}  # fmt: skip
-QUOTES = "\"'`“”‘’„‚«»′″"
-
-
-def clean(text: str, source: Source) -> tuple[str, list[TaskFault]]:
-    """The text without what only looks wrong, so that it hides nothing else.
-
-    Args:
-        text: As the user wrote it.
-        source: For places.
-
-    Returns:
-        Text of the same length, in which tabs, quotes and typographic characters are what was
-        meant and comments are blank; and one fault for each run of them.
-    """
-    faults: list[TaskFault] = []
-    lines = text.split("\n")
-    for number, line in enumerate(lines, 1):
-        code = re.sub(r"#.*", lambda m: " " * len(m[0]), line)
-        if not code.isascii() or any(c in QUOTES or (c < " " and c != "\r") for c in code):
-            code = _clean_line(code, number, source, faults)
-        lines[number - 1] = code
-    return "\n".join(lines), _one_for_tabs(faults)
-
-
-def _clean_line(line: str, number: int, source: Source, faults: list[TaskFault]) -> str:
-    """The line as it was meant; of each kind of odd character the line is told once."""
-    told = set()
-    for i, char in enumerate(line):
-        kind = _odd(char)
-        quoted = kind == "E105" and char in QUOTES
-        if kind and (kind, quoted) not in told:
-            told.add((kind, quoted))
-            length = _quoted(line, i) if quoted else 1
-            faults.append(_odd_fault(kind, char, source.place(number, i + 1, length)))
-    return "".join(_meant(c) if _odd(c) else c for c in line)
-
-
-def _quoted(line: str, start: int) -> int:
-    """How many characters stand from one quote to the next, both with them."""
-    ends = (i for i in range(start + 1, len(line)) if line[i] in QUOTES)
-    return next(ends, start) - start + 1
-
-
-def _odd(char: str) -> str:
-    if char == "\t":
-        return "E106"
-    if char in QUOTES or char in LIKE:
-        return "E105"
-    if (char < " " and char != "\r") or char in "\x7f\ufffd":
-        return "E104"
-    return ""
-
-
-def _meant(char: str) -> str:
-    return LIKE.get(char, " ")
-
-
-def _odd_fault(code: str, char: str, place: Place) -> TaskFault:
-    if code == "E106":
-        return TaskFault(code, "a tab", place, expected="spaces", hint="use spaces")
-    if code == "E104":
-        return TaskFault(code, f"a character that is not text (U+{ord(char):04X})", place)
-    if char in QUOTES:
-        what = "typographic quotes" if ord(char) > 127 else "quotes"
-        hint = "names are written without quotes"
-        return TaskFault(code, f"{what} `{char}`", place, expected="a name", hint=hint)
-    plain = LIKE[char]
-    shown = "an ordinary space" if plain == " " else f"`{plain}`"
-    what = f"`{char}` (U+{ord(char):04X}) only looks like {shown}"
-    return TaskFault(code, what, place, expected=shown, hint="type it on the keyboard")
-
-
-def _one_for_tabs(faults: list[TaskFault]) -> list[TaskFault]:
-    """All tabs of a file are one habit, told once."""
-    tabs = [f for f in faults if f.code == "E106"]
-    if len(tabs) < 2:
-        return faults
-    lines = len({f.place.line for f in tabs})
-    what = f"tabs, here and in {lines} lines" if lines > 1 else "tabs"
-    first = TaskFault("E106", what, tabs[0].place, expected="spaces", hint="use spaces")
-    return [first if f is tabs[0] else f for f in faults if f is tabs[0] or f.code != "E106"]
+LONGEST = 4000  # characters of a statement that mistakes are looked for in
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +47,11 @@ class Parsed:
     defined: frozenset[str] = frozenset()
     used: frozenset[str] = frozenset()
 
+    @property
+    def lacking(self) -> bool:
+        """Whether a file that it includes could not be read, so that names may be missing."""
+        return any(f.code in ("E130", "E221", "E222") for f in self.faults)
+
 
 def parse(text: str, source: Source) -> Parsed:
     """Read a cleaned text; where it is not in the grammar, statement by statement.
@@ -141,7 +63,7 @@ def parse(text: str, source: Source) -> Parsed:
     Returns:
         The tree of all well written statements, one fault for each other one.
     """
-    deep = _too_deep(text, source)
+    deep = _too_deep(without_texts(text), source)
     if deep:
         return Parsed(Task(()), (deep,))
     try:
@@ -151,28 +73,40 @@ def parse(text: str, source: Source) -> Parsed:
 
 
 def _parse_in_parts(text: str, source: Source) -> Parsed:
-    stages: list[Stage] = []
-    actors: list[Actor] = []
-    invariants: list[Invariant] = []
+    statements: list[object] = []
     faults: list[TaskFault] = []
     defined: set[str] = set()
     used: set[str] = set()
     for chunk in split(text):
         try:
-            part = read("\n" * (chunk.line - 1) + " " * (chunk.column - 1) + chunk.text)
+            statements += read_statements(_in_place(chunk))
         except UnexpectedInput as e:
-            faults.append(name_mistake(chunk, source) or _unexpected(e, chunk, source))
-            first = re.match(rf"\s*<?\s*({NAME})", chunk.text)
+            faults.append(name_mistake(_near(chunk, e), source) or _unexpected(e, chunk, source))
+            first = DECLARES.match(chunk.text)
             defined |= {first[1]} if first else set()
             used |= set(re.findall(NAME, chunk.text))
-        else:
-            stages += part.stages
-            actors += part.actors
-            invariants += part.invariants
-    task = Task(tuple(stages), tuple(actors), tuple(invariants), source.file)
     if not faults:  # each part reads well, but not all of them together
         faults = [_whole(text, source)]
+    task = collect(statements, source.file)
     return Parsed(task, tuple(faults), frozenset(defined), frozenset(used))
+
+
+def _in_place(chunk: Chunk) -> str:
+    """The statement with so much blank before it that its places are those in its file."""
+    return "\n" * (chunk.line - 1) + " " * (chunk.column - 1) + chunk.raw
+
+
+def _near(chunk: Chunk, error: UnexpectedInput) -> Chunk:
+    """A statement, cut around the error when it is so long that looking at all of it takes long."""
+    if len(chunk.text) <= LONGEST:
+        return chunk
+    starts = [0, *(m.end() for m in re.finditer("\n", chunk.text))]
+    row = min(max(0, error.line - chunk.line), len(starts) - 1)
+    column = error.column - (chunk.column if row == 0 else 1)
+    at = min(len(chunk.text), max(0, starts[row] + column))
+    start, end = max(0, at - LONGEST // 2), at + LONGEST // 4
+    line, column = chunk.position(start)
+    return Chunk(chunk.text[start:end], line, column)
 
 
 def split(text: str) -> Iterator[Chunk]:
@@ -181,20 +115,22 @@ def split(text: str) -> Iterator[Chunk]:
     Statements begin at `<name> ::=` anywhere, at lines that look like the beginning of one,
     and at unindented lines that begin with a name that is not defined elsewhere.
     """
-    heads = {m[0].split(">")[0].strip("< ") for m in HEAD.finditer(text)}
-    starts = {m.start() for m in HEAD.finditer(text)}
-    offset, before = 0, ""
-    for line in text.split("\n"):
+    code = without_texts(text)
+    heads = {m[0].split(">")[0].strip("< ") for m in HEAD.finditer(code)}
+    starts = {m.start() for m in MARKED_HEAD.finditer(code)}
+    lines = [0]
+    before = ""
+    for line in code.split("\n"):
         if _begins(line, before, heads):
-            starts.add(offset + len(line) - len(line.lstrip(" ")))
+            starts.add(lines[-1] + len(line) - len(line.lstrip(" ")))
         before = line if line.strip() else before
-        offset += len(line) + 1
+        lines.append(lines[-1] + len(line) + 1)
     cuts = sorted({0, *starts, len(text)})
     for a, b in pairwise(cuts):
-        if text[a:b].strip():
-            row = text.count("\n", 0, a) + 1
-            column = a - (text.rfind("\n", 0, a) + 1) + 1
-            yield Chunk(text[a:b].rstrip(), row, column)
+        if code[a:b].strip() or text[a:b].strip():
+            row = bisect_right(lines, a)
+            raw = text[a:b].rstrip()
+            yield Chunk(code[a : a + len(raw)], row, a - lines[row - 1] + 1, raw)
 
 
 def _begins(line: str, before: str, heads: set[str]) -> bool:
@@ -222,7 +158,7 @@ def _whole(text: str, source: Source) -> TaskFault:
     try:
         read(text)
     except UnexpectedInput as e:
-        return _unexpected(e, Chunk(text, 1, 1), source)
+        return _unexpected(e, Chunk(text, 1, 1, text), source)
     return TaskFault("E101", "text that is not part of the language", source.place(1, 1))
 
 
@@ -240,9 +176,22 @@ SAID = {
     "VBAR": "`|`",
     "AMPERSAND": "`&`",
     "ACTOR": "`actor`",
+    "UNIT": "a unit",
+    "COUNT": "a whole number",
+    "TEXT": "a text in double quotes",
+    "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
+    "COMPARE": "`<` or `>`",
+    "_TIMES": "`times`",
+    "AT": "`at least` or `at most`",
+    "ANY": "`any order`",
+    "OPTIONAL": "`optional actor`",
+    "TASK": "`task`",
     "$END": "the end of the file",
 }
-KEYWORDS = ("actor", "is", "or", "never", "always", "during", "for", "within")
+KEYWORDS = (
+    *WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
+    "ends", "progresses", "fails", "when", "and", "not",
+)  # fmt: skip
 
 
 def _unexpected(error: UnexpectedInput, chunk: Chunk, source: Source) -> TaskFault:
@@ -261,8 +210,13 @@ def _unexpected(error: UnexpectedInput, chunk: Chunk, source: Source) -> TaskFau
         what,
         source.place(line, column, max(1, len(found))),
         expected=_said(allowed or set()),
-        hint=did_you_mean(found, KEYWORDS) if found.isidentifier() else None,
+        hint=did_you_mean(found, KEYWORDS) if _slipped(found) else None,
     )
+
+
+def _slipped(found: str) -> bool:
+    """Whether a word may be a slip of the pen for a word of the language."""
+    return found.isidentifier() and found not in KEYWORDS
 
 
 def _said(terminals: set[str]) -> str | None:
@@ -274,7 +228,7 @@ def _said(terminals: set[str]) -> str | None:
 
 
 def _word_at(chunk: Chunk, line: int, column: int) -> str:
-    rows = chunk.text.split("\n")
+    rows = chunk.raw.split("\n")
     row = rows[min(max(0, line - chunk.line), len(rows) - 1)]
     start = column - 1 - (chunk.column - 1 if line == chunk.line else 0)
     match = re.match(r"\w+|\S", row[max(0, start) :])

@@ -17,6 +17,8 @@ from visup.agent import (
 )
 from visup.rules.sentences import describe
 from visup.tasks.sentences import stage_sentence, verdict_sentence
+from visup.tasks.structure import stages_inside
+from visup.tasks.tree import Task
 from visup.tasks.verify import BAD
 
 KINDS = {
@@ -29,13 +31,14 @@ KINDS = {
 }
 
 
-def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind) -> Iterator[Event]:
+def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) -> Iterator[Event]:
     """Events of what changed between two beliefs about a task.
 
     Args:
         before: The belief of the last step.
         now: The belief of this step.
         mind: The mind, for the time; it may still hold the old belief.
+        task: The task, for the texts of its stages.
 
     Yields:
         Events of stages in the order of the task, then a change of the verdict.
@@ -48,6 +51,8 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind) -> Iterator[Ev
             event = _stage_event(kind, stage, now, mind)
             if first and kind == "stage_started" and event.objects:
                 event = replace(event, text=_introduction(stage, now, mind))
+            if kind == "stage_started":
+                event = replace(event, text=event.text + _own_words(stage.stage, before, task))
             yield event
     if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
         yield _verdict_event(now, mind)
@@ -106,6 +111,17 @@ def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
     """The sentence with which a task begins: it says who is believed to take part."""
     who = ", and ".join(describe(mind, i, n) for n, i in enumerate(_objects(belief)))
     return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
+
+
+def _own_words(name: str, before: TaskBelief, task: Task) -> str:
+    """What the task file itself says of a stage that begins, and of those that begin with it."""
+    begun = {s.stage for s in before.stages if s.status is not Status.PENDING}
+    groups = [s for s in task.stages if s.text and s.name != name]
+    inside = ((g, stages_inside(task, g.name)) for g in groups)
+    texts = [g.text for g, names in inside if name in names and not names & begun]
+    own = task.stage(name)
+    texts += [own.text] if own and own.text else []
+    return "".join(f" {_capital(t).rstrip('.')}." for t in texts)
 
 
 def _verdict_event(belief: TaskBelief, mind: Mind) -> Event:

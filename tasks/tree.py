@@ -3,169 +3,77 @@
 `str(node)` is text of the task language and reads back as the same node; where a node stands in
 its file (`span`) takes no part in equality. Spacing, comments and needless brackets are not kept.
 
-Read next: `read.py` (text to tree), `check.py` (what a tree must also satisfy).
+Read before: `conditions.py` and `courses.py`. Read next: `read.py` (text to tree),
+`check.py` (what a tree must also satisfy).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Literal
 
-SECONDS_PER_UNIT = {"ms": 0.001, "s": 1.0, "min": 60.0, "h": 3600.0}
+from visup.tasks.conditions import (
+    NOWHERE,
+    Action,
+    Amount,
+    Comparison,
+    Condition,
+    Name,
+    Span,
+    number_text,
+)
+from visup.tasks.courses import (
+    AnyOrder,
+    Choice,
+    Clause,
+    Counted,
+    Course,
+    Deadline,
+    Hold,
+    Judged,
+    Reference,
+    Repeated,
+    Sequence,
+    Sign,
+    Timed,
+    Together,
+    children,
+    walk,
+)
 
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Where a node stands: lines and columns counted from 1, the end column exclusive."""
-
-    line: int = 0
-    column: int = 0
-    end_line: int = 0
-    end_column: int = 0
-
-
-NOWHERE = Span()
-
-
-@dataclass(frozen=True, slots=True)
-class Duration:
-    """An amount of time with its unit, as written: `60 s`, `2 min`."""
-
-    amount: float
-    unit: str = "s"
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    @property
-    def seconds(self) -> float:
-        """The duration in seconds; an unknown unit counts as seconds (`check` refuses it)."""
-        return self.amount * SECONDS_PER_UNIT.get(self.unit, 1.0)
-
-    def __str__(self) -> str:
-        return f"{_number(self.amount)} {self.unit}"
-
-
-@dataclass(frozen=True, slots=True)
-class Hold:
-    """`for 5 s`: what it stands behind must hold so long without a break."""
-
-    duration: Duration
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return f"for {self.duration}"
-
-
-@dataclass(frozen=True, slots=True)
-class Deadline:
-    """`within 60 s`: what it stands behind must be over so long after it began."""
-
-    duration: Duration
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return f"within {self.duration}"
-
-
-Clause: TypeAlias = Hold | Deadline
-
-
-@dataclass(frozen=True, slots=True)
-class Name:
-    """A name where it is used, such as an actor in an action."""
-
-    text: str
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return self.text
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """`converging(arm, satellite)`: a relation that should hold between actors."""
-
-    name: str
-    actors: tuple[Name, ...]
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return f"{self.name}({', '.join(map(str, self.actors))})"
-
-
-@dataclass(frozen=True, slots=True)
-class Reference:
-    """`<approach>`: the stage of that name, here."""
-
-    stage: str
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return f"<{self.stage}>"
-
-
-@dataclass(frozen=True, slots=True)
-class Repeated:
-    """`a?` (may be left out), `a*` (any number of times), `a+` (at least once)."""
-
-    item: Course
-    mark: Literal["?", "*", "+"]
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return f"{_within(self.item, ATOM)}{self.mark}"
-
-
-@dataclass(frozen=True, slots=True)
-class Timed:
-    """`a for 5 s within 60 s`: a course with clauses."""
-
-    item: Course
-    clauses: tuple[Clause, ...]
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return " ".join([_within(self.item, REPEATED), *map(str, self.clauses)])
-
-
-@dataclass(frozen=True, slots=True)
-class Together:
-    """`a & b`: at the same time."""
-
-    parts: tuple[Course, ...]
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return " & ".join(_within(p, TIMED) for p in self.parts)
-
-
-@dataclass(frozen=True, slots=True)
-class Sequence:
-    """`a b`: one after the other."""
-
-    items: tuple[Course, ...]
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return " ".join(_within(i, TOGETHER) for i in self.items)
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """`a | b`: one of them."""
-
-    options: tuple[Course, ...]
-    span: Span = field(default=NOWHERE, compare=False, repr=False)
-
-    def __str__(self) -> str:
-        return " | ".join(_within(o, SEQUENCE) for o in self.options)
-
-
-Course: TypeAlias = Choice | Sequence | Together | Timed | Repeated | Action | Reference
-"""What a stage asks for."""
-
-CHOICE, SEQUENCE, TOGETHER, TIMED, REPEATED, ATOM = range(6)
-BINDS = {Choice: CHOICE, Sequence: SEQUENCE, Together: TOGETHER, Timed: TIMED, Repeated: REPEATED}
+__all__ = [
+    "NOWHERE",
+    "Action",
+    "Actor",
+    "Actors",
+    "Amount",
+    "AnyOrder",
+    "Choice",
+    "Clause",
+    "Comparison",
+    "Condition",
+    "Counted",
+    "Course",
+    "Deadline",
+    "Hold",
+    "Include",
+    "Invariant",
+    "Judged",
+    "Name",
+    "Parameter",
+    "Reference",
+    "Repeated",
+    "Sequence",
+    "Sign",
+    "Span",
+    "Stage",
+    "Task",
+    "Timed",
+    "Together",
+    "ZoneDeclaration",
+    "children",
+    "walk",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,41 +94,95 @@ class Stage:
     Attributes:
         name: The name between the angle brackets.
         body: Its course, or `Actors` when the rule is an action in the strict form.
+        text: What the narrative says when it begins; empty when the file says nothing.
+        is_task: Whether it is marked with `task`.
         span: Where its head stands.
     """
 
     name: str
     body: Course | Actors
+    text: str = ""
+    is_task: bool = False
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return f"<{self.name}> ::= {self.body}"
+        mark, text = "task " if self.is_task else "", f'"{self.text}" ' if self.text else ""
+        return f"{mark}<{self.name}> ::= {text}{self.body}"
 
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """`actor satellite is spartan201_approx or hubble`: the models that an actor may be."""
+    """`actor satellite is spartan201_approx or hubble size 1.6 m`.
+
+    Attributes:
+        name: Its name in the file.
+        models: The models that it may be; empty when only its size is said, or that it is optional.
+        size: Its largest extent, or None.
+        optional: Whether what is asked of it may be left out.
+    """
 
     name: str
-    models: tuple[str, ...]
+    models: tuple[str, ...] = ()
+    size: Amount | None = None
+    optional: bool = False
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return f"actor {self.name} is {' or '.join(self.models)}"
+        said = [*(["optional"] if self.optional else []), "actor", self.name]
+        said += [f"is {' or '.join(self.models)}"] if self.models else []
+        return " ".join([*said, *([f"size {self.size}"] if self.size else [])])
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneDeclaration:
+    """`zone berth is (100, 50) (300, 50) (300, 200)`: corners in pixels; none for one drawn elsewhere."""
+
+    name: str
+    corners: tuple[tuple[float, float], ...] = ()
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        corners = " ".join(f"({number_text(x)}, {number_text(y)})" for x, y in self.corners)
+        return f"zone {self.name}{' is ' + corners if corners else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """`parameter patience is 90 s`."""
+
+    name: str
+    amount: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"parameter {self.name} is {self.amount}"
+
+
+@dataclass(frozen=True, slots=True)
+class Include:
+    """`include "common.task"`: the statements of another file, as if they stood here."""
+
+    path: str
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f'include "{self.path}"'
 
 
 @dataclass(frozen=True, slots=True)
 class Invariant:
-    """`never touching(arm, radiator)`, `always ... during <approach>`."""
+    """`never touching(arm, radiator)`, `always ... for 2 s during <approach>`."""
 
     when: Literal["never", "always"]
-    action: Action
-    during: Reference | None = None
+    condition: Condition
+    lasting: Hold | None = None
+    during: tuple[Reference, ...] = ()
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        during = f" during {self.during}" if self.during else ""
-        return f"{self.when} {self.action}{during}"
+        lasting = f" {self.lasting}" if self.lasting else ""
+        during = f" during {' or '.join(map(str, self.during))}" if self.during else ""
+        return f"{self.when} {self.condition}{lasting}{during}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,56 +190,60 @@ class Task:
     """A task file.
 
     Attributes:
-        stages: Its rules in the order of the file; the first one is the task itself.
+        stages: Its rules in the order of the file.
         actors: Declarations of actors.
         invariants: What must never or always hold.
+        zones: Parts of the image that it names.
+        parameters: Amounts that it names.
+        includes: Files that it includes; their statements stand among the others.
         file: Name of the file, for messages.
+        root: The rule that is the task when the file has several; empty for its first one.
     """
 
     stages: tuple[Stage, ...]
     actors: tuple[Actor, ...] = ()
     invariants: tuple[Invariant, ...] = ()
+    zones: tuple[ZoneDeclaration, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    includes: tuple[Include, ...] = ()
     file: str = field(default="<text>", compare=False)
+    root: str = ""
+
+    @property
+    def declared(self) -> tuple[Actor | ZoneDeclaration | Parameter, ...]:
+        """Declarations of actors, zones and parameters."""
+        return (*self.actors, *self.zones, *self.parameters)
+
+    @property
+    def roots(self) -> tuple[str, ...]:
+        """The tasks of the file: the rules marked with `task`, else the first one."""
+        marked = tuple(dict.fromkeys(s.name for s in self.stages if s.is_task))
+        return marked or tuple(s.name for s in self.stages[:1])
 
     @property
     def name(self) -> str:
-        """Name of the task, which is that of its first rule."""
-        return self.stages[0].name if self.stages else ""
+        """Name of the task."""
+        return self.root or next(iter(self.roots), "")
 
     def stage(self, name: str) -> Stage | None:
         """The first rule of that name, or None."""
         return next((s for s in self.stages if s.name == name), None)
 
+    def actor(self, name: str) -> Actor:
+        """What is declared of an actor."""
+        return next((a for a in self.actors if a.name == name), Actor(name))
+
     def models(self, actor: str) -> tuple[str, ...]:
         """Models that an actor may be: as declared, else the one of the actor's own name."""
-        return next((a.models for a in self.actors if a.name == actor), (actor,))
+        return self.actor(actor).models or (actor,)
+
+    def amount(self, amount: Amount) -> Amount:
+        """What an amount stands for: itself, or what its parameter is."""
+        if not amount.parameter:
+            return amount
+        found = (p.amount for p in self.parameters if p.name == amount.parameter)
+        return next(found, amount)
 
     def __str__(self) -> str:
-        return "\n".join(map(str, (*self.actors, *self.stages, *self.invariants)))
-
-
-def children(course: Course) -> tuple[Course, ...]:
-    """The courses directly inside one."""
-    match course:
-        case Choice(options=inner) | Sequence(items=inner) | Together(parts=inner):
-            return inner
-        case Timed(item=item) | Repeated(item=item):
-            return (item,)
-    return ()
-
-
-def walk(course: Course) -> Iterator[Course]:
-    """A course and all courses inside it, outermost first, in the order of the text."""
-    yield course
-    for child in children(course):
-        yield from walk(child)
-
-
-def _within(course: Course, least: int) -> str:
-    """A course as text, in brackets when it binds looser than its place asks for."""
-    text = str(course)
-    return text if BINDS.get(type(course), ATOM) >= least else f"({text})"
-
-
-def _number(amount: float) -> str:
-    return str(int(amount)) if amount == int(amount) and abs(amount) < 1e15 else repr(amount)
+        said = (*self.includes, *self.parameters, *self.actors, *self.zones)
+        return "\n".join(map(str, (*said, *self.stages, *self.invariants)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from visup.agent import Status, Truth
 from visup.tasks.actions import Meaning
 from visup.tasks.course import Step
-from visup.tasks.observe import Sighting
+from visup.tasks.observe import UNSEEN, Sighting
 from visup.tasks.settings import TaskSettings
 
 BAD = (Status.FAILING, Status.FAILED)
@@ -37,6 +37,8 @@ class Watch:
         late: Whether a `within` ran out before the step was over; there is no way back from that.
         ceased: Whether it once held and then was seen not to.
         unseen_since: Since when nothing is known about it, or None.
+        denied: Whether what the course says of its end was last seen not to hold.
+        opened: Whether what the course says of its beginning was seen (see `Sign`).
         confidence: Of the last sighting, 0 to 1.
     """
 
@@ -60,6 +62,8 @@ class Watch:
     ceased: bool = False
     unseen_since: float | None = None
     confidence: float = 1.0
+    denied: bool = False
+    opened: bool = False
 
 
 def entered(now: float) -> Watch:
@@ -90,6 +94,10 @@ def update(
     Returns:
         What is kept now, with the new status.
     """
+    if step.sign("begins") is not None and not watch.opened:
+        # Until it begins, nothing that is seen speaks for or against it.
+        watch = replace(watch, opened=seen.entry is not None)
+        seen = seen if watch.opened else replace(UNSEEN, observed=seen.observed)
     noted = _note_contrary(_note_progress(watch, step, meaning, seen, now, dt, settings), seen, now)
     late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
     noted = replace(noted, late=late)
@@ -113,7 +121,8 @@ def update(
 
 def over(watch: Watch, step: Step, meaning: Meaning) -> bool:
     """Whether a step is over by itself, whatever comes next."""
-    return watch.fulfilled and (not meaning.lasts or step.hold_s is not None)
+    told = step.hold_s is not None or step.sign("ends") is not None
+    return watch.fulfilled and (not meaning.lasts or told)
 
 
 def overdue(step: Step, now: float) -> bool:
@@ -142,18 +151,22 @@ def _note_progress(
             held, ceased = 0.0, ceased or watch.fulfilled
     helping = seen.helps is not None
     must = meaning.hold_s if step.hold_s is None else step.hold_s
+    complete = held >= must - 1e-9
+    if seen.over is not None:
+        complete = seen.over is Truth.TRUE and (complete or step.hold_s is None)
     return replace(
         watch,
         begun=_first(watch.begun, now) if helping else watch.begun,
         held=watch.held or seen.holds is Truth.TRUE,
         held_s=held,
         broken_since=broken,
-        fulfilled=watch.fulfilled or held >= must - 1e-9,
+        fulfilled=watch.fulfilled or complete,
         helped_by=seen.helps.name if seen.helps else watch.helped_by,
         helped_since=seen.helps.since if seen.helps else watch.helped_since,
         helped_at=now if helping else watch.helped_at,
         better_since=_first(watch.better_since, now) if helping and not seen.contrary else None,
         ceased=ceased,
+        denied=watch.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
         unseen_since=None,
         confidence=seen.helps.confidence if seen.helps else 1.0,
     )
@@ -163,7 +176,7 @@ def _note_contrary(watch: Watch, seen: Sighting, now: float) -> Watch:
     """A contrary counts from when it was true within this step; holding outweighs it."""
     if not seen.observed:
         return watch
-    if seen.contrary is None or seen.holds is Truth.TRUE:
+    if seen.contrary is None or (seen.holds is Truth.TRUE and not seen.stern):
         return replace(watch, contrary=None, contrary_since=None)
     since = max(watch.entered, seen.contrary.since)
     if watch.contrary == seen.contrary.name and watch.contrary_since is not None:

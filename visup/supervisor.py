@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from visup.agent import Behaviour, Mind, Severity, Verdict
@@ -18,8 +18,8 @@ from visup.percepts.video import Source, open_source
 from visup.rules.language import load_rules
 from visup.rules.thinkers import default_thinkers
 from visup.settings import WatchSettings
-from visup.tasks import load_task
-from visup.tasks.structure import task_actors
+from visup.tasks import load_tasks
+from visup.tasks.structure import sizes, task_actors, undrawn
 from visup.tasks.supervise import finish, task_thinker
 from visup.zones import load_zones
 
@@ -45,14 +45,16 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
         VisupError: A task, rules file, zones file, model database or behaviour is not as it should
             be, or an actor is bound that no task has or to a model that the database lacks.
     """
-    tasks = [load_task(name) for name in settings.tasks]
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    zones = load_zones(settings.zones) if settings.zones else ()
+    _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     return Agent(
-        behaviours=_behaviours(settings, database),
+        behaviours=_behaviours(settings, database, sizes(tasks, settings.actors)),
         thinkers=_thinkers(settings, tasks),
         actors=settings.actors,
-        zones=load_zones(settings.zones) if settings.zones else (),
+        zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
     )
@@ -78,10 +80,15 @@ _GRAVITY = (
 )
 
 
-def _behaviours(settings: WatchSettings, database: ModelDatabase | None) -> list[Behaviour]:
+def _behaviours(
+    settings: WatchSettings, database: ModelDatabase | None, sizes_m: Mapping[str, float]
+) -> list[Behaviour]:
     seeing: list[Behaviour] = [HealthBehaviour(), MotionBehaviour()]
     if database is not None:
-        seeing += [ShapeBehaviour(database), DepthBehaviour(database, settings.fov_vertical_deg)]
+        seeing += [
+            ShapeBehaviour(database),
+            DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
+        ]
     registry = discover() if settings.plugins else None
     named = [registry.make(name) for name in settings.plugins] if registry else []
     own = [b for path in settings.behaviours for b in from_file(path)]
@@ -93,6 +100,19 @@ def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     interpreting = default_thinkers(rules=rules or None)
     match = (task_thinker(tasks),) if tasks else ()
     return Thinkers(interpreting.update, interpreting.cogitate, match)
+
+
+def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
+    """A zone that nobody has drawn could never be seen to be entered or left."""
+    for task in tasks:
+        for zone in undrawn(task):
+            if zone in drawn:
+                continue
+            raise SettingsError(
+                f"zone `{zone}` of task `{task.name}` is drawn nowhere",
+                where=task.file,
+                expected=f"`zone {zone} is (100, 50) (300, 50) (300, 200)`, or a zones file with it",
+            )
 
 
 def _check_actors(

@@ -26,7 +26,7 @@ from visup.agent.records import (
     Report,
     ReportState,
 )
-from visup.percepts.depth import DepthBehaviour, focal_px
+from visup.percepts.depth import DepthBehaviour, extents, focal_px
 from visup.percepts.shape.behaviour import ShapeBehaviour, ShapeSettings
 from visup.percepts.shape.compare import Shape
 from visup.percepts.shape.database import ModelDatabase, Ranking
@@ -235,3 +235,21 @@ def test_the_database_tells_sizes_that_hypotheses_lack(database: Counting) -> No
     (percept,) = DepthBehaviour(database, 40.0).perceive(frame(0.0), seen, ())
     expected = focal_px(SIZE[1], 40.0) / math.sqrt(float(ZOO["star"].sum()))
     assert percept.value.depth == pytest.approx(expected)
+
+
+def test_a_measured_size_goes_before_that_of_the_database(database: Counting) -> None:
+    view = next(v for v in database.views if v.area is not None and not v.cut)
+    extent = extents(database, [view.name])[view.name]
+    seen = observation(
+        0.0,
+        region=[region(ZOO[view.name])],
+        hypothesis=[Hypothesis(1, view.name, view.number, 0.9)],
+    )
+    (plain,) = DepthBehaviour(database, 40.0).perceive(frame(0.0), seen, ())
+    (twice,) = DepthBehaviour(database, 40.0, {view.name: 2 * extent}).perceive(
+        frame(0.0), seen, ()
+    )
+    (other,) = DepthBehaviour(database, 40.0, {"nobody": 3.0}).perceive(frame(0.0), seen, ())
+    assert twice.value.depth == pytest.approx(2 * plain.value.depth)
+    assert twice.value.sigma == pytest.approx(2 * plain.value.sigma)
+    assert other.value == plain.value

@@ -39,6 +39,15 @@ def test_printing_is_stable(task: Task) -> None:
         "<a> <b>+ (<c> | <d>)?",
         "((a(x) b(x)) c(x)) d(x)",
         "a(x) (b(x) (c(x) d(x)))",
+        "a(x) for 5 s at least 2 times within 60 s",
+        "(a(x) for 5 s) within 60 s",
+        "(a(x) at least 2 times) at most 3 times",
+        "a(x) at least 2 times at most 3 times",
+        "a(x) fails when b(x) or c(x) and not d(x) for 2 s & e(x)",
+        "(a(x) fails when b(x)) for 5 s",
+        "a(x) ends when (b(x) or c(x)) and d(x)",
+        "any order (a(x) b(x), <c> | d(x), gap(x, y) < 20 px)",
+        "gap(x, y) < reach <b>",
     ],
 )
 def test_brackets_are_kept_where_they_mean_something_and_nowhere_else(course: str) -> None:

@@ -5,26 +5,36 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from visup.tasks.chunk import WORDS
+from visup.tasks.conditions import Both, Condition, Denied, Either
 from visup.tasks.tree import (
     Action,
     Actor,
     Actors,
+    Amount,
+    AnyOrder,
     Choice,
     Clause,
+    Comparison,
+    Counted,
     Course,
     Deadline,
-    Duration,
     Hold,
+    Include,
     Invariant,
+    Judged,
     Name,
+    Parameter,
     Reference,
     Repeated,
     Sequence,
+    Sign,
     Stage,
     Task,
     Timed,
     Together,
+    ZoneDeclaration,
 )
+from visup.tasks.units import UNITS
 
 names = st.from_regex(r"[a-zA-Zä_][a-z0-9_é]{0,8}", fullmatch=True).filter(lambda n: n not in WORDS)
 models = st.from_regex(r"[a-z0-9][a-z0-9_.\-]{0,8}", fullmatch=True).filter(
@@ -33,13 +43,27 @@ models = st.from_regex(r"[a-z0-9][a-z0-9_.\-]{0,8}", fullmatch=True).filter(
 amounts = st.one_of(
     st.integers(0, 10**6).map(float), st.floats(0.0, 1e9, allow_nan=False, allow_infinity=False)
 )
-durations = st.builds(Duration, amounts, st.sampled_from(["s", "ms", "min", "h"]))
-clauses: st.SearchStrategy[Clause] = st.one_of(
-    st.builds(Hold, durations), st.builds(Deadline, durations)
+amounts_said = st.one_of(
+    st.builds(Amount, amounts, st.sampled_from([*UNITS, "parsec"])),
+    st.builds(lambda n: Amount(0.0, "", n), names),
 )
+holds = st.builds(Hold, amounts_said)
+clauses: st.SearchStrategy[Clause] = st.one_of(holds, st.builds(Deadline, amounts_said))
 actors = st.lists(names.map(Name), min_size=1, max_size=3).map(tuple)
 actions = st.builds(Action, names, actors)
+comparisons = st.builds(Comparison, actions, st.sampled_from(["<", "<=", ">", ">="]), amounts_said)
 references = st.builds(Reference, names)
+facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
+
+
+def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]:
+    several = st.lists(inner, min_size=2, max_size=3).map(tuple)
+    return st.one_of(st.builds(Both, several), st.builds(Either, several), st.builds(Denied, inner))
+
+
+conditions = st.recursive(facts, _joined, max_leaves=4)
+kinds = st.sampled_from(["begins", "ends", "progresses", "fails"])
+signs = st.builds(Sign, kinds, conditions, st.none() | holds)
 
 
 def _several(inner: st.SearchStrategy[Course]) -> st.SearchStrategy[tuple[Course, ...]]:
@@ -51,22 +75,44 @@ def _larger(inner: st.SearchStrategy[Course]) -> st.SearchStrategy[Course]:
         st.builds(Choice, _several(inner)),
         st.builds(Sequence, _several(inner)),
         st.builds(Together, _several(inner)),
+        st.builds(AnyOrder, _several(inner)),
+        st.builds(Judged, inner, st.lists(signs, min_size=1, max_size=2).map(tuple)),
+        st.builds(Counted, inner, st.integers(0, 9), st.none() | st.integers(0, 9)),
         st.builds(Timed, inner, st.lists(clauses, min_size=1, max_size=2).map(tuple)),
         st.builds(Repeated, inner, st.sampled_from(["?", "*", "+"])),
     )
 
 
-atoms: st.SearchStrategy[Course] = st.one_of(actions, references)
+atoms: st.SearchStrategy[Course] = st.one_of(actions, references, comparisons)
 courses = st.recursive(atoms, _larger, max_leaves=8)
-stages = st.builds(Stage, names, st.one_of(courses, st.builds(Actors, actors)))
+texts = st.text(st.characters(exclude_characters='"\n', exclude_categories=["Cs"]), max_size=12)
+stages = st.builds(
+    Stage, names, st.one_of(courses, st.builds(Actors, actors)), texts, st.booleans()
+)
+sizes = st.none() | amounts_said
+declared = st.one_of(
+    st.builds(
+        Actor, names, st.lists(models, min_size=1, max_size=3).map(tuple), sizes, st.booleans()
+    ),
+    st.builds(Actor, names, st.just(()), amounts_said, st.booleans()),
+    st.builds(Actor, names, st.just(()), sizes, st.just(True)),
+)
+corners = st.lists(st.tuples(amounts, amounts), min_size=3, max_size=4).map(tuple)
 tasks = st.builds(
     Task,
     st.lists(stages, min_size=1, max_size=4).map(tuple),
+    st.lists(declared, max_size=2).map(tuple),
     st.lists(
-        st.builds(Actor, names, st.lists(models, min_size=1, max_size=3).map(tuple)), max_size=2
-    ).map(tuple),
-    st.lists(
-        st.builds(Invariant, st.sampled_from(["never", "always"]), actions, st.none() | references),
+        st.builds(
+            Invariant,
+            st.sampled_from(["never", "always"]),
+            conditions,
+            st.none() | holds,
+            st.lists(references, max_size=2).map(tuple),
+        ),
         max_size=2,
     ).map(tuple),
+    st.lists(st.builds(ZoneDeclaration, names, st.just(()) | corners), max_size=2).map(tuple),
+    st.lists(st.builds(Parameter, names, amounts_said), max_size=2).map(tuple),
+    st.lists(st.builds(Include, texts), max_size=1).map(tuple),
 )

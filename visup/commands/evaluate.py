@@ -10,6 +10,7 @@ import typer
 
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
+from visup.commands.eval_tasks import tasks
 from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
@@ -27,6 +28,7 @@ app.command("views")(views)
 app.command("relations")(relations)
 app.command("rules")(rules)
 app.command("reasoning")(reasoning)
+app.command("tasks")(tasks)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]

@@ -1,66 +1,123 @@
-"""`visup task`: check task files, show their trees, list the tasks that ship with visup."""
+"""`visup task`: check, lay out, show, explain and walk through task files."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from visup.commands.task_walk import simulate
+
 if TYPE_CHECKING:
-    from rich.tree import Tree
-
     from visup.agent.errors import VisupError
-    from visup.tasks.tree import Course, Task
 
-app = typer.Typer(help="Check, show and list task files.", no_args_is_help=True)
+app = typer.Typer(help="Check, show, lay out and try task files.", no_args_is_help=True)
+app.command("simulate")(simulate)
 
 Files = Annotated[list[str], typer.Argument(help="Task files, or names of shipped tasks.")]
+File = Annotated[str, typer.Argument(help="A task file or shipped task.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
+Without = Annotated[
+    list[str] | None,
+    typer.Option(help="A kind of percept that will not be at hand, such as depth; repeatable."),
+]
 
 
 @app.command()
-def check(files: Files, as_json: AsJson = False) -> None:
+def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
     """Tell every mistake of some task files; exit code 2 when there is any."""
-    from visup.agent.errors import ManyErrors, VisupError
-    from visup.tasks.load import load_task
+    from visup.agent.errors import ManyErrors, SettingsError, VisupError
+    from visup.tasks.actions import ALL_PERCEPTS
+    from visup.tasks.diagnostics import examine
+    from visup.tasks.files import read_text
 
+    odd = set(without or ()) - ALL_PERCEPTS
+    if odd:
+        what = f"there is no kind of percept called `{min(odd)}`"
+        raise SettingsError(what, expected=f"one of: {', '.join(sorted(ALL_PERCEPTS))}")
     found: dict[str, list[VisupError]] = {}
     for file in files:
-        found[file] = []
         try:
-            load_task(file)
-        except ManyErrors as e:
-            found[file] += e.errors
+            faults = examine(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
+            found[file] = [*faults]
         except VisupError as e:
-            found[file].append(e)
-    faults = [e for errors in found.values() for e in errors]
+            found[file] = [e]
+    told = [e for errors in found.values() for e in errors]
     if as_json:
         typer.echo(json.dumps({f: [_as_data(e) for e in es] for f, es in found.items()}, indent=2))
-        raise typer.Exit(2 if faults else 0)
+        raise typer.Exit(2 if told else 0)
     for file, errors in found.items():
         if not errors:
             typer.echo(f"{file}: ok")
-    if len(faults) == 1:
-        raise faults[0]
-    if faults:
-        raise ManyErrors(faults)
+    if len(told) == 1:
+        raise told[0]
+    if told:
+        raise ManyErrors(told)
+
+
+@app.command("format")
+def format_files(
+    files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
+    only_check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; exit code 1 when a layout differs.")
+    ] = False,
+) -> None:
+    """Give task files one layout; words, comments and meaning stay as they are."""
+    from visup.agent.errors import OutputError, TaskError
+    from visup.tasks.files import read_text
+
+    differ = False
+    for file in files:
+        text = sys.stdin.read() if file == "-" else read_text(file)
+        new = laid_out(text, "<stdin>" if file == "-" else file)
+        differ = differ or new != text
+        if file == "-" and not only_check:
+            typer.echo(new, nl=False)
+        elif new != text and only_check:
+            typer.echo(f"{file}: not laid out")
+        elif new != text:
+            if not Path(file).is_file():
+                raise TaskError("it ships with visup and is not changed", where=file)
+            try:
+                Path(file).write_text(new, encoding="utf-8")
+            except OSError as e:
+                what = f"cannot be written: {e.strerror or e}"
+                raise OutputError(what, where=file) from e
+            typer.echo(f"{file}: laid out")
+    raise typer.Exit(1 if only_check and differ else 0)
 
 
 @app.command()
-def show(file: Annotated[str, typer.Argument(help="A task file or shipped task.")]) -> None:
-    """Draw the tree of a task."""
-    from rich.console import Console
+def show(
+    file: File,
+    form: Annotated[
+        Literal["tree", "mermaid", "dot"],
+        typer.Option("--format", help="A tree for the terminal, or a picture's source."),
+    ] = "tree",
+) -> None:
+    """Draw a task: its tree, or its flow for Mermaid or Graphviz."""
+    from visup.tasks.load import load_tasks
 
-    from visup.tasks.load import load_task
+    for task in load_tasks(file):
+        if form == "tree":
+            from rich.console import Console
 
-    Console().print(task_tree(load_task(file)))
+            from visup.commands.task_tree import task_tree
+
+            Console().print(task_tree(task))
+        else:
+            from visup.tasks.diagram import dot, flow_of, mermaid
+
+            typer.echo(mermaid(flow_of(task)) if form == "mermaid" else dot(flow_of(task)))
 
 
 @app.command("list")
 def list_tasks(as_json: AsJson = False) -> None:
     """List the tasks that ship with visup, each with the first line of its file."""
-    from visup.tasks.load import read_text, shipped_tasks
+    from visup.tasks.files import read_text, shipped_tasks
 
     about = {name: _first_comment(read_text(name)) for name in shipped_tasks()}
     if as_json:
@@ -71,70 +128,71 @@ def list_tasks(as_json: AsJson = False) -> None:
         typer.echo(f"{name:{width}}  {words}")
 
 
-def task_tree(task: Task) -> Tree:
-    """The tree of a task for the terminal: stages with what they ask for, actors, invariants.
+@app.command()
+def actions(as_json: AsJson = False) -> None:
+    """List all that a stage may ask for: actions, words and quantities of rules, plug-ins' own."""
+    from visup.tasks.actions import known_actions
+    from visup.tasks.describe import written
 
-    Args:
-        task: A task without mistakes.
-
-    Returns:
-        A rich tree; each stage is opened where it is first referred to.
-    """
-    from rich.markup import escape
-    from rich.tree import Tree
-
-    tree = Tree(f"[bold]{escape(task.name)}[/bold]")
-    _grow(tree, task, task.stages[0].name, set())
-    for title, nodes in (("actors", task.actors), ("invariants", task.invariants)):
-        if nodes:
-            branch = tree.add(f"[dim]{title}[/dim]")
-            for node in nodes:
-                branch.add(escape(str(node)))
-    return tree
-
-
-def _grow(tree: Tree, task: Task, name: str, shown: set[str]) -> None:
-    from visup.tasks.tree import Actors
-
-    stage = task.stage(name)
-    if stage is None or name in shown:
+    said = {m.name: (written(m), m.about or m.text) for m in known_actions().values()}
+    if as_json:
+        data = {n: {"written": w, "about": a} for n, (w, a) in said.items()}
+        typer.echo(json.dumps(data, indent=2))
         return
-    shown.add(name)
-    if isinstance(stage.body, Actors):
-        for actor in stage.body.names:
-            tree.add(f"[green]{actor}[/green]")
-    else:
-        _grow_course(tree, task, stage.body, shown)
+    width = max(len(w) for w, _ in said.values())
+    for how, about in sorted(said.values()):
+        typer.echo(f"{how:{width}}  {about}")
 
 
-def _grow_course(tree: Tree, task: Task, course: Course, shown: set[str]) -> None:
-    from rich.markup import escape
+@app.command()
+def explain(
+    code: Annotated[str, typer.Argument(help="A code, as messages show it: E102.")],
+) -> None:
+    """Say what a code means, with a wrong and a right example."""
+    from visup.tasks.explain import explain as explanation
 
-    from visup.tasks.tree import Action, Choice, Reference, Repeated, Sequence, Timed, Together
-
-    match course:
-        case Action():
-            tree.add(f"[cyan]{escape(str(course))}[/cyan]")
-        case Reference(stage=name):
-            again = " [dim](see above)[/dim]" if name in shown else ""
-            _grow(tree.add(f"[bold]<{escape(name)}>[/bold]{again}"), task, name, shown)
-        case Sequence(items=items):
-            for item in items:
-                _grow_course(tree, task, item, shown)
-        case Choice(options=parts) | Together(parts=parts):
-            title = "one of" if isinstance(course, Choice) else "at the same time"
-            branch = tree.add(f"[dim]{title}[/dim]")
-            for part in parts:
-                inner = branch.add("[dim]in turn[/dim]") if isinstance(part, Sequence) else branch
-                _grow_course(inner, task, part, shown)
-        case Timed(item=item, clauses=clauses):
-            words = " ".join(map(str, clauses))
-            _grow_course(tree.add(f"[magenta]{escape(words)}[/magenta]"), task, item, shown)
-        case Repeated(item=item, mark=mark):
-            _grow_course(tree.add(f"[dim]{REPEATS[mark]}[/dim]"), task, item, shown)
+    typer.echo(str(explanation(code)))
 
 
-REPEATS = {"?": "perhaps", "*": "any number of times", "+": "at least once"}
+@app.command()
+def textmate() -> None:
+    """Write the TextMate grammar of task files, for editors that colour text by one."""
+    from visup.tasks.files import textmate_grammar
+
+    typer.echo(textmate_grammar(), nl=False)
+
+
+@app.command()
+def lsp() -> None:
+    """Serve editors over stdin and stdout by the Language Server Protocol (extra `lsp`)."""
+    from visup.agent.errors import ExtraMissingError
+
+    try:
+        from visup.commands.task_server import serve
+    except ModuleNotFoundError as e:
+        if (e.name or "").split(".")[0] not in ("pygls", "lsprotocol"):
+            raise
+        raise ExtraMissingError("`visup task lsp`", "lsp") from e
+    serve()
+
+
+def laid_out(text: str, file: str) -> str:
+    """A text in the layout of visup.
+
+    Raises:
+        TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
+        ManyErrors: The same, for several reasons.
+    """
+    from visup.tasks.cleaning import clean
+    from visup.tasks.diagnostics import raise_all
+    from visup.tasks.faults import Source
+    from visup.tasks.layout import formatted
+    from visup.tasks.syntax import parse
+
+    source = Source(text, file)
+    code, odd = clean(text, source)
+    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
+    return formatted(text)
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:
