@@ -20,6 +20,8 @@ from visup.percepts.motion.image import Floats, WorkImage
 Ints = NDArray[np.int64]
 WINDOW = 11
 CORNER = 0.1  # least ratio of the eigenvalues of a corner's structure tensor
+STEPS_NEAR = 10, 0.03  # most steps of a search, and the step, in pixels, at which it is done: well
+STEPS_FAR = 30, 0.01  # below FLOOR; slow things, seen over long baselines, ask for more
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
 
@@ -175,12 +177,14 @@ def track(
         return Constraints(lag, new.time - old.time, np.zeros(0, np.int64), *_nothing())
     start = points.xy.reshape(-1, 1, 2).copy()
     begin = guess.astype(np.float32).reshape(-1, 1, 2).copy()
-    there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 2)
+    # From one frame to the next dense flow tells where to begin: coarse images would only mislead.
+    near = lag == 1
+    there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 1 if near else 2, near)
     # The way back is nearly known: it needs no coarse images. It begins as far beside as the guess
     # was off, for a search that begins where it should end proves little; over a long baseline,
     # where guesses are poor, no more than that can be asked.
-    aside = there - begin if lag == 1 else np.float32(0)
-    home, back, _ = _follow(old.grey, new.grey, there, start + aside, 0)
+    aside = there - begin if near else np.float32(0)
+    home, back, _ = _follow(old.grey, new.grey, there, start + aside, 0, near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # What is said of points that were lost is not even finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
@@ -203,8 +207,10 @@ def _follow(
     start: Floats,
     begin: Floats,
     levels: int,
+    near: bool,
 ) -> tuple[Floats, NDArray[np.uint8], Floats]:
     """Pyramidal Lucas-Kanade from given starting values: (N, 1, 2), (N, 1), (N, 1)."""
+    most, enough = STEPS_NEAR if near else STEPS_FAR
     end, found, misfit = cv2.calcOpticalFlowPyrLK(
         source,
         target,
@@ -212,6 +218,7 @@ def _follow(
         begin,
         winSize=(WINDOW, WINDOW),
         maxLevel=levels,
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, most, enough),
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         minEigThreshold=1e-5,
     )

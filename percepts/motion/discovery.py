@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +76,7 @@ def slack_of(model: Affine, where: tuple[float, float] = (0.0, 0.0)) -> float:
     Returns:
         Standard deviation, pixels.
     """
-    moved = model.at(np.asarray([where], dtype=np.float32))[0]
-    return 0.1 + 0.05 * float(np.hypot(*moved))
+    return 0.1 + 0.05 * hypot(*model.shift(where))
 
 
 def middle(c: Constraints, index: NDArray[np.int64]) -> Affine:

@@ -26,6 +26,7 @@ class WorkImage:
         tone: (h, w, 3) uint8, the colours with shadows lifted, for appearance and superpixels.
         gx: (h, w) float32, gradient along x, grey levels per pixel.
         gy: (h, w) float32, gradient along y.
+        half: (h / 2, w / 2) uint8, `grey` at half the size, for dense comparison.
     """
 
     time: float
@@ -34,6 +35,7 @@ class WorkImage:
     tone: NDArray[np.uint8]
     gx: Floats
     gy: Floats
+    half: NDArray[np.uint8]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -62,13 +64,19 @@ def prepare(frame: Frame, work_size: int) -> WorkImage:
     scale = min(1.0, work_size / max(height, width))
     if scale < 1.0:
         size = (max(8, round(width * scale)), max(8, round(height * scale)))
-        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        # Down to half the size, four neighbours hold nearly all of the area of a pixel.
+        way = cv2.INTER_LINEAR if scale >= 0.5 else cv2.INTER_AREA
+        image = np.asarray(cv2.resize(image, size, interpolation=way), dtype=np.uint8)
     image = np.asarray(cv2.GaussianBlur(image, (3, 3), 0.7), dtype=np.uint8)
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     gx = np.asarray(cv2.Scharr(grey, cv2.CV_32F, 1, 0, scale=1 / 32), dtype=np.float32)
     gy = np.asarray(cv2.Scharr(grey, cv2.CV_32F, 0, 1, scale=1 / 32), dtype=np.float32)
     tone = np.asarray(cv2.LUT(image, LIFT), dtype=np.uint8)
-    return WorkImage(frame.time, scale, grey, tone, gx, gy)
+    even = grey[: grey.shape[0] // 2 * 2, : grey.shape[1] // 2 * 2]
+    half = np.asarray(
+        cv2.resize(even, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), dtype=np.uint8
+    )
+    return WorkImage(frame.time, scale, grey, tone, gx, gy, half)
 
 
 class History:

@@ -78,7 +78,7 @@ def _most(labels: Indices, count: int, share: float) -> int | None:
 def _alone(part: NDArray[np.bool_], scene: Scene, key: int) -> Track | None:
     """A new track for cells that move as no layer does; None when there is too little to go by."""
     c = scene.measured[0].constraints
-    inside = np.flatnonzero(part[scene.cell_of(c.xy)])
+    inside = np.flatnonzero(part[scene.cell_of(c)])
     if len(inside) < 6:
         return None
     weight = np.zeros(len(c), dtype=np.float32)
@@ -127,7 +127,7 @@ def _moves_as(hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: S
     """Whether points in some cells move as a hidden track did, and not as its occluder."""
     m = scene.measured[-1]
     c = m.constraints
-    inside = where[scene.cell_of(c.xy)]
+    inside = where[scene.cell_of(c)]
     rate = occluder.best_rate()
     if np.count_nonzero(inside) < 6 or rate is None or c.span_s > 0.7:
         return False
@@ -149,9 +149,13 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
     """
     if len(tracks) < 2:
         return tracks
-    members = np.stack([winner == k for k in range(1, len(tracks) + 1)], axis=1)
-    near = scene.cells.reach(members, NEAR_STEPS)
+    members = winner[:, None] == np.arange(1, len(tracks) + 1)
+    ring = scene.cells.reach(members, 1) & ~members
+    near = scene.cells.reach(members | ring, NEAR_STEPS - 1)
     touch = (near.astype(np.float32).T @ members.astype(np.float32)) > 0
+    around = ring.astype(np.float32).T @ members.astype(np.float32)
+    inside = around > SURROUNDED * ring.sum(axis=0)[:, None]
+    grown = _grown_together(scene, winner, len(tracks))
     out = list(tracks)
     for j in range(len(tracks) - 1, 0, -1):
         for i in range(j):
@@ -165,9 +169,8 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
             if apart > APART_S or not _may_join(a, b, members[:, i], members[:, j], scene):
                 continue
             votes = a.alike.get(b.key, 0.0)
-            if _grown_together(scene, members[:, i], members[:, j]) or _is_inside(
-                scene, members[:, j], members[:, i]
-            ):
+            # One all but surrounded by the other is a part of it.
+            if grown[i, j] or inside[i, j] or inside[j, i]:
                 votes += 1.0
             else:
                 votes += _vote(scene, a, members[:, i], members[:, j])
@@ -183,9 +186,12 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
 def _may_join(
     a: Track, b: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], scene: Scene
 ) -> bool:
-    """Whether one is not the ground on which the other goes; what was told is no ground."""
+    """Whether one is not the ground on which the other goes; what was told is no ground.
+
+    What goes behind another is surrounded by it at last, and is no part of it for that.
+    """
     if bool(a.id) == bool(b.id):
-        return True
+        return not (a.id and (a.mostly_hidden or b.mostly_hidden))
     told, other = (in_a, in_b) if a.id else (in_b, in_a)
     return not _is_ground(other, told, scene)
 
@@ -200,7 +206,7 @@ def _vote(scene: Scene, a: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool
         c = m.constraints
         if c.lag == 1 and len(scene.measured) > 1:
             continue
-        at = scene.cell_of(c.xy)
+        at = scene.cell_of(c)
         start = a.predicted(c.lag, c.span_s)[0]
         mine, other = in_a[at], in_b[at]
         if not (_moves(m, mine) and _moves(m, other)):
@@ -210,19 +216,16 @@ def _vote(scene: Scene, a: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool
     return votes
 
 
-def _grown_together(scene: Scene, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_]) -> bool:
-    """Whether no image edge parts two tracks where they touch, as in the links of an arm."""
-    contact = scene.cells.link[in_a][:, in_b]
-    return contact.nnz > 0 and float(contact.max()) > CONTACT
-
-
-def _is_inside(scene: Scene, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> bool:
-    """Whether either of two tracks is all but surrounded by the other: then it is a part of it."""
-    for inner, outer in ((a, b), (b, a)):
-        ring = scene.cells.reach(inner[:, None], 1)[:, 0] & ~inner
-        if outer[ring].mean() > SURROUNDED:
-            return True
-    return False
+def _grown_together(scene: Scene, winner: Indices, count: int) -> NDArray[np.bool_]:
+    """(count, count): whether no image edge parts two tracks where they touch, as links of an arm."""
+    link = scene.cells.link
+    strong = np.flatnonzero(link.data > CONTACT)
+    a = winner[np.searchsorted(link.indptr, strong, side="right") - 1] - 1
+    b = winner[link.indices[strong]] - 1
+    both = (a >= 0) & (b >= 0) & (a < count) & (b < count)
+    out = np.zeros((count, count), dtype=bool)
+    out[a[both], b[both]] = True
+    return out
 
 
 def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from visup.percepts.motion.constraints import Constraints, mahalanobis
 from visup.percepts.motion.image import Floats
 
 Doubles = NDArray[np.float64]
-SETTLED = 0.003  # pixels: a fit that moves by less is done
+SETTLED = 0.003  # pixels, far below what is measured: a fit that moves by less is done
 STILL: Doubles = np.zeros((2, 3))
 
 
@@ -50,6 +51,17 @@ class Affine:
             else:
                 out[:, i] = (a + d * x + e * y) * x + (b + f * y) * y + c
         return out
+
+    def shift(self, where: tuple[float, float]) -> tuple[float, float]:
+        """(x, y) displacement of one position; what `at` says, without arrays."""
+        x, y = where
+        (a, b, c), (d, e, f) = self.matrix.tolist()
+        dx, dy = a * x + b * y + c, d * x + e * y + f
+        if self.bend is not None:
+            (p, q, r), (s, t, u) = self.bend.tolist()
+            dx += (p * x * x + q * x * y + r * y * y) / 1000.0
+            dy += (s * x * x + t * x * y + u * y * y) / 1000.0
+        return dx, dy
 
     def scaled(self, factor: float) -> Affine:
         """The same motion over a baseline that is `factor` times as long."""
@@ -199,19 +211,22 @@ class _System:
         a, b, d = self.info
         dx, dy = self.moved
         self._pull = np.stack([a * dx + b * dy, b * dx + d * dy])
+        # Products of coordinates do not change from round to round.
+        self._pairs = (phi[:, None] * phi).reshape(len(phi) ** 2, -1).T
 
     def solve(self, w: Doubles, hold: Doubles) -> Doubles:
         """(2, K) coefficients for (N,) weights."""
         k = len(self.phi)
-        weighted = (self.info * w)[:, None] * self.phi
-        blocks = weighted.reshape(3 * k, -1) @ self.phi.T
+        xx, xy, yy = ((self.info * w) @ self._pairs).reshape(3, k, k)
         normal = hold.copy()
-        normal[:k, :k] += blocks[:k]
-        normal[:k, k:] += blocks[k : 2 * k]
-        normal[k:, :k] += blocks[k : 2 * k]
-        normal[k:, k:] += blocks[2 * k :]
+        normal[:k, :k] += xx
+        normal[:k, k:] += xy
+        normal[k:, :k] += xy
+        normal[k:, k:] += yy
         right = (self._pull * w) @ self.phi.T
-        return np.asarray(np.linalg.solve(normal, right.ravel()).reshape(2, k))
+        # What is held is held by more than nothing: the matrix is positive definite.
+        _, found, _ = dposv(normal, right.ravel())
+        return np.asarray(found.reshape(2, k))
 
     def squared(self, fitted: Doubles) -> Doubles:
         """Squared Mahalanobis distance of each constraint to (2, N) displacements, (N,)."""

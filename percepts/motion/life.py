@@ -21,6 +21,7 @@ from visup.percepts.motion.tracking import Indices, Motion, Track, Tracks, remem
 
 LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
 SURE = 200.0  # the same for one that has only just appeared
+BEHIND = 0.3  # share of a cell in which an object is expected behind another
 SLIVER = 3.5  # length over width of a strip that is no object
 
 
@@ -45,7 +46,7 @@ def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> T
             if len(out) >= settings.max_regions:
                 return tuple(out)
             share = np.zeros(scene.cells.count, dtype=np.float32)
-            share[scene.cell_of(c.xy[index])] = 1
+            share[scene.cell_of(c)[index]] = 1
             share = scene.cells.reach(share[:, None] > 0, 1)[:, 0] * 0.7 * ~owned
             born += 1
             middle = c.xy[index].mean(axis=0)
@@ -78,7 +79,7 @@ def _territory(
         if (
             t.id
             and t.hidden is not None
-            and scene.cells.mean(t.hidden)[where].mean() > 0.5
+            and (scene.cells.mean(t.hidden)[where] > BEHIND).mean() > 0.5
             and moves_like(motion, t)
         ):
             return i
@@ -87,10 +88,11 @@ def _territory(
             continue
         # What comes out from behind an object is not a part of it.
         others = [
-            o.own > 0.3 for o in tracks if o is not t and o.hidden is not None and o.own is not None
+            o.own > BEHIND for o in tracks if o is not t and o.hidden is not None and o.own is not None
         ]
         free = where & ~np.any(others, axis=0) if others else where
-        if free.any() and np.mean(t.recent[free] > 0.3) > 0.5:
+        most = np.count_nonzero(free) > 0.5 * np.count_nonzero(where)
+        if most and np.mean(t.recent[free] > 0.3) > 0.5:
             return i
     return None
 
@@ -99,14 +101,17 @@ def _unexplained(
     m: Measured, tracks: Sequence[Track], scene: Scene, owned: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     c = m.constraints
-    at = scene.cell_of(c.xy)
+    at = scene.cell_of(c)
     out = ~owned[at] & (m.background.distances(c) > 16)
-    for t in tracks:
-        if not out.any():
-            break
+    if not (tracks and out.any()):
+        return np.asarray(out)
+    members = np.stack([t.share for t in tracks], axis=1) > 0.3
+    near = scene.cells.reach(members, NEAR_STEPS)[at]
+    for k, t in enumerate(tracks):
+        left = np.flatnonzero(out & near[:, k])
+        if not len(left):
+            continue
         parts = t.predicted(c.lag, c.span_s)
-        near = scene.cells.reach((t.share > 0.3)[:, None], NEAR_STEPS)[:, 0]
-        left = np.flatnonzero(out & near[at])
         some = c.take(left)
         off = np.min([distances(p, some, slack_of(p, t.centre)) for p in parts], axis=0)
         out[left] = off >= 16
@@ -123,12 +128,12 @@ def update(
 ) -> Tracks:
     """Bring each track's shape and evidence up to date with the posterior."""
     least = 0.3 * least_area(scene, settings)
-    at = winner[scene.cell_of(scene.points.xy)]
+    at = winner[scene.at]
     out = []
     for k, t in enumerate(tracks, 1):
         gain = np.clip(likelihood[:, k] - likelihood[:, 0], -CLIP, CLIP)[at == k]
         t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
-        out.append(remember(t, posterior[:, k], winner, k, scene.cells, scene.time, least))
+        out.append(remember(t, posterior, winner, k, scene.cells, scene.time, least))
     return tuple(out)
 
 

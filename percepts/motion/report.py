@@ -142,7 +142,7 @@ def _inside(xy: NDArray[Any], box: tuple[float, float, float, float]) -> NDArray
 def _region(t: Track, shape: Outline, scale: float) -> Region:
     rate = t.best_rate()
     centre = (shape.centroid[0] * scale, shape.centroid[1] * scale)
-    speed = rate.velocity(centre) / scale if rate is not None else np.zeros(2)
+    speed = t.velocity(centre) / scale
     sigma = rate.sigma / scale if rate is not None else float("inf")
     sure = float(1 - np.exp(-max(t.evidence, 0.0) / 100.0))
     return shape.region(t.id, (float(speed[0]), float(speed[1])), sigma, sure)

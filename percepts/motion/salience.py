@@ -55,8 +55,14 @@ def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track
     Returns:
         The tracks.
     """
+    young = [k for k, t in enumerate(tracks, 1) if not t.id]
+    members = winner[:, None] == np.asarray(young, dtype=winner.dtype)
+    # Points of its own outline may lie in the cells right beside it.
+    beside = scene.cells.reach(members, 1)
+    rings = scene.cells.reach(beside, RING_STEPS - 1) & ~beside & (winner == 0)[:, None]
+    ring_of = dict(zip(young, rings.T, strict=True))
     return tuple(
-        _watched(t, k, scene, winner) if t.id else _weighed(t, k, scene, winner)
+        _watched(t, k, scene, winner) if t.id else _weighed(t, k, scene, winner, ring_of[k])
         for k, t in enumerate(tracks, 1)
     )
 
@@ -85,7 +91,7 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
     """Note how well the background explains an object, over each baseline."""
     explained = dict(t.explained)
     for m in scene.measured:
-        mine = winner[scene.cell_of(m.constraints.xy)] == k
+        mine = winner[scene.cell_of(m.constraints)] == k
         if np.count_nonzero(mine) >= FEWEST:
             _note(explained, m, m.background.distances(m.constraints)[mine])
     area = t.moving_area
@@ -94,13 +100,10 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
     return replace(t, explained=MappingProxyType(explained), moving_area=area)
 
 
-def _weighed(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
+def _weighed(t: Track, k: int, scene: Scene, winner: Indices, ring: NDArray[np.bool_]) -> Track:
     explained, borne = dict(t.explained), dict(t.borne)
-    # Points of its own outline may lie in the cells right beside it.
-    beside = scene.cells.reach((winner == k)[:, None], 1)
-    ring = scene.cells.reach(beside, RING_STEPS - 1)[:, 0] & ~beside[:, 0] & (winner == 0)
     for m in scene.measured:
-        at = scene.cell_of(m.constraints.xy)
+        at = scene.cell_of(m.constraints)
         mine, around = winner[at] == k, ring[at]
         local = surroundings(m, around)
         if np.count_nonzero(mine) >= FEWEST:
@@ -217,8 +220,7 @@ def border_share(share: Floats, cells: Superpixels) -> float:
 
 def _runs_ahead(t: Track, scene: Scene) -> bool:
     """Whether a track moves as the background does, only faster: as near things at rest do."""
-    at = np.asarray([t.centre], dtype=np.float32)
-    ground = scene.measured[0].background.models[-1].at(at)[0]
+    ground = np.asarray(scene.measured[0].background.models[-1].shift(t.centre))
     speed = float(np.hypot(*ground))
     if speed < 1.0:
         return False
@@ -230,7 +232,6 @@ def _runs_ahead(t: Track, scene: Scene) -> bool:
 
 def _apart(moved: Doubles, t: Track, m: Measured, local: Affine | None) -> Doubles:
     """(x, y) pixels that a track moved against the background nearest to its motion."""
-    at = np.asarray([t.centre], dtype=np.float32)
     models = m.background.models if local is None else (*m.background.models, local)
-    ways = [moved - b.at(at)[0] for b in models]
+    ways = [moved - np.asarray(b.shift(t.centre)) for b in models]
     return min(ways, key=lambda way: float(np.hypot(*way)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Measured:
     background: Background
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """One frame as measured.
 
@@ -61,10 +62,15 @@ class Scene:
         """Seconds."""
         return self.image.time
 
-    def cell_of(self, xy: Floats) -> NDArray[np.int32]:
-        """Number of the superpixel at each of (N, 2) positions."""
-        x, y = xy.astype(np.int64).T
+    @cached_property
+    def at(self) -> NDArray[np.int32]:
+        """(N,) number of the superpixel at each point."""
+        x, y = self.points.xy.astype(np.int64).T
         return np.asarray(self.cells.labels[y, x])
+
+    def cell_of(self, c: Constraints) -> NDArray[np.int32]:
+        """Number of the superpixel at each constraint."""
+        return np.asarray(self.at[c.index])
 
 
 def least_area(scene: Scene, settings: MotionSettings) -> float:
@@ -76,14 +82,14 @@ def outside(scene: Scene) -> Floats:
     """(N,) float32: 1 for points away from all objects, 0 for those in or beside one."""
     owner = scene.owner > 0
     near = scene.cells.reach(owner[:, None], 1)[:, 0] if owner.any() else owner
-    return (~near[scene.cell_of(scene.points.xy)]).astype(np.float32)
+    return (~near[scene.at]).astype(np.float32)
 
 
 def expected(
     scene: Scene, tracks: tuple[Track, ...], camera: Affine, lag: int, span: float
 ) -> Floats:
     """Where each point is expected in an older image, (N, 2) float32."""
-    at = scene.owner[scene.cell_of(scene.points.xy)]
+    at = scene.owner[scene.at]
     moved = camera.at(scene.points.xy)
     for k, t in enumerate(tracks, 1):
         mine = at == k
@@ -97,7 +103,7 @@ def fit_tracks(tracks: tuple[Track, ...], scene: Scene) -> tuple[Track, ...]:
     """Renew each track's motion from the constraints inside its outline."""
     for m in scene.measured:
         c = m.constraints
-        at = scene.owner[scene.cell_of(c.xy)]
+        at = scene.owner[scene.cell_of(c)]
         tracks = tuple(_fit(t, m, at == k, scene.time) for k, t in enumerate(tracks, 1))
     return tracks
 
@@ -200,14 +206,14 @@ def reach_of(scene: Scene, tracks: tuple[Track, ...], prior: Floats) -> NDArray[
 
 
 def explain(
-    scene: Scene, tracks: tuple[Track, ...], prior: Floats, settings: MotionSettings
+    scene: Scene, tracks: tuple[Track, ...], reach: NDArray[np.bool_], settings: MotionSettings
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Log likelihood of every point under every label (the E step).
 
     Args:
         scene: The frame.
         tracks: K tracks.
-        prior: (count, K + 2) float32 label shares expected.
+        reach: (count, K) bool, which cells each track may claim.
         settings: Gives the distance at which a motion no longer explains.
 
     Returns:
@@ -218,8 +224,7 @@ def explain(
     n = len(scene.points)
     out = np.zeros((n, len(tracks) + 2), dtype=np.float32)
     has = np.zeros(n, dtype=bool)
-    at = scene.cell_of(scene.points.xy)
-    near = reach_of(scene, tracks, prior)[at]
+    near = reach[scene.at]
     least = -0.5 * settings.outlier**2
     for m in scene.measured:
         c = m.constraints

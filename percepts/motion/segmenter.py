@@ -73,7 +73,6 @@ class MotionSegmenter:
         self._history = History(max(self.settings.lags_s) * 1.1)
         self._tracks: Tracks = ()
         self._cells: Superpixels | None = None
-        self._grid: Floats = np.zeros((0, 0, 2), np.float32)
         self._ground = bare_ground((1, 1))
         self._camera: dict[int, Rate] = {}
         self._fixed_until: float | None = None
@@ -104,7 +103,6 @@ class MotionSegmenter:
         before = self._cells
         if before is None:
             self._cells = coming.result()
-            self._grid = _grid(image.shape)
             self._ground = bare_ground(image.shape)
             return ()
         scene, tracks = self._look(image, before, coming)
@@ -113,9 +111,9 @@ class MotionSegmenter:
         tracks = bear(tracks, scene, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
         prior = priors(tracks, cells)
-        likelihood, has = explain(scene, tracks, prior, self.settings)
-        likelihood = obey(directives, scene, likelihood)
         near = reach_of(scene, tracks, prior)
+        likelihood, has = explain(scene, tracks, near, self.settings)
+        likelihood = obey(directives, scene, likelihood)
         old = self._history.back(scene.measured[-1].constraints.lag)
         more = warped(scene, tracks, old, near, self.settings.noise)
         stay = np.zeros(cells.count, dtype=bool)
@@ -150,8 +148,8 @@ class MotionSegmenter:
         flow = flow_back(image.grey, old.grey, self._engine)
         first = self._follow(points, flow, old, image)
         cells = coming.result()
-        step = transition(before, cells, flow, self._grid)
-        tracks = tuple(carry(t, step, before, cells, seconds) for t in self._tracks)
+        step = transition(before, cells, flow)
+        tracks = carry(self._tracks, step, before, cells, seconds)
         owner = priors(tracks, cells).argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         later = [self._later(scene, tracks, lag) for lag in self._turn(image)]
@@ -220,8 +218,3 @@ class MotionSegmenter:
         nearest = min(fresh, key=lambda r: abs(np.log(r.span_s / span)))
         bend = None if nearest.bend is None else nearest.bend * span
         return Affine(nearest.matrix * span, bend=bend)
-
-
-def _grid(shape: tuple[int, int]) -> Floats:
-    ys, xs = np.mgrid[: shape[0], : shape[1]]
-    return np.stack([xs, ys], axis=-1).astype(np.float32)

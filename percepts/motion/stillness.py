@@ -33,7 +33,7 @@ def camera_rests(scene: Scene) -> bool | None:
 def _still_share(scene: Scene, number: int) -> float | None:
     c = scene.measured[number].constraints
     use = c.information[:, 0] + c.information[:, 2] > TELLS
-    use &= scene.owner[scene.cell_of(c.xy)] == 0
+    use &= scene.owner[scene.cell_of(c)] == 0
     rows, cols = GRID
     row = np.clip(c.xy[:, 1] * rows / scene.image.shape[0], 0, rows - 1).astype(np.int64)
     col = np.clip(c.xy[:, 0] * cols / scene.image.shape[1], 0, cols - 1).astype(np.int64)

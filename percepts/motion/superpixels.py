@@ -19,6 +19,7 @@ from visup.percepts.motion.image import Floats, WorkImage
 STIFF = 15.0  # flat cells of one tone are nearly one: a whole sky, a whole face of a box
 CALM = 1.0  # mean gradient up to which a cell is flat, grey levels per pixel
 LOOSE = 0.05
+FLAT = 3.0  # gradient, averaged over 3 x 3 pixels, below which there is no edge worth following
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +57,22 @@ class Superpixels:
             amount = near.astype(np.float32)
             near = self.link @ amount + amount > 0
         return np.asarray(near)
+
+    def samples(self, every: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Every n-th pixel of each cell, its first one always.
+
+        Args:
+            every: n.
+
+        Returns:
+            (N,) int32 places in scan order of the image, cell by cell; (count + 1,) int32, where
+            those of each cell begin and end.
+        """
+        first = self.pixels.indptr[:-1]
+        number = (np.diff(self.pixels.indptr) + every - 1) // every
+        ends = np.concatenate([[0], np.cumsum(number)]).astype(np.int32)
+        place = np.arange(ends[-1]) * every + np.repeat(first - every * ends[:-1], number)
+        return np.asarray(self.pixels.indices[place]), ends
 
     def mean(self, values: Floats) -> Floats:
         """Mean of an (h, w) map in each cell, (count,) float32; that of a map asked again is kept.
@@ -130,17 +147,15 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
         The cells.
     """
     height, width = image.shape
-    seeds = np.zeros((height, width), dtype=np.int32)
     busy = np.abs(image.gx) + np.abs(image.gy)
-    ys, xs = _seeds(busy, cell)
-    seeds[ys, xs] = np.arange(1, len(ys) + 1)
+    seeds, count = _seeds(busy, cell)
     labels = cv2.watershed(image.tone, seeds)
     # Lines between the cells go to the later of the cells beside them.
     short = (labels + 1).astype(np.uint16)  # on a line 0, what was not reached 1
     grown = cv2.dilate(short, np.ones((3, 3), np.uint8))
-    np.copyto(short, grown, where=short < 2)
-    filled = np.maximum(np.subtract(short, 2, dtype=np.int32), 0)
-    count = len(ys)
+    cv2.copyTo(grown, (short < 2).view(np.uint8), short)
+    filled = short.astype(np.int32) - 2
+    np.maximum(filled, 0, out=filled)
     pixels = _pixels(filled, count)
     area = np.maximum(np.diff(pixels.indptr), 1).astype(np.float32)
 
@@ -156,23 +171,36 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     return Superpixels(filled, count, area, centre, tone, link, pixels, corners)
 
 
-def _seeds(busy: Floats, cell: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The flattest place of each cell, so that no seed sits on an edge."""
+def _seeds(busy: Floats, cell: int) -> tuple[NDArray[np.int32], int]:
+    """Seeds numbered from 1, (h, w) int32, 0 elsewhere; and how many.
+
+    A seed is the flattest 3 x 3 pixels of its cell, so that none sits on an edge, or the inside of
+    a cell that is flat all over: there the watershed has nothing to find.
+    """
     rows, cols = busy.shape[0] // cell, busy.shape[1] // cell
     strength = cv2.boxFilter(busy, -1, (3, 3))
     cells = strength[: rows * cell, : cols * cell].reshape(rows, cell, cols, cell)
     inner = cells[:, 1:-1, :, 1:-1].transpose(0, 2, 1, 3).reshape(rows * cols, -1)
     best, side = inner.argmin(axis=1), cell - 2
-    number = np.arange(rows * cols)
-    return (number // cols) * cell + best // side + 1, (number % cols) * cell + best % side + 1
+    number = np.arange(1, rows * cols + 1, dtype=np.int32)
+    seeds = np.zeros(busy.shape, dtype=np.int32)
+    flat = np.where(inner.max(axis=1) < FLAT, number, 0).reshape(rows, 1, cols, 1)
+    own = seeds[: rows * cell, : cols * cell].reshape(rows, cell, cols, cell)
+    own[:, 1:-1, :, 1:-1] = flat
+    y = np.arange(rows).repeat(cols) * cell + best // side + 1
+    x = np.tile(np.arange(cols), rows) * cell + best % side + 1
+    for i in (-1, 0, 1):
+        for j in (-1, 0, 1):
+            seeds[y + i, x + j] = number
+    return seeds, len(number)
 
 
 def _pixels(labels: NDArray[np.int32], count: int) -> sparse.csr_matrix:
     """Which pixels each cell consists of, in scan order."""
     ones = np.ones(labels.size, dtype=np.float32)
-    places = labels.ravel(), np.arange(labels.size, dtype=np.int32)
-    members = sparse.coo_matrix((ones, places), shape=(count, labels.size))
-    members.has_canonical_format = True  # no pixel is in two cells: nothing to sum
+    # Column by column, that is pixel by pixel, there is one entry in each.
+    ends = np.arange(labels.size + 1, dtype=np.int32)
+    members = sparse.csc_matrix((ones, labels.ravel(), ends), shape=(count, labels.size))
     return members.tocsr()
 
 
@@ -212,20 +240,23 @@ def _links(
     return sparse.coo_matrix(both, shape=(count, count)).tocsr()
 
 
-def overlap(old: Superpixels, new: Superpixels, from_where: NDArray[np.int32]) -> sparse.csr_matrix:
-    """Which old cells the pixels of each new cell come from.
+def overlap(
+    old: Superpixels, new: Superpixels, source: NDArray[np.int32], ends: NDArray[np.int32]
+) -> sparse.csr_matrix:
+    """Which old cells some pixels of each new cell come from.
 
     Args:
         old: Cells of the old image.
         new: Cells of the new image.
-        from_where: (h, w) int32 old cell of each pixel of the new image, -1 for none.
+        source: (N,) int32 old cell of each of those pixels, -1 for none, cell by cell.
+        ends: (new count + 1,) int32, where the pixels of each new cell begin and end.
 
     Returns:
         (new count, old count) sparse float32 shares, entries not summed; rows sum to 1, or less.
     """
-    source = from_where.ravel()[new.pixels.indices]
     # Each pixel is an entry of its own: products cost less than finding those that are alike.
-    share = np.repeat(1 / new.area, np.diff(new.pixels.indptr))
+    number = np.diff(ends)
+    share = np.repeat(1 / np.maximum(number, 1).astype(np.float32), number)
     share *= source >= 0
-    entries = share, np.maximum(source, 0), new.pixels.indptr
+    entries = share, np.maximum(source, 0), ends
     return sparse.csr_matrix(entries, shape=(new.count, old.count))

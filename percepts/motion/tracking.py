@@ -6,8 +6,10 @@ it moves with its own motion under an occluder that moves with another.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import dist, hypot
 from types import MappingProxyType
 
 import cv2
@@ -21,8 +23,10 @@ from visup.percepts.motion.superpixels import Superpixels, overlap
 
 Indices = NDArray[np.int64]
 BRISK_S = 0.25  # baselines up to which a velocity is that of the moment, seconds
+SMOOTH_S = 0.2  # time over which a velocity seen from frame to frame is averaged, seconds
 PATH_S = 2.8  # how long the way of a track is remembered, seconds
 PACE_S = 1.0  # time over which the pace of a track follows its measured velocity, seconds
+EVERY = 4  # of the pixels of a cell, one in so many is asked where it comes from
 FADE = 0.4  # share of the memory of where a track was that is left after a second
 
 
@@ -120,6 +124,9 @@ class Track:
         pace: (vx, vy) when it was last in full view, pixels per second.
         drift: (x, y) of motion not yet applied to `hidden`, pixels.
         own: (count,) float32, where it would be by its own motion alone.
+        whole_map: (h, w) float32, the same by pixels while others hide a part of it, or None.
+        body: (count,) bool, where it prevails, if by less than half, and objects are surer than the
+            background; None before that was seen.
         path: (time, x, y) of its displacement since birth, over the longest baseline.
         apart: Seconds for which it was seen apart from other tracks, by key.
         alike: Votes that it is one with another track, by key.
@@ -147,6 +154,8 @@ class Track:
     pace: tuple[float, float] = (0.0, 0.0)
     drift: tuple[float, float] = (0.0, 0.0)
     own: Floats | None = None
+    whole_map: Floats | None = None
+    body: NDArray[np.bool_] | None = None
     path: tuple[tuple[float, float, float], ...] = ()
     apart: Mapping[int, float] = field(default_factory=_nothing)
     alike: Mapping[int, float] = field(default_factory=_nothing)
@@ -167,19 +176,20 @@ class Track:
         measured_now = bool(self.path) and own is not None and own.time > self.path[-1][0] - 1e-6
         if len(self.path) > 1 and not measured_now:
             went = self._went(span_s)
-            first = parts[0].at(np.asarray([self.centre], dtype=np.float32))[0]
-            if np.hypot(*(first - went)) > 1 + 0.1 * np.hypot(*went):
+            if dist(parts[0].shift(self.centre), went) > 1 + 0.1 * hypot(*went):
                 matrix = np.zeros((2, 3))
                 matrix[:, 2] = went
                 parts[0] = Affine(matrix)
         return tuple(parts)
 
-    def _went(self, span_s: float) -> Doubles:
+    def _went(self, span_s: float) -> tuple[float, float]:
         """Displacement over the last so many seconds, (x, y) pixels; at its rate before birth."""
-        now = self.path[-1]
-        then = min(self.path, key=lambda p: abs(now[0] - span_s - p[0]))
-        seconds = max(now[0] - then[0], 1e-6)
-        return np.array([now[1] - then[1], now[2] - then[2]]) * (span_s / seconds)
+        now, sought = self.path[-1], self.path[-1][0] - span_s
+        after = bisect_left(self.path, (sought,))
+        around = self.path[max(after - 1, 0) : after + 1]
+        then = min(around, key=lambda p: abs(sought - p[0]))
+        rate = span_s / max(now[0] - then[0], 1e-6)
+        return (now[1] - then[1]) * rate, (now[2] - then[2]) * rate
 
     def brisk(self) -> Doubles:
         """Velocity over the shortest baselines, (vx, vy) pixels per second."""
@@ -195,6 +205,20 @@ class Track:
                 best = rate
         return best.velocity(self.centre)
 
+    def velocity(self, where: tuple[float, float]) -> Doubles:
+        """(vx, vy) at a position, pixels per second.
+
+        What was measured from one frame to the next is averaged over the last few.
+        """
+        rate = self.best_rate()
+        if rate is None:
+            return np.zeros(2)
+        now = rate.velocity(where)
+        if len(self.motions) > 1 or rate.span_s > SMOOTH_S or len(self.path) < 2:
+            return now
+        span = min(SMOOTH_S, self.path[-1][0] - self.path[0][0])
+        return now - self.brisk() + np.asarray(self._went(span)) / span
+
     def best_rate(self) -> Rate | None:
         """The rate of the whole, or of the only part."""
         if not self.motions:
@@ -208,71 +232,91 @@ class Track:
 Tracks = tuple[Track, ...]
 
 
-def transition(old: Superpixels, new: Superpixels, flow: Floats, grid: Floats) -> sparse.csr_matrix:
+def transition(old: Superpixels, new: Superpixels, flow: Floats) -> sparse.csr_matrix:
     """Which superpixels of the last frame each new one comes from, following the flow.
 
     Args:
         old: Superpixels of the last frame.
         new: Superpixels of the newest frame.
         flow: (h, w, 2) float32, from the newest image back to the last.
-        grid: (h, w, 2) float32 positions of pixels.
 
     Returns:
         (new count, old count) sparse shares; rows sum to 1, or less where the image came into view.
     """
-    from_x, from_y = cv2.split(grid + flow)
-    from_where = cv2.remap(
-        old.labels.astype(np.float32),
-        from_x,
-        from_y,
-        cv2.INTER_NEAREST,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=-1,
-    )
-    return overlap(old, new, from_where.astype(np.int32))
+    height, width = old.labels.shape
+    places, ends = new.samples(EVERY)
+    # Both components as one number: rows of two are gathered slowly.
+    back = flow.view(np.float64).ravel()[places].view(np.float32)
+    back_x, back_y = np.rint(back).astype(np.int32).reshape(-1, 2).T
+    y = places // np.int32(width)
+    x = places - y * np.int32(width) + back_x
+    y += back_y
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    source = old.labels.ravel()[np.where(inside, y * np.int32(width) + x, 0)]
+    source[~inside] = -1
+    return overlap(old, new, source, ends)
 
 
 def carry(
-    track: Track, step: sparse.csr_matrix, old: Superpixels, new: Superpixels, seconds: float
-) -> Track:
-    """Bring a track to the next frame.
+    tracks: Tracks, step: sparse.csr_matrix, old: Superpixels, new: Superpixels, seconds: float
+) -> Tracks:
+    """Bring tracks to the next frame.
 
     What is visible goes with the flow. Where it would be by its own motion is kept as well: if
     another object turns up there, the track is hidden behind it. That map is moved by whole pixels,
     so that it is not blurred by many small moves.
 
     Args:
-        track: The track as of the frame before.
+        tracks: The tracks as of the frame before.
         step: The transition between superpixels.
         old: Superpixels of the frame before.
         new: Superpixels of the newest frame.
         seconds: Between the two frames.
 
     Returns:
-        The track as predicted for the newest image.
+        The tracks as predicted for the newest image.
     """
-    share = np.asarray(step @ track.share, dtype=np.float32)
-    recent = share
-    if track.recent is not None:
-        recent = FADE**seconds * np.asarray(step @ track.recent, dtype=np.float32)
+    if not tracks:
+        return ()
+    before = [t.share for t in tracks]
+    before += [t.share if t.recent is None else t.recent for t in tracks]
+    moved = np.ascontiguousarray((step @ np.stack(before, axis=1)).T)
+    return tuple(
+        _carried(t, share, np.float32(FADE**seconds) * recent, old, new, seconds)
+        for t, share, recent in zip(tracks, moved, moved[len(tracks) :], strict=False)
+    )
+
+
+def _carried(
+    track: Track, share: Floats, recent: Floats, old: Superpixels, new: Superpixels, seconds: float
+) -> Track:
+    """A track where it is expected, given what of it and of its past comes to each superpixel."""
     drift = np.asarray(track.drift) + np.asarray(track.pace) * seconds
-    whole = np.round(drift)
-    rest = drift - whole
+    pixels = np.round(drift)
+    rest = drift - pixels
     step_xy = track.brisk() * seconds
     last = track.path[-1] if track.path else (track.born, 0.0, 0.0)
     here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
     path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
-    by = int(whole[0]), int(whole[1])
+    by = int(pixels[0]), int(pixels[1])
+    # Where an occluder comes, an object fades before it is hidden: what it still has counts.
+    body = track.share > 0.5
+    if track.body is not None:
+        body = body | track.body
+    whole = None
     if track.hidden is None:
-        own = new.shifted(old, track.share > 0.5, by)
+        own = new.shifted(old, body, by)
     else:
-        own = new.mean(shift(np.maximum(old.paint(track.share > 0.5), track.hidden), *by))
+        whole = shift(np.maximum(old.paint(body), track.hidden), *by)
+        own = new.mean(whole)
     return replace(
         track,
         share=share,
         recent=np.maximum(recent, share),
         hidden=None if track.hidden is None else shift(track.hidden, *by),
         own=own,
+        whole_map=whole,
+        body=None,
         path=(*(path or (last,)), here),
         drift=(float(rest[0]), float(rest[1])),
     )
@@ -325,7 +369,7 @@ def sharpen(shares: Floats) -> Floats:
 
 def remember(
     track: Track,
-    share: Floats,
+    posterior: Floats,
     winner: Indices,
     label: int,
     cells: Superpixels,
@@ -336,7 +380,7 @@ def remember(
 
     Args:
         track: The carried track.
-        share: (count,) float32, its posterior.
+        posterior: (count, K) float32, shares of the labels.
         winner: (count,) the label that has each superpixel.
         label: The track's label.
         cells: The superpixels.
@@ -346,7 +390,7 @@ def remember(
     Returns:
         The track; what others took over is hidden, what is seen to be background is forgotten.
     """
-    mine = winner == label
+    mine, share = winner == label, posterior[:, label]
     area = float(cells.area[mine].sum())
     seen = area >= least
     centre = track.centre
@@ -360,15 +404,20 @@ def remember(
         follow = 1.0 if track.frames < 15 else min(1.0, (now - track.seen) / PACE_S)
         velocity = np.asarray(pace) * (1 - follow) + rate.velocity(centre) * follow
         pace = (float(velocity[0]), float(velocity[1]))
-    covered = (winner > 0) & ~mine & (track.own > 0.5 if track.own is not None else False)
-    # A cell or two beside another object is no occlusion.
-    much = cells.area[covered].sum() > max(0.05 * area, 0.3 * least)
+    taken = (winner > 0) & ~mine
+    covered = taken & (track.own > 0.5 if track.own is not None else False)
+    # A cell or two beside another object is no occlusion; nor is what was never told remembered.
+    much = track.id > 0 and cells.area[covered].sum() > max(0.05 * area, 0.3 * least)
     hidden = cells.paint(covered) if much else None
+    if much and track.whole_map is not None and track.own is not None:
+        # By pixels, for cells are others in each frame: by those it would wear away at its edges.
+        hidden = track.whole_map * cells.paint(taken & (track.own > 0.05))
     return replace(
         track,
         share=share,
         recent=share if track.recent is None else np.maximum(track.recent, share),
         hidden=hidden,
+        body=mine & (posterior[:, 0] < 0.5),
         seen=now if seen else track.seen,
         frames=track.frames + int(seen),
         centre=track.centre if track.mostly_hidden else centre,

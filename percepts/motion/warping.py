@@ -30,11 +30,13 @@ def compare(
 ) -> Floats:
     """Log likelihood of pixels when the old image is warped by a layer's motions (the best counts).
 
+    At half the size: what is asked is which cells fit, and each is several pixels wide.
+
     Args:
         new: The newest image.
         old: The older image.
-        models: Displacements from old to new; at least one.
-        box: (x, y, width, height) of the part to compare.
+        models: Displacements from old to new, working pixels; at least one.
+        box: (x, y, width, height) of the part to compare, pixels at half the size.
         precision: (height, width) float32 inverse variance of grey values there.
 
     Returns:
@@ -44,37 +46,43 @@ def compare(
     part = np.s_[y : y + h, x : x + w]
     off: Floats | None = None
     for model in models:
-        there = cv2.absdiff(new.grey[part], _warp(old.grey, model, box))
-        each = cv2.boxFilter(there, cv2.CV_32F, (3, 3))
-        off = np.asarray(each) if off is None else np.minimum(off, each, out=off)
+        each = cv2.absdiff(new.half[part], _warp(old.half, model, box))
+        off = each if off is None else np.minimum(off, each, out=off)
     assert off is not None, "a layer has a motion"
-    np.multiply(off, off, out=off)
+    off = np.square(off, dtype=np.float32)
     np.multiply(off, precision, out=off)
     np.minimum(off, 9.0, out=off)
     return np.multiply(off, np.float32(-0.5), out=off)
 
 
 def precision_of(image: WorkImage, noise: float, box: tuple[int, int, int, int]) -> Floats:
-    """Inverse variance to expect of a warped image's grey values in a box, (h, w) float32.
+    """Inverse variance to expect of a warped image's grey values, (h, w) float32.
 
     Where the image is steep, a small error of the motion makes a large one of the grey value.
+    The box is of pixels at half the size.
     """
     x, y, w, h = box
-    gx, gy = image.gx[y : y + h, x : x + w], image.gy[y : y + h, x : x + w]
+    every = np.s_[2 * y : 2 * (y + h) : 2, 2 * x : 2 * (x + w) : 2]
+    gx, gy = image.gx[every], image.gy[every]
     slope2 = gx * gx + gy * gy
     return np.asarray(1 / ((1.5 * noise) ** 2 + 0.35**2 * slope2), dtype=np.float32)
 
 
 def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]) -> NDArray[Any]:
-    """An old image as a layer's motion brings it to a part of the newest one."""
+    """An old image, at half the size, as a layer's motion brings it to a part of the newest one.
+
+    The middle of pixel u lies at 2 u + 1/2 in the working image, to which motions refer.
+    """
     x, y, w, h = box
     if model.bend is not None:
         ys, xs = np.mgrid[y : y + h, x : x + w]
         at = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
-        source = (at - model.at(at)).reshape(h, w, 2)
+        source = (at - model.at(2 * at + np.float32(0.5)) / 2).reshape(h, w, 2)
         from_x, from_y = (np.ascontiguousarray(source[..., i]) for i in (0, 1))
         return cv2.remap(grey, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    back = np.eye(2, 3) - model.matrix
+    back = np.eye(2, 3)
+    back[:, :2] -= model.matrix[:, :2]
+    back[:, 2] -= np.asarray(model.shift((0.5, 0.5))) / 2
     back[:, 2] += back[:, :2] @ np.array([x, y])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return cv2.warpAffine(grey, back, (w, h), flags=flags, borderMode=cv2.BORDER_REPLICATE)
@@ -101,7 +109,7 @@ def warped(
     any_near = np.asarray(near.any(axis=1))
     if not any_near.any():
         return out
-    box = cells.box(any_near)
+    box = _halved(cells.box(any_near), cells)
     precision = precision_of(scene.image, noise, box)
     zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, precision), box)
     out[any_near, 0] = zero[any_near]
@@ -110,7 +118,7 @@ def warped(
         mine = np.flatnonzero(near[:, k - 1])
         if len(mine):
             models = t.predicted(c.lag, c.span_s)
-            x, y, w, h = own = cells.box(near[:, k - 1])
+            x, y, w, h = own = _halved(cells.box(near[:, k - 1]), cells)
             there = np.s_[y - box[1] : y - box[1] + h, x - box[0] : x - box[0] + w]
             fit = compare(scene.image, old, models, own, precision[there])
             out[mine, k] = _cell_mean(cells, fit, own)[mine]
@@ -138,9 +146,19 @@ def _was_hidden(scene: Scene, which: NDArray[np.int64], model: Affine, k: int) -
     return out
 
 
-def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
-    """Mean of a map of a box in each cell; only of cells that lie in it whole."""
+def _halved(box: tuple[int, int, int, int], cells: Superpixels) -> tuple[int, int, int, int]:
+    """A box of working pixels as one at half the size, at least one pixel wide, in the image."""
     x, y, w, h = box
-    where = cells.labels[y : y + h, x : x + w].ravel().astype(np.int64)
+    height, width = (n // 2 for n in cells.labels.shape)
+    left, top = min(x // 2, width - 1), min(y // 2, height - 1)
+    right, bottom = min((x + w + 1) // 2, width), min((y + h + 1) // 2, height)
+    return left, top, max(right - left, 1), max(bottom - top, 1)
+
+
+def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
+    """Mean of a map of a box, at half the size, in each cell; 0 where none of its pixels is seen."""
+    x, y, w, h = box
+    where = cells.labels[2 * y : 2 * (y + h) : 2, 2 * x : 2 * (x + w) : 2].ravel().astype(np.int64)
     total = np.bincount(where, weights=values.ravel(), minlength=cells.count)
-    return np.asarray(total / cells.area, dtype=np.float32)
+    number = np.bincount(where, minlength=cells.count)
+    return np.asarray(total / np.maximum(number, 1), dtype=np.float32)

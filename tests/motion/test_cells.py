@@ -72,4 +72,16 @@ def test_overlap_carries_shares_with_their_pixels(seed: int, shift: int) -> None
     source[:, : max(shift, 0)] = -1
     share = np.random.default_rng(seed).random(old.count).astype(np.float32)
     carried = np.where(source >= 0, share[source], 0).astype(np.float32)
-    assert np.allclose(overlap(old, new, source) @ share, new.mean(carried), atol=1e-5)
+    places, ends = new.samples(1)
+    step = overlap(old, new, source.ravel()[places], ends)
+    assert np.allclose(step @ share, new.mean(carried), atol=1e-5)
+
+
+@given(st.integers(0, 99), st.integers(1, 5))
+@settings(deadline=None, max_examples=8)
+def test_samples_are_every_nth_pixel_of_each_cell(seed: int, every: int) -> None:
+    cells = cells_of(seed)
+    places, ends = cells.samples(every)
+    for k in range(cells.count):
+        inside = np.flatnonzero(cells.labels.ravel() == k)
+        assert np.array_equal(places[ends[k] : ends[k + 1]], inside[::every])

@@ -140,7 +140,7 @@ def explained_by(looked: Looked, m: Measured) -> NDArray[np.int64]:
     """
     c, cells = m.constraints, looked.scene.cells
     best, layer = m.background.distances(c), np.zeros(len(c), np.int64)
-    at = looked.scene.cell_of(c.xy)
+    at = looked.scene.cell_of(c)
     for k, t in enumerate(looked.tracks, 1):
         near = cells.reach((t.share > 0.3)[:, None], 1)[at, 0]
         parts = [distances(p, c, slack_of(p, t.centre)) for p in t.predicted(c.lag, c.span_s)]
