@@ -88,13 +88,32 @@ def _territory(
             continue
         # What comes out from behind an object is not a part of it.
         others = [
-            o.own > BEHIND for o in tracks if o is not t and o.hidden is not None and o.own is not None
+            o.own > BEHIND
+            for o in tracks
+            if o is not t and o.hidden is not None and o.own is not None
         ]
         free = where & ~np.any(others, axis=0) if others else where
         most = np.count_nonzero(free) > 0.5 * np.count_nonzero(where)
         if most and np.mean(t.recent[free] > 0.3) > 0.5:
-            return i
+            return i if moves_like(motion, t) else _uncovered(tracks, i, where, motion, scene)
     return None
+
+
+def _uncovered(
+    tracks: Sequence[Track], host: int, where: NDArray[np.bool_], motion: Motion, scene: Scene
+) -> int | None:
+    """Whose part it is that turned up where a track was: the track's, unless another moves so.
+
+    What an occluder uncovers moves as what it hid, and lies beside the rest of that.
+    """
+    near = scene.cells.reach(where[:, None], NEAR_STEPS)[:, 0]
+    best, most = host, 0
+    for i, t in enumerate(tracks):
+        if i != host and t.id and t.own is not None and moves_like(motion, t):
+            there = int(np.count_nonzero(near & ((t.own > BEHIND) | (t.share > BEHIND))))
+            if there > most:
+                best, most = i, there
+    return best
 
 
 def _unexplained(

@@ -411,7 +411,7 @@ def remember(
     hidden = cells.paint(covered) if much else None
     if much and track.whole_map is not None and track.own is not None:
         # By pixels, for cells are others in each frame: by those it would wear away at its edges.
-        hidden = track.whole_map * cells.paint(taken & (track.own > 0.05))
+        hidden = track.whole_map * cells.paint(taken & (track.own > 0))
     return replace(
         track,
         share=share,

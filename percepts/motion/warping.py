@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import cv2
@@ -44,12 +45,8 @@ def compare(
     """
     x, y, w, h = box
     part = np.s_[y : y + h, x : x + w]
-    off: Floats | None = None
-    for model in models:
-        each = cv2.absdiff(new.half[part], _warp(old.half, model, box))
-        off = each if off is None else np.minimum(off, each, out=off)
-    assert off is not None, "a layer has a motion"
-    off = np.square(off, dtype=np.float32)
+    gaps = [cv2.absdiff(new.half[part], _warp(old.half, model, box)) for model in models]
+    off = np.square(reduce(np.minimum, gaps), dtype=np.float32)
     np.multiply(off, precision, out=off)
     np.minimum(off, 9.0, out=off)
     return np.multiply(off, np.float32(-0.5), out=off)
