@@ -165,7 +165,8 @@ def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
             keep = gone <= 0.2 and t.evidence > -20
         else:
             keep = gone <= (settings.memory_s if t.hidden is not None else 0.5)
-            keep = keep and not is_swallowing(t, scene)
+            # As surely the background as it had to be something else to be told.
+            keep = keep and t.evidence > -LIKELY and not is_swallowing(t, scene)
         if keep:
             out.append(t)
     keys = {t.key for t in out}

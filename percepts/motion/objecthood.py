@@ -14,12 +14,20 @@ LIMB = 0.35  # how large, as a share of its object, a part may be that is taken 
 LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
 LEAST_SHARE = 0.25  # the same as a share of its size
 STRAIGHT = 0.6  # net way as a share of the way
+DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of that at rest
+EVENLY = 1.5  # how much brighter, relative to the rest, the brightest part of a shadow may be
+SAME_HUE = 0.035  # how far colour may differ in it, as a share of brightness
 GHOST = 0.6  # edges in the image, as a share of those at rest, below which nothing is there
 FRAGMENT = 0.2  # gap between a part and its object, as a share of its length
 
 
 def is_salient(s: Silhouette) -> bool:
-    """Whether a side of an object's box has left its place and kept a course while it did."""
+    """Whether a side of an object's box has left its place and kept a course while it did.
+
+    Shadows do so too, and are none.
+    """
+    if s.shadow:
+        return False
     gone = s.gone()
     least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
     return s.frames >= 3 and bool(np.any((gone > least) & (gone > STRAIGHT * s.way)))
@@ -64,6 +72,29 @@ def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
             tone[where] = t
     corner = (float(box[0]), float(box[1]))
     return replace(host, id=host.id or s.id, now=(box, mask), shape=mask, tone=tone, corner=corner)
+
+
+def is_deep_shadow(s: Silhouette, image: Floats, rest: Floats) -> bool:
+    """Whether an outline shows the rest, dimmed by one factor all over: what is cast, not what casts.
+
+    Objects differ from what they hide by more in one place than in another.
+
+    Args:
+        s: The object.
+        image: (h, w, 3) float32.
+        rest: (h, w, 3) float32, the picture of the rest at the exposure of the image.
+    """
+    if s.now is None or s.crowded:
+        return False
+    box, shape = s.now
+    now, before = cut(image, box)[shape], cut(rest, box)[shape]
+    power = np.einsum("ij,ij->i", before, before) + 1.0
+    bright = np.einsum("ij,ij->i", now, before) / power
+    gap = now - bright[:, None] * before
+    hue = np.sqrt(np.einsum("ij,ij->i", gap, gap) / power)
+    low, high = np.quantile(bright, [0.1, 0.9])
+    dim = low > DIMMED[0] and high < min(DIMMED[1], EVENLY * low)
+    return bool(dim and np.quantile(hue, 0.9) <= SAME_HUE)
 
 
 def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:

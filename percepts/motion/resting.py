@@ -9,13 +9,14 @@ not know: what was there, and slow, when the picture was made.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from visup.agent import Frame, Region
 from visup.percepts.motion.image import Floats
-from visup.percepts.motion.objecthood import is_ghost, joined
+from visup.percepts.motion.objecthood import is_deep_shadow, is_ghost, joined
 from visup.percepts.motion.picture import (
     Picture,
     changed,
@@ -116,6 +117,9 @@ class RestingView:
         view = view_of(image, change, settings.least_blob * change.size, now, seconds)
         known, self._born = follow(self._known, view, self._born)
         known = joined(known)
+        known = tuple(
+            s if s.id else replace(s, shadow=is_deep_shadow(s, image, picture.mean)) for s in known
+        )
         now_edges, rest_edges = edges(image), edges(picture.mean)
         ghosts = [s for s in known if is_ghost(s, now_edges, rest_edges)]
         known = tuple(s for s in known if s not in ghosts)

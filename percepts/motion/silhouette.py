@@ -38,6 +38,7 @@ class Silhouette:
         crowded: Whether it shares a blob with others.
         cut: Whether the border of the image cuts it, or did: then it is no limb of another.
         parted: How far it went since it was last seen in one piece, pixels.
+        shadow: Whether it looks as a deep shadow does; told of what has no public id.
     """
 
     key: int
@@ -57,6 +58,7 @@ class Silhouette:
     crowded: bool = False
     cut: bool = False
     parted: float = 0.0
+    shadow: bool = False
 
     @property
     def centre(self) -> tuple[float, float]:

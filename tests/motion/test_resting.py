@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.motion.clips import FPS, SIZE, Shot, clip, texture
 from visup.agent import Frame
-from visup.percepts.motion.objecthood import is_salient
+from visup.percepts.motion.objecthood import is_deep_shadow, is_salient
 from visup.percepts.motion.picture import changed, exposed, first_picture, learnt, shaded
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.silhouette import Silhouettes, histogram_of, view_of
@@ -40,6 +40,19 @@ def followed(frames: list[np.ndarray]) -> list[Silhouettes]:
         known, born = follow(known, view, born)
         out.append(known)
     return out
+
+
+@pytest.mark.parametrize(
+    ("seed", "dim", "shadow"),
+    [(1, 0.45, True), (1, 0.55, True), (2, 0.45, False), (2, 1.0, False), (1, 0.2, False)],
+)
+def test_a_deep_shadow_is_the_rest_dimmed_by_one_factor(
+    seed: int, dim: float, shadow: bool
+) -> None:
+    mask, image = box(100, 60, 40, 40), GROUND.copy()
+    image[mask] = dim * np.repeat(texture(seed, SIZE)[..., None], 3, axis=2)[mask]
+    (found,) = follow((), view_of(image, mask, 20, 0.0, 1 / FPS), 0)[0]
+    assert is_deep_shadow(found, image, GROUND) == shadow
 
 
 @settings(deadline=None, max_examples=25)
