@@ -41,6 +41,7 @@ def main() -> int:
     results = [
         _run(kind, None, given.out)
         for kind in ("clips", "robustness", "relations", "rules", "tasks")
+        for kind in ("clips", "robustness", "relations", "rules", "faults")
         if (given.only or "") in kind
     ]
     if not given.data.is_dir():
