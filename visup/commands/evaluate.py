@@ -11,8 +11,8 @@ import typer
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
 from visup.commands.eval_tasks import tasks
-from visup.commands.reasoning import reasoning
 from visup.commands.faults import faults
+from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
 from visup.commands.views import views
