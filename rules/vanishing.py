@@ -83,11 +83,19 @@ def miss(work: Work) -> None:
         )
         if out and (cover is None or track.visible > s.hidden_share):
             _leave(work, belief, 0.9)
-        elif cover is not None:
+        elif cover is not None and _hidden_now(work, track, cover):
             _hide(work, belief, cover)
         elif work.now - track.seen_at >= s.lost_s - 1e-6:
             work.put(replace(belief, presence=Presence.HIDDEN), told="lost", clear_since=None)
             work.tell("lost", "{0} is no longer seen, and nothing tells why.", belief.id)
+
+
+def _hidden_now(work: Work, track: Track, cover: ObjectBelief) -> bool:
+    """Whether so little of a missing object would show beside its cover that it is not just missed."""
+    s = work.settings
+    covered = shared_pixels(cover.region, track.region) / max(1.0, track.region.area)
+    showing = track.visible * (1.0 - covered)
+    return showing < s.hidden_share or work.now - track.seen_at >= s.missed_s - 1e-6
 
 
 def _cover(work: Work, belief: ObjectBelief) -> ObjectBelief | None:

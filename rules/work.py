@@ -23,6 +23,7 @@ class PresenceSettings:
         least_sightings: Sightings that an entry needs.
         allowed_gap_s: Longest flicker within a steady sighting.
         settle_s: How long an object must be missing before exit or occlusion is told.
+        missed_s: The same when it is not seen though another hides only a part of it.
         lost_s: The same when nothing explains it.
         partial_s: How long little must show before exit or occlusion is told.
         hidden_share: Below this share in sight, beside another region, an object is occluded.
@@ -41,6 +42,7 @@ class PresenceSettings:
     least_sightings: int = 3
     allowed_gap_s: float = 0.25
     settle_s: float = 0.3
+    missed_s: float = 0.9
     lost_s: float = 2.0
     partial_s: float = 0.16
     hidden_share: float = 0.2

@@ -227,7 +227,7 @@ class NamesTruth:
     def __post_init__(self) -> None:
         noise, mission = self.seeing.noise, self.seeing.mission
         self.contract = Contract(
-            "names of truth", ("hypothesis", "depth"), ("region",), noise.names_every_s
+            "truth_names", ("hypothesis", "depth"), ("region",), noise.names_every_s
         )
         seeds = np.random.SeedSequence([noise.seed, 2]).spawn(len(mission.truth["labels"]))
         for name, seed in zip(sorted(mission.truth["labels"]), seeds, strict=True):
@@ -248,7 +248,7 @@ class NamesTruth:
         for region in seen.of("region"):
             for value in self._said(region, frame.index):
                 kind = "hypothesis" if isinstance(value, Hypothesis) else "depth"
-                yield Percept(kind, value, frame.time, "truth")
+                yield Percept(kind, value, frame.time, "truth_names")
 
     def _said(self, region: Region, index: int) -> Iterator[Hypothesis | Depth]:
         masks = self.seeing.mission.masks[index]
