@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 from visup.agent.act import alert_events, faults, update_alerts
 from visup.agent.answers import understood, with_answers
@@ -21,6 +22,7 @@ from visup.agent.records import (
     Report,
     Severity,
 )
+from visup.agent.state import Keeps
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +114,26 @@ class Agent:
         Returns:
             The whole record of the step; `mind` has become `Step.mind`.
         """
-        seen = perceive(self._slots, frame, self.directives)
-        thought = self._reason(seen)
-        step = self._act(seen, thought)
-        self.mind, self.directives = step.mind, step.directives
+        step = self.rethink(self.look(frame))
         for observer in self.observers:
             observer(step, frame)
+        return step
+
+    def look(self, frame: Frame) -> Observation:
+        """Perceive only: behaviours see the frame, the mind stays as it is."""
+        return perceive(self._slots, frame, self.directives)
+
+    def rethink(self, seen: Observation) -> Step:
+        """Reason about what was perceived, now or in a recorded run; observers are not told.
+
+        Args:
+            seen: What was perceived of the next frame.
+
+        Returns:
+            The whole record of the step; `mind` has become `Step.mind`.
+        """
+        step = self._act(seen, self._reason(seen))
+        self.mind, self.directives = step.mind, step.directives
         return step
 
     def run(
@@ -153,6 +169,33 @@ class Agent:
             SettingsError: There is no such object, or nobody knows such a name.
         """
         self._answers[object_id] = understood(self.mind, object_id, name, self.models)
+    def save(self) -> Mapping[str, Any]:
+        """All that this agent has become, to be frozen by `visup.agent.state`.
+
+        Returns:
+            `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
+        """
+        kept = [s.behaviour for s in self._slots if isinstance(s.behaviour, Keeps)]
+        whole = len(kept) == len(self._slots)
+        return {
+            "mind": (self.mind, self.directives, self._alerts_opened),
+            "behaviours": {b.contract.name: b.save() for b in kept} if whole else None,
+            "slots": {s.behaviour.contract.name: s.conduct() for s in self._slots},
+        }
+
+    def load(self, state: Mapping[str, Any]) -> bool:
+        """Become what an agent of the same settings was; `state` is used up.
+
+        Returns:
+            Whether behaviours too are as they were; else they are new, and only the mind is.
+        """
+        self.mind, self.directives, self._alerts_opened = state["mind"]
+        behaviours = state["behaviours"]
+        for slot in self._slots if behaviours is not None else ():
+            name = slot.behaviour.contract.name
+            slot.behaviour.load(behaviours[name])  # type: ignore[attr-defined]  # it gave its state
+            slot.take_up(state["slots"][name])
+        return behaviours is not None
 
     def _reason(self, seen: Observation) -> Outcome:
         """Update, cogitate, match: all or nothing."""

@@ -8,9 +8,10 @@ twice as long each time, so that a broken plug-in costs little and can still com
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from graphlib import CycleError, TopologicalSorter
+from typing import Any
 
 from visup.agent.behaviour import Behaviour
 from visup.agent.errors import BehaviourError
@@ -29,6 +30,15 @@ class Slot:
     last_run: float = float("-inf")
     failures: int = 0
     suspended_until: float = float("-inf")
+
+    def conduct(self) -> dict[str, Any]:
+        """What the agent knows of its behaviour's conduct, as plain values."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "behaviour"}
+
+    def take_up(self, conduct: Mapping[str, Any]) -> None:
+        """Go on from the conduct that another slot told."""
+        for name, value in conduct.items():
+            setattr(self, name, value)
 
     @property
     def suspension_s(self) -> float:

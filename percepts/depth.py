@@ -15,6 +15,8 @@ from types import MappingProxyType
 
 import cv2
 from scipy.spatial.distance import pdist
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from visup.agent.behaviour import Contract
 from visup.agent.errors import SettingsError
@@ -62,6 +64,13 @@ class DepthBehaviour:
         self._areas = {(v.name, v.number): v.area for v in views if v.area is not None}
         known = extents(database, sizes_m) if database is not None else {}
         self._enlarged = {n: sizes_m[n] / extent for n, extent in known.items()}
+
+    def save(self) -> Mapping[str, Any]:
+        """Nothing: each frame stands for itself."""
+        return {}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Nothing is remembered."""
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]

@@ -13,7 +13,8 @@ from visup.agent import Frame, Severity, Verdict
 from visup.agent.agent import Observer, Step
 from visup.agent.encode import plain
 from visup.agent.errors import ExtraMissingError, OutputError
-from visup.agent.journal import Journal, export_events
+from visup.agent.journal import Journal
+from visup.agent.recording import export_events
 from visup.percepts.video import Source
 from visup.settings import WatchSettings
 from visup.supervisor import build_agent, final_verdict, open_video

@@ -9,6 +9,7 @@ from visup.agent import Behaviour, Mind, Severity, Verdict
 from visup.agent.agent import Agent, Observer, Thinkers
 from visup.agent.errors import SettingsError
 from visup.agent.registry import discover, from_file
+from visup.conditions import tell_conditions
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
@@ -26,7 +27,7 @@ from visup.zones import load_zones
 if TYPE_CHECKING:
     from visup.tasks.tree import Task
 
-__all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video"]
+__all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
 
 def open_video(settings: WatchSettings) -> Source:
@@ -38,8 +39,17 @@ def open_video(settings: WatchSettings) -> Source:
     return open_source(settings.source, every=settings.every, fps=settings.fps)
 
 
-def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> Agent:
+def build_agent(
+    settings: WatchSettings,
+    observers: Sequence[Observer] = (),
+    also: Sequence[Behaviour] = (),
+) -> Agent:
     """An agent that supervises as the settings say.
+
+    Args:
+        settings: What to supervise against.
+        observers: Told of each step.
+        also: Behaviours besides those of the settings.
 
     Raises:
         VisupError: A task, rules file, zones file, model database or behaviour is not as it should
@@ -52,12 +62,24 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
     _check_actors(settings, tasks, database)
     return Agent(
         behaviours=_behaviours(settings, database, sizes(tasks, settings.actors)),
+        behaviours=[*_behaviours(settings, database), *also],
         thinkers=_thinkers(settings, tasks),
         actors=settings.actors,
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
     )
+
+
+def reasoning_agent(settings: WatchSettings) -> Agent:
+    """An agent that reasons as the settings say about what was perceived before; it sees nothing.
+
+    Raises:
+        VisupError: A task or rules file is not as it should be, or an actor is bound that no task has.
+    """
+    tasks = [load_task(name) for name in settings.tasks]
+    _check_actors(settings, tasks, None)
+    return Agent(thinkers=_thinkers(settings, tasks), actors=settings.actors)
 
 
 def final_verdict(mind: Mind) -> Verdict:
@@ -98,7 +120,7 @@ def _behaviours(
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     rules = tuple(rule for path in settings.rules for rule in load_rules(path))
     interpreting = default_thinkers(rules=rules or None)
-    match = (task_thinker(tasks),) if tasks else ()
+    match = (*((task_thinker(tasks),) if tasks else ()), tell_conditions)
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 
