@@ -95,6 +95,16 @@ class Recording:
         ends = [(a, b) for _, (a, b) in rows if isinstance(a, int) and isinstance(b, int)]
         return (ends[0][0], ends[-1][1]) if ends else None
 
+    def count(self) -> int:
+        """How many steps are kept."""
+        return sum(n for _, (n,) in self._rows("SELECT count(*) FROM steps"))
+
+    def written(self) -> float:
+        """When it was last written to, seconds since the epoch by the clock of the wall."""
+        last = segments(self.path)[-1]
+        log = last.with_name(last.name + "-wal")
+        return max(p.stat().st_mtime for p in (last, log) if p.exists())
+
     def _rows(
         self, sql: str, given: tuple[Any, ...] = ()
     ) -> Iterator[tuple[Path, tuple[Any, ...]]]:
