@@ -40,6 +40,7 @@ class Recorder:
         source: What is watched.
         folder: A folder from `fresh_folder`, or that of the run that goes on.
         video: Whether to write the annotated video.
+        report: Whether to write the report.
         limits: Of the journal.
         resume: Whether the run goes on.
 
@@ -60,6 +61,7 @@ class Recorder:
         folder: Path,
         *,
         video: bool = True,
+        report: bool = True,
         limits: Limits | None = None,
         resume: bool = False,
     ) -> None:
@@ -82,7 +84,8 @@ class Recorder:
         self.collector = Collector()
         path = _free(folder / "annotated.webm")
         self.video = AnnotatedVideo(path, source.fps / settings.every) if video else None
-        self._derived = {"report": self.collector.add}
+        self._wants_report = report
+        self._derived = {"report": self.collector.add} if report else {}
         if self.video:
             self._derived["annotated video"] = self.video.add
         self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
@@ -178,6 +181,8 @@ class Recorder:
     def _report(self, verdict: Verdict | None, problem: str | None) -> Path | None:
         from visup.report.html import write_report
 
+        if not self._wants_report:
+            return None
         path = self.folder / "report.html"
         try:
             write_report(self._run_data(verdict, problem), path)

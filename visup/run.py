@@ -34,6 +34,7 @@ class RunOptions:
 
     Attributes:
         video: Whether to write the annotated video.
+        report: Whether to write the report.
         limits: Of the journal.
         state_every_s: Seconds of the source between two states from which it could be resumed; 0 for
             none.
@@ -41,6 +42,7 @@ class RunOptions:
     """
 
     video: bool = True
+    report: bool = True
     limits: Limits = field(default_factory=Limits)
     state_every_s: float = 30.0
     sinks: tuple[str, ...] = ()
@@ -193,7 +195,13 @@ def _recorder(
     if folder is None:
         return None
     made = Recorder(
-        settings, source, folder, video=options.video, limits=options.limits, resume=resume
+        settings,
+        source,
+        folder,
+        video=options.video,
+        report=options.report,
+        limits=options.limits,
+        resume=resume,
     )
     stack.callback(made.close)
     return made

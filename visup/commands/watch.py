@@ -146,7 +146,12 @@ def _answers(given: list[str], path: Path | None) -> dict[int, str]:
     from visup.run import RunOptions
 
     keep = None if keep_gb is None else int(keep_gb * 1e9)
-    options = RunOptions(video, Limits(keep_bytes=keep), state_every, tuple(sink or ()))
+    options = RunOptions(
+        video=video,
+        limits=Limits(keep_bytes=keep),
+        state_every_s=state_every,
+        sinks=tuple(sink or ()),
+    )
     if resume:
         settings, past = _past(resume, source, task, models, rules, out, actor)
     elif source is None:
