@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic_core import from_json, to_json
 
 from visup.agent import mind, records
 from visup.agent.errors import OutputError
@@ -58,8 +59,7 @@ def packed(seen: Observation) -> bytes:
     Returns:
         A compressed JSON document.
     """
-    text = json.dumps(document(seen), ensure_ascii=False, separators=(",", ":"))
-    return zlib.compress(text.encode(), _LEVEL)
+    return zlib.compress(to_json(document(seen), inf_nan_mode="constants"), _LEVEL)
 
 
 def unpacked(data: bytes, where: str = "") -> Observation:
@@ -73,8 +73,8 @@ def unpacked(data: bytes, where: str = "") -> Observation:
         text = inflater.decompress(data, LARGEST)
         if not inflater.eof:
             raise ValueError("it is cut off or too large")
-        return observation(json.loads(text))
-    except (zlib.error, ValueError, TypeError, KeyError, AttributeError, RecursionError) as fault:
+        return observation(from_json(text))
+    except (zlib.error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as fault:
         raise OutputError(
             f"a recorded step cannot be read ({fault})",
             where=where or None,

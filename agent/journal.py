@@ -91,7 +91,7 @@ class Journal:
 
     def note(self, **facts: Any) -> None:
         """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
-        rows = [(key, _json(value)) for key, value in facts.items()]
+        rows = [(key, _text(plain(value))) for key, value in facts.items()]
         self._write([("INSERT OR REPLACE INTO run VALUES (?, ?)", row) for row in rows])
 
     def record(self, step: Step, frame: Frame | None = None) -> None:
@@ -101,7 +101,7 @@ class Journal:
             OutputError: The disk is full or the file has become unwritable; earlier steps stay.
         """
         seen = packed(step.observation)
-        row = (step.frame_index, step.time, _json(summary(step)), seen, zlib.crc32(seen))
+        row = (step.frame_index, step.time, _text(summary(step)), seen, zlib.crc32(seen))
         statements: list[Statement] = [("INSERT INTO steps VALUES (?, ?, ?, ?, ?)", row)]
         statements += [
             ("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (number, *_event_row(e)))
@@ -265,15 +265,16 @@ def _connected(path: Path) -> sqlite3.Connection:
 
 
 def _event_row(event: Event) -> tuple[Any, ...]:
-    return event.frame_index, event.time, event.kind, event.text, _json(event_line(event))
+    return event.frame_index, event.time, event.kind, event.text, _text(event_line(event))
 
 
 def _alert_row(a: Alert) -> tuple[Any, ...]:
-    return a.id, a.kind, a.severity.name.lower(), a.opened, a.closed, a.cause, _json(plain(a))
+    return a.id, a.kind, a.severity.name.lower(), a.opened, a.closed, a.cause, _text(plain(a))
 
 
-def _json(value: Any) -> str:
-    return json.dumps(plain(value), ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+def _text(value: Any) -> str:
+    """Plain values as JSON, the same values as the same text."""
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
 def _unwritable(path: Path, fault: sqlite3.Error) -> OutputError:
