@@ -13,11 +13,13 @@ from visup.agent.errors import OutputError
 from visup.agent.journal import Limits
 from visup.conditions import Conditions
 from visup.percepts.video import Source
+from visup.percepts.video.live import LiveSource
 from visup.recorder import Recorder, kept_of
 from visup.resume import Past, caught_up
 from visup.settings import WatchSettings
 from visup.sinks import Sinks
 from visup.states import StateKeeper
+from visup.steady import Steady
 from visup.supervisor import build_agent, final_verdict, open_video
 
 if TYPE_CHECKING:
@@ -116,6 +118,7 @@ def supervise(
     progress: Progress | None = None,
     video: bool = True,
     operator: Operator | None = None,
+    notice: Callable[[str], None] | None = None,
     options: RunOptions | None = None,
     past: Past | None = None,
 ) -> RunResult:
@@ -128,6 +131,7 @@ def supervise(
         progress: Told of each step.
         video: Whether to write the annotated video.
         operator: Who answers questions; nobody by default.
+        notice: Told what cannot wait for a step, such as that a camera dropped: one sentence.
         options: How it is recorded and told.
         past: The run to go on with; `settings` are its own.
 
@@ -161,9 +165,14 @@ def supervise(
         if recorder:
             conditions.ask(recorder.troubles)
         conditions.ask(sinks.troubles)
+        steady = Steady(frames, source.fps, agent.mind.time if past and past.steps else None)
+        conditions.ask(steady.troubles)
+        if isinstance(source, LiveSource):
+            source.notify = notify(sinks, notice)
+            conditions.ask(source.troubles)
         steps = past.steps if past else 0
         try:
-            for step in agent.steps(frames):
+            for step in agent.steps(steady):
                 steps += 1
                 if states:
                     states.offer(agent, step, lambda: kept_of(recorder))
@@ -182,6 +191,17 @@ def supervise(
         ended = source.ended.value if source.ended and not tally.stopped else "stopped"
         report, more = recorder.finish(verdict, steps, problem, ended, agent.mind.tasks)
         return RunResult(verdict, steps, problem, folder, report, (*notes, *more))
+
+
+def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:
+    """What tells a sentence to sinks and to `notice` at once."""
+
+    def tell(text: str) -> None:
+        sinks.notice(text)
+        if notice:
+            notice(text)
+
+    return tell
 
 
 def _recorder(

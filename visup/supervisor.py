@@ -36,7 +36,12 @@ def open_video(settings: WatchSettings) -> Source:
     Raises:
         SourceError: It cannot be opened.
     """
-    return open_source(settings.source, every=settings.every, fps=settings.fps)
+    return open_source(
+        settings.source,
+        every=settings.every,
+        fps=settings.fps,
+        patience_s=settings.patience_s,
+    )
 
 
 def build_agent(

@@ -209,6 +209,7 @@ def run_and_tell(
 ) -> RunResult:
     """Run, print the narrative as it goes and the verdict last."""
     from rich.console import Console
+    from rich.markup import escape
 
     from visup.narrative import Narrator
     from visup.operator import Operator, typed_lines
@@ -229,6 +230,9 @@ def run_and_tell(
             progress=progress,
             video=video,
             operator=operator,
+            notice=None
+            if as_json
+            else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]"),
             options=options,
             past=past,
         )

@@ -62,6 +62,10 @@ class Sinks:
         for observer in self._observers:
             observer(step, frame)
 
+    def notice(self, text: str) -> None:
+        """Send a sentence that cannot wait for a step."""
+        self._alerts.notice(text)
+
     def troubles(self) -> Iterable[Concern]:
         """What is wrong with sinks now."""
         return [concern for outbox in self.outboxes for concern in outbox.troubles()]

@@ -48,6 +48,11 @@ class AlertSender:
         for alert in step.alerts:
             self._send(alert_record(alert, self._source))
 
+    def notice(self, text: str) -> None:
+        """Send a sentence that cannot wait for a step."""
+        told = {"version": VERSION, "record": "notice", "source": self._source, "text": text}
+        self._send(told)
+
     def end(self, verdict: Verdict | None, steps: int) -> None:
         """Send the verdict."""
         self._send(verdict_record(verdict, steps, self._source))
