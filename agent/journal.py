@@ -85,9 +85,8 @@ class Journal:
             self._open(path, 1)
             return
         old = segments(path)
-        for one in old:
-            self._take_over(one)
-        self._db = _connected(old[-1])
+        begun = [one for one in old if self._take_over(one)]
+        self._db = _connected(begun[-1])
 
     def note(self, **facts: Any) -> None:
         """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
@@ -130,9 +129,9 @@ class Journal:
     def _open(self, path: Path, number: int) -> None:
         try:
             self._db = _connected(path)
-            self._db.execute(f"PRAGMA application_id={APPLICATION_ID}")
             # One transaction: a run killed meanwhile leaves an empty file or a whole journal.
-            self._db.executescript(f"BEGIN;{SCHEMA}PRAGMA user_version={VERSION};COMMIT;")
+            marks = f"PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};"
+            self._db.executescript(f"BEGIN;{SCHEMA}{marks}COMMIT;")
         except sqlite3.Error as fault:
             raise _unwritable(path, fault) from fault
         self._sizes.append(0)
@@ -140,9 +139,13 @@ class Journal:
         if number > 1:
             self.note(segment=number)
 
-    def _take_over(self, path: Path) -> None:
+    def _take_over(self, path: Path) -> bool:
+        """Count what a segment holds; False when the run was killed before it was begun."""
         try:
             db = _connected(path)
+            if path != self.path and is_empty(db):
+                db.close()
+                return False
             check_version(db, path)
             last, begun, size = db.execute(
                 "SELECT max(frame_index), min(time), coalesce(sum(length(seen) + length(summary)), 0)"
@@ -156,6 +159,7 @@ class Journal:
         self._last_event = max(self._last_event, event)
         self._begun = begun
         self._sizes.append(size)
+        return True
 
     def _is_full(self, time: float) -> bool:
         if self._begun is None:
@@ -212,6 +216,11 @@ def segments(path: Path) -> list[Path]:
     while (following := segment_path(path, len(found) + 1)).exists():
         found.append(following)
     return found
+
+
+def is_empty(db: sqlite3.Connection) -> bool:
+    """Whether a file is a segment that was not begun."""
+    return db.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
 
 
 def check_version(db: sqlite3.Connection, path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from visup.agent.codec import unpacked
 from visup.agent.errors import OutputError
-from visup.agent.journal import check_version, segments
+from visup.agent.journal import check_version, is_empty, segments
 from visup.agent.records import Observation
 
 JOURNAL = "journal.sqlite"
@@ -111,10 +111,12 @@ class Recording:
         for path in segments(self.path):
             try:
                 with closing(_opened(path)) as db:
+                    if path != self.path and is_empty(db):
+                        continue
                     check_version(db, path)
                     for row in db.execute(sql, given):
                         yield path, row
-            except (sqlite3.Error, TypeError, OverflowError) as fault:
+            except (sqlite3.Error, ValueError, TypeError, OverflowError) as fault:
                 raise _damaged(str(path), str(fault)) from fault
 
     def _record(self, text: Any) -> dict[str, Any]:
