@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -182,20 +183,23 @@ def test_a_value_that_is_not_plain_leaves_what_its_behaviour_gives_unobserved() 
 
 
 REGION = Region(
-    1, (0, 0, 2, 2), np.ones((2, 2), bool), np.float32([[0, 0], [1, 0], [1, 1]]), (0.5, 0.5), 4.0
+    1,
+    (0, 0, 2, 2),
+    np.ones((2, 2), bool),
+    np.array([[0, 0], [1, 0], [1, 1]], np.float32),
+    (0.5, 0.5),
+    4.0,
 )
 
 
 @settings(max_examples=150)
 @given(st.data())
-def test_damaged_bytes_are_refused_with_one_message(data: st.DataObject) -> None:
+def test_damaged_bytes_are_refused_or_read_never_more(data: st.DataObject) -> None:
     good = packed(seen_of(("region", REGION), ("own", {"a": (1, b"x")})))
     at = data.draw(st.integers(0, len(good) - 1))
     bad = good[:at] + data.draw(st.binary(max_size=3)) + good[at + 1 :]
-    try:
+    with suppress(OutputError):
         assert same(unpacked(bad), unpacked(good))
-    except OutputError as told:
-        assert "cannot be read" in str(told)
 
 
 json_values = st.recursive(
@@ -210,17 +214,15 @@ json_values = st.recursive(
 
 @settings(max_examples=200)
 @given(json_values, st.sampled_from(["time", "frame_index", "frame_size", "reports", "value"]))
-def test_documents_of_another_form_are_refused_with_one_message(value: Any, place: str) -> None:
+def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, place: str) -> None:
     told = {"frame_index": 1, "time": 0.5, "frame_size": [4, 4], "reports": []}
     if place == "value":
         percept = ["own", value, 0.5, "eye", 1.0]
         told["reports"] = [{"behaviour": "eye", "state": "ran", "gives": [], "percepts": [percept]}]
     else:
         told[place] = value
-    try:
-        unpacked(zlib.compress(json.dumps(told).encode()))
-    except OutputError as fault:
-        assert "cannot be read" in str(fault)
+    with suppress(OutputError):
+        assert isinstance(unpacked(zlib.compress(json.dumps(told).encode())), Observation)
 
 
 def test_a_bomb_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:

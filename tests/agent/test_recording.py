@@ -186,7 +186,7 @@ def test_a_damaged_step_is_told_with_its_frame_and_those_before_it_are_given(
     db.execute("UPDATE steps SET seen = x'00' WHERE frame_index = 6")
     db.commit()
     db.close()
-    given = []
+    given: list[int] = []
     with pytest.raises(OutputError, match="frame 6"):
         given.extend(o.frame_index for o in Recording.open(path).observations())
     steps = Recording.open(path).observations()

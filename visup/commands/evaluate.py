@@ -15,6 +15,7 @@ from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
 from visup.commands.resume import resume
+from visup.commands.lasting import resume, soak
 from visup.commands.views import views
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ app.command("rules")(rules)
 app.command("reasoning")(reasoning)
 app.command("tasks")(tasks)
 app.command("resume")(resume)
+app.command("soak")(soak)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]

@@ -1,4 +1,4 @@
-"""`visup eval resume`: runs that are killed at random moments and gone on with."""
+"""`visup eval resume` and `visup eval soak`: runs that are killed, and runs of hours."""
 
 from __future__ import annotations
 
@@ -42,3 +42,27 @@ def resume(
     if json_file:
         write_record(json_file, figures, {"kills": kills, "seed": seed, "demo": demo})
     raise typer.Exit(int(figures["total"]["equal"] < kills or figures["total"]["lost"] > 0))
+
+
+def soak(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures to this file too.")
+    ] = None,
+    frames: Annotated[int, typer.Option(help="Length of the run.")] = 200_000,
+) -> None:
+    """A run of hours of scripted percepts: time of a step and memory at its start and end."""
+    from rich.console import Console
+
+    from visup.commands.evaluate import print_table, told, writable
+    from visup.evaluation.record import write_record
+    from visup.evaluation.soak import evaluate_soak
+
+    writable(json_file)
+    with told("soaking") as tell:
+        figures = evaluate_soak(frames, progress=tell)
+    console = Console()
+    print_table(console, "soak", figures, ("ms", "rss_mb"))
+    for name, value in figures["total"].items():
+        console.print(f"{name}: {value:.6g}")
+    if json_file:
+        write_record(json_file, figures, {"frames": frames})
