@@ -31,6 +31,7 @@ KILLED_AGAIN = 0.25
 STATELESS = 1 / 3
 STATE_EVERY_S = 0.4
 MOST_RESUMES = 20
+LONGEST_START_S = 60.0
 SIZE, FRAMES, FPS = (96, 72), 50, 10.0
 
 
@@ -69,8 +70,9 @@ def evaluate_resume(
     with tempfile.TemporaryDirectory() as scratch:
         place = Path(scratch)
         settings = settings or WatchSettings(source=str(crossing(place / "clip.avi", seed)))
+        child = _begin(settings, place / "whole", state_every_s)
         begin = time.perf_counter()
-        _wait(_begin(settings, place / "whole", state_every_s))
+        _wait(child)
         whole_s = time.perf_counter() - begin
         expected = _outcome(place / "whole")
         for trial in range(kills):
@@ -159,8 +161,13 @@ def _trial(
 
 
 def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
+    """A process that begins a run; it has begun to record."""
     folder.mkdir()
-    return _forked(folder, lambda console: _supervise(settings, folder, every, console, False))
+    child = _forked(folder, lambda console: _supervise(settings, folder, every, console, False))
+    until = time.monotonic() + LONGEST_START_S
+    while not (folder / JOURNAL).exists() and time.monotonic() < until:
+        time.sleep(0.005)
+    return child
 
 
 def _resume(folder: Path, every: float) -> int | None:
