@@ -22,6 +22,10 @@ FIRST_SUSPENSION_S = 1.0
 LONGEST_SUSPENSION_S = 60.0
 
 
+_SETTLED = frozenset({"behaviour"})
+"""What of a slot is settled when the agent is made; all else is conduct."""
+
+
 @dataclass(slots=True)
 class Slot:
     """A behaviour in its place in an agent, with what the agent knows of its conduct."""
@@ -33,7 +37,7 @@ class Slot:
 
     def conduct(self) -> dict[str, Any]:
         """What the agent knows of its behaviour's conduct, as plain values."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "behaviour"}
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SETTLED}
 
     def take_up(self, conduct: Mapping[str, Any]) -> None:
         """Go on from the conduct that another slot told."""

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from visup.agent import ReportState
+
 VERSION = 1
 """Of the form; that of the journal that holds it is `visup.agent.journal.VERSION`."""
 
@@ -111,7 +113,7 @@ class ReportDocument(_Strict):
     """What one behaviour did in a step."""
 
     behaviour: str
-    state: Literal["ran", "rested", "failed", "suspended"]
+    state: ReportState
     gives: list[str] = Field(description="Kinds of percept that it would have reported.")
     percepts: list[tuple[str, Value, Any, str, Any]] = Field(
         default=[], description="Each is: kind, value, time in seconds, source, confidence."

@@ -16,6 +16,7 @@ from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
 from visup.commands.resume import resume
 from visup.commands.lasting import resume, soak
+from visup.commands.relations import relations
 from visup.commands.views import views
 
 if TYPE_CHECKING:
