@@ -80,11 +80,16 @@ def reasoning_agent(settings: WatchSettings) -> Agent:
     """An agent that reasons as the settings say about what was perceived before; it sees nothing.
 
     Raises:
-        VisupError: A task or rules file is not as it should be, or an actor is bound that no task has.
+        VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
+            task has.
     """
     tasks = [load_task(name) for name in settings.tasks]
     _check_actors(settings, tasks, None)
-    return Agent(thinkers=_thinkers(settings, tasks), actors=settings.actors)
+    return Agent(
+        thinkers=_thinkers(settings, tasks),
+        actors=settings.actors,
+        zones=load_zones(settings.zones) if settings.zones else (),
+    )
 
 
 def final_verdict(mind: Mind) -> Verdict:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from visup.commands.watch import Actors, Rules, Tasks
+from visup.commands.watch import Actors, Rules, Tasks, Zones
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,6 +20,7 @@ def replay(
     task: Tasks = None,
     rules: Rules = None,
     actor: Actors = None,
+    zones: Zones = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the new run to this folder.")
     ] = None,
@@ -53,6 +54,7 @@ def replay(
         tasks=tuple(task or ()),
         rules=tuple(rules or ()),
         actors=parse_actors(actor or ()),
+        zones=zones,
     )
     folder = fresh_folder(out, settings.source) if out else None
     narrator = Narrator(console)

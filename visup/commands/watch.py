@@ -153,7 +153,8 @@ def _answers(given: list[str], path: Path | None) -> dict[int, str]:
         sinks=tuple(sink or ()),
     )
     if resume:
-        settings, past = _past(resume, source, task, models, rules, out, actor)
+        given = (source, task, models, rules, out, actor, behaviour, plugin, fps, fov, zones)
+        settings, past = _past(resume, *given, every != 1)
     elif source is None:
         raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
     else:
