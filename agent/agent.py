@@ -123,15 +123,19 @@ class Agent:
         """Perceive only: behaviours see the frame, the mind stays as it is."""
         return perceive(self._slots, frame, self.directives)
 
-    def rethink(self, seen: Observation) -> Step:
+    def rethink(self, seen: Observation, answers: Mapping[int, str] | None = None) -> Step:
         """Reason about what was perceived, now or in a recorded run; observers are not told.
 
         Args:
             seen: What was perceived of the next frame.
+            answers: What the operator had said before that step of a recorded run: object id ->
+                model name, as 'answer' events tell it. None when there is no such run.
 
         Returns:
             The whole record of the step; `mind` has become `Step.mind`.
         """
+        if answers is not None:
+            self._answers = dict(answers)
         step = self._act(seen, self._reason(seen))
         self.mind, self.directives = step.mind, step.directives
         return step
@@ -169,6 +173,7 @@ class Agent:
             SettingsError: There is no such object, or nobody knows such a name.
         """
         self._answers[object_id] = understood(self.mind, object_id, name, self.models)
+
     def save(self) -> Mapping[str, Any]:
         """All that this agent has become, to be frozen by `visup.agent.state`.
 
@@ -178,7 +183,7 @@ class Agent:
         kept = [s.behaviour for s in self._slots if isinstance(s.behaviour, Keeps)]
         whole = len(kept) == len(self._slots)
         return {
-            "mind": (self.mind, self.directives, self._alerts_opened),
+            "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
             "behaviours": {b.contract.name: b.save() for b in kept} if whole else None,
             "slots": {s.behaviour.contract.name: s.conduct() for s in self._slots},
         }
@@ -189,7 +194,7 @@ class Agent:
         Returns:
             Whether behaviours too are as they were; else they are new, and only the mind is.
         """
-        self.mind, self.directives, self._alerts_opened = state["mind"]
+        self.mind, self.directives, self._alerts_opened, self._answers = state["mind"]
         behaviours = state["behaviours"]
         for slot in self._slots if behaviours is not None else ():
             name = slot.behaviour.contract.name

@@ -62,6 +62,18 @@ class Recording:
         rows = self._rows("SELECT record FROM events ORDER BY number")
         return (self._record(record) for _, (record,) in rows)
 
+    def answers(self) -> dict[int, dict[int, str]]:
+        """What the operator said: frame index -> object id -> model name."""
+        told: dict[int, dict[int, str]] = {}
+        for _, (text,) in self._rows("SELECT record FROM events WHERE kind = 'answer'"):
+            event = self._record(text)
+            try:
+                number, name = int(event["objects"][0]), str(event["data"]["name"])
+                told.setdefault(int(event["frame_index"]), {})[number] = name
+            except (KeyError, IndexError, TypeError, ValueError) as fault:
+                raise _damaged(str(self.path), "an answer is not as it should be") from fault
+        return told
+
     def alerts(self) -> dict[int, dict[str, Any]]:
         """Alerts by id, as they were last."""
         rows = self._rows("SELECT record FROM alerts ORDER BY id")

@@ -129,6 +129,10 @@ class _Writer:
         name = _name(kind)
         if isinstance(value, Enum):
             return ["enum", name, self.node(value.value)]
+        if isinstance(value, tuple):
+            return ["named", name, [self.node(v) for v in value]]
+        if isinstance(value, _BUILT_IN):
+            raise StateError(f"a {kind.__qualname__}")
         return ["object", name, [[n, self.node(v)] for n, v in _attributes(value).items()]]
 
     def _array(self, value: NDArray[Any] | np.generic) -> int:
@@ -143,6 +147,7 @@ class _Writer:
 
 
 _OPEN = -1
+_BUILT_IN = (bool, int, float, str, bytes, list, dict, set, frozenset)
 
 
 def _in_order(values: frozenset[Any] | set[Any]) -> list[Any]:
@@ -192,6 +197,12 @@ class _Reader:
             object.__setattr__(it, attribute, self._of(node))
         return it
 
+    def named(self, name: str, nodes: list[_Node]) -> Any:
+        kind = _class(name)
+        if not issubclass(kind, tuple):
+            raise ValueError(f"{name} is no tuple")
+        return tuple.__new__(kind, self.many(nodes))
+
     def csr(self, *parts: _Node) -> Any:
         from scipy.sparse import csr_matrix
 
@@ -219,6 +230,7 @@ _MAKERS: Mapping[str, Callable[..., Any]] = {
     "object": _Reader.made,
     "enum": _Reader.enum,
     "csr": _Reader.csr,
+    "named": _Reader.named,
 }
 
 

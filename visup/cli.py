@@ -15,8 +15,8 @@ from visup.commands.doctor import doctor
 from visup.commands.evaluate import app as evaluate_app
 from visup.commands.models import app as models_app
 from visup.commands.render import render
-from visup.commands.rules import app as rules_app
 from visup.commands.replay import replay
+from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task import app as task_app
 from visup.commands.watch import demo, watch

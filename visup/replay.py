@@ -124,9 +124,10 @@ def replay(
     listener = _Listener()
     with ExitStack() as stack:
         journal = _journal(recording, settings, out, stack) if out else None
+        answers = recording.answers()
         begin = time.perf_counter()
         for seen in recording.observations():
-            step = agent.rethink(seen)
+            step = agent.rethink(seen, answers.get(seen.frame_index, {}))
             if journal:
                 journal.record(step)
             listener(step)

@@ -8,7 +8,7 @@ one they look again at all frames. A camera's frames are gone: there behaviours 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -36,6 +36,7 @@ class Past:
         why_none: Why the state that there is cannot be used, or None.
         steps: How many steps are recorded.
         grave: Whether anything grave was told.
+        answers: What the operator said beforehand: object id -> name.
     """
 
     recording: Recording
@@ -44,6 +45,7 @@ class Past:
     why_none: str | None
     steps: int
     grave: bool
+    answers: Mapping[int, str]
 
 
 def past_of(run: Path) -> Past:
@@ -78,10 +80,18 @@ def past_of(run: Path) -> Past:
     told = recording.events()
     grave = any(e.get("severity") != Severity.INFO.name.lower() for e in told)
     settings = recorded_settings(facts, str(run))
-    return Past(recording, settings, state, why_none, recording.count(), grave)
+    answers = _answers(facts, str(run))
+    return Past(recording, settings, state, why_none, recording.count(), grave, answers)
 
 
-def recorded_settings(facts: Any, where: str) -> WatchSettings:
+def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
+    try:
+        return {int(i): str(name) for i, name in facts.get("answers", {}).items()}
+    except (AttributeError, ValueError) as fault:
+        raise OutputError("the run's answers cannot be read", where=where) from fault
+
+
+def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
     """The settings of a recorded run.
 
     Raises:
@@ -117,13 +127,14 @@ def caught_up(
     whole = agent.load(past.state.agent) if past.state else False
     if source.live:
         return _live(agent, source, past, after), ("What came between was not seen.",)
+    answers = past.recording.answers()
     differing = 0
     frames: Iterator[Frame] = iter(source)
     for seen in past.recording.observations(after):
         frame = _frame(frames, seen, source)
         again = agent.look(frame)
         differing += packed(_without_conditions(again)) != packed(_without_conditions(seen))
-        tell(agent.rethink(seen), frame)
+        tell(agent.rethink(seen, answers.get(seen.frame_index, {})), frame)
     notes = []
     if not whole and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
@@ -159,9 +170,9 @@ def _without_conditions(seen: Observation) -> Observation:
 
 def _live(agent: Agent, source: Source, past: Past, after: int) -> Iterator[Frame]:
     """Frames of a camera, counted and timed on from the last recorded one."""
-    last: Observation | None = None
+    answers = past.recording.answers()
     for last in past.recording.observations(after):
-        agent.rethink(last)
+        agent.rethink(last, answers.get(last.frame_index, {}))
         for behaviour in agent.behaviours:
             if missed := getattr(behaviour, "missed", None):
                 missed(last)

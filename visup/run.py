@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from visup.agent import Frame, Severity, Verdict
 from visup.agent.agent import Agent, Observer, Step
@@ -24,7 +25,6 @@ from visup.supervisor import build_agent, final_verdict, open_video
 
 if TYPE_CHECKING:
     from visup.operator import Operator
-    from visup.report.records import RunData
 
 Progress = Callable[[int, int | None], None]
 """Told after each step how many frames are done and how many there are (None when not known)."""
@@ -116,7 +116,6 @@ def supervise(
     *,
     observers: Sequence[Observer] = (),
     progress: Progress | None = None,
-    video: bool = True,
     operator: Operator | None = None,
     notice: Callable[[str], None] | None = None,
     options: RunOptions | None = None,
@@ -129,7 +128,6 @@ def supervise(
         folder: A folder from `fresh_folder`, that of `past`, or None to record nothing.
         observers: Told of each step after it is recorded.
         progress: Told of each step.
-        video: Whether to write the annotated video.
         operator: Who answers questions; nobody by default.
         notice: Told what cannot wait for a step, such as that a camera dropped: one sentence.
         options: How it is recorded and told.
@@ -147,11 +145,6 @@ def supervise(
     with ExitStack() as stack:
         agent = build_agent(settings, also=(conditions,))
         source = stack.enter_context(open_video(settings))
-        recorder = _Recorder(settings, source, folder, video, stack) if folder else None
-        recording = (recorder,) if recorder else ()
-        answering = (operator.attend(agent),) if operator else ()
-        agent.observers = (tally, *recording, *observers, *answering)
-        steps = 0
         recorder = _recorder(settings, source, folder, options, past is not None, stack)
         sinks = Sinks(options.sinks, settings.source)
         stack.callback(sinks.close)
@@ -161,7 +154,9 @@ def supervise(
         if past:
             frames, notes = _caught_up(agent, source, past, recorder)
         # The journal comes first: what is told was recorded before.
-        agent.observers = (tally, *((recorder,) if recorder else ()), *observers, sinks)
+        recording = (recorder,) if recorder else ()
+        answering = (_attending(operator, agent, recorder, past),) if operator else ()
+        agent.observers = (tally, *recording, *observers, sinks, *answering)
         if recorder:
             conditions.ask(recorder.troubles)
         conditions.ask(sinks.troubles)
@@ -191,6 +186,18 @@ def supervise(
         ended = source.ended.value if source.ended and not tally.stopped else "stopped"
         report, more = recorder.finish(verdict, steps, problem, ended, agent.mind.tasks)
         return RunResult(verdict, steps, problem, folder, report, (*notes, *more))
+
+
+def _attending(
+    operator: Operator, agent: Agent, recorder: Recorder | None, past: Past | None
+) -> Observer:
+    """The operator of a run, who does not say again what was taken up before the run was killed."""
+    if recorder and not past:
+        recorder.journal.note(answers=operator.answers)
+    given = {**past.answers, **operator.answers} if past else operator.answers
+    waiting = {i: name for i, name in given.items() if i not in agent.mind.answers}
+    attend = replace(operator, answers=waiting)
+    return attend.attend(agent, at_once=past is not None)
 
 
 def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:

@@ -82,6 +82,7 @@ def forged(table: Any, root: Any = (0,)) -> bytes:
         [["enum", "visup.agent.records:Frame", 1]],
         [["enum", "visup.agent.records:Severity", 99]],
         [["array", 0]],
+        [["named", "visup.agent.records:Health", []]],
         [["strange"]],
         [["tuple", [[7]]]],
         [["dict", [[[0], 1]]]],

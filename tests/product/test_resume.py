@@ -20,6 +20,7 @@ from visup.agent.errors import OutputError, SourceError
 from visup.agent.journal import Journal
 from visup.agent.recording import JOURNAL, Recording
 from visup.evaluation.resume import evaluate_resume
+from visup.operator import Operator
 from visup.percepts.video.live import LiveSource
 from visup.replay import difference, recorded, replay, settings_for
 from visup.resume import past_of
@@ -103,6 +104,32 @@ def test_a_run_goes_on_only_with_its_own_video(clip: WatchSettings, tmp_path: Pa
     other = write_clip(tmp_path / "short.avi", moving_disc(9))
     with pytest.raises(SourceError, match="not what was recorded"):
         supervise(WatchSettings(source=str(other)), tmp_path / "run", options=BARE, past=past)
+
+
+@pytest.mark.parametrize("at", [12, 14, 15, 16, 17, 25])
+def test_what_the_operator_said_is_remembered(clip: WatchSettings, tmp_path: Path, at: int) -> None:
+    """An answer is taken up one step after its object is confirmed, whenever the run is killed."""
+    demo = Path(__file__).resolve().parents[2] / "visup" / "data" / "demo.models"
+    settings = WatchSettings(clip.source, models=demo)
+    folder = tmp_path / "whole"
+    told = Operator({1: "spartan"})
+    supervise(settings, fresh_folder(folder, ""), operator=told, options=BARE)
+    run = Recording.open(folder)
+    (frame,) = run.answers()
+    assert run.answers()[frame] == {1: "spartan"}
+    assert not difference(recorded(run), replay(run, settings_for(run)))
+    parts = tmp_path / "parts"
+
+    def pull(step: Step, frame: Frame) -> None:
+        if step.frame_index == at:
+            raise Pulled
+
+    parts.mkdir()
+    with pytest.raises(Pulled):
+        supervise(settings, parts, operator=told, observers=[pull], options=BARE)
+    past = past_of(parts)
+    supervise(past.settings, parts, operator=Operator(), options=BARE, past=past)
+    assert outcome(parts) == outcome(folder)
 
 
 def test_a_folder_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:

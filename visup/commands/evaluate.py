@@ -11,12 +11,10 @@ import typer
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
 from visup.commands.eval_tasks import tasks
+from visup.commands.lasting import resume, soak
 from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
-from visup.commands.resume import resume
-from visup.commands.lasting import resume, soak
-from visup.commands.relations import relations
 from visup.commands.views import views
 
 if TYPE_CHECKING:

@@ -130,18 +130,6 @@ def watch(
 
     Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
     """
-    settings = settings_of(
-        source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
-    )
-    given = _answers(answer or [], answers)
-    result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, video=video, answers=given)
-    raise typer.Exit(result.exit_code)
-
-
-def _answers(given: list[str], path: Path | None) -> dict[int, str]:
-    from visup.operator import parse_answers, read_answers
-
-    return {**(read_answers(path) if path else {}), **parse_answers(given)}
     from visup.agent.journal import Limits
     from visup.run import RunOptions
 
@@ -162,8 +150,22 @@ def _answers(given: list[str], path: Path | None) -> dict[int, str]:
         settings = settings_of(
             source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
         )
-    result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, options=options, past=past)
+    result = run_and_tell(
+        settings,
+        out,
+        quiet=quiet,
+        as_json=as_json,
+        answers=_answers(answer or [], answers),
+        options=options,
+        past=past,
+    )
     raise typer.Exit(result.exit_code)
+
+
+def _answers(given: list[str], path: Path | None) -> dict[int, str]:
+    from visup.operator import parse_answers, read_answers
+
+    return {**(read_answers(path) if path else {}), **parse_answers(given)}
 
 
 def _past(run: Path, *given: object) -> tuple[WatchSettings, Past]:
@@ -203,7 +205,6 @@ def run_and_tell(
     *,
     quiet: bool = False,
     as_json: bool = False,
-    video: bool = True,
     answers: dict[int, str] | None = None,
     options: RunOptions | None = None,
     past: Past | None = None,
@@ -229,7 +230,6 @@ def run_and_tell(
             folder,
             observers=() if quiet else (narrator,),
             progress=progress,
-            video=video,
             operator=operator,
             notice=None
             if as_json

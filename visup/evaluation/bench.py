@@ -45,6 +45,7 @@ def main() -> int:
         for kind in ("clips", "robustness", "relations")
         for kind in ("clips", "robustness", "resume", "soak")
         for kind in ("clips", "robustness", "relations", "resume", "soak")
+        for kind in ("clips", "robustness", "relations", "rules", "resume", "soak")
         if (given.only or "") in kind
     ]
     if not given.data.is_dir():
