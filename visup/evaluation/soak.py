@@ -11,12 +11,14 @@ import math
 import os
 import tempfile
 import time
+from array import array
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import (
     Depth,
@@ -60,7 +62,8 @@ def evaluate_soak(
     Returns:
         `items` for the run's 'start' and 'end' (a tenth of the run each, the first hundredth left out)
         with `ms` (median processor time of a step with its journal) and `rss_mb`; `total` with `frames`,
-        `slower` (end by start), `rss_grown_mb`, `journal_bytes` for each frame, `disk_mb`, `same` (1 when
+        `slower` (end by a fresh run that takes turns with it there, since machines are busier at times),
+        `rss_grown_mb`, `journal_bytes` for each frame, `disk_mb`, `same` (1 when
         the first `LEAST_FRAMES` frames twice gave the same bytes of events), `replay_fps` (frames per
         second of processor time), and `sinks` (time of a step with a file and a webhook that answers
         nobody, by that without).
@@ -80,17 +83,18 @@ def evaluate_soak(
         ratio = sinks_ratio(place, LEAST_FRAMES)
         folder = place / "long"
         folder.mkdir()
-        costs, memory = _long(folder, frames, tell)
+        costs, beside, memory = _long(folder, frames, tell)
         disk = sum(p.stat().st_size for p in segments(folder / JOURNAL))
     tenth = frames // 10
     start, end = costs[frames // 100 : tenth], costs[-tenth:]
+    warm = tenth // 10
     items = {
         "start": {"ms": float(np.median(start)), "rss_mb": memory[0]},
         "end": {"ms": float(np.median(end)), "rss_mb": memory[-1]},
     }
     total = {
         "frames": frames,
-        "slower": float(np.median(end) / np.median(start)),
+        "slower": float(np.median(end[warm:]) / np.median(beside[warm:])),
         "rss_grown_mb": memory[-1] - memory[0],
         "journal_bytes": _bytes_each(LEAST_FRAMES),
         "disk_mb": disk / 2**20,
@@ -175,21 +179,45 @@ def _journal(folder: Path, limits: Limits | None = None) -> Journal:
 
 def _long(
     folder: Path, frames: int, tell: Callable[[str], None]
-) -> tuple[list[float], list[float]]:
-    agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
-    journal = _journal(folder, LIMITS)
-    costs: list[float] = []
+) -> tuple[list[float], list[float], list[float]]:
+    """Costs of the steps of a long run, of a fresh run beside its last tenth, and memory."""
+    long, fresh = _Run(folder, LIMITS), None
+    last_tenth = frames - frames // 10
     memory: list[float] = []
     for seen in scripted(frames):
-        begin = time.process_time()
-        journal.record(agent.rethink(seen))
-        costs.append((time.process_time() - begin) * 1e3)
-        if seen.frame_index == frames // 10 or seen.frame_index == frames - 1:
-            memory.append(_rss_mb() - 2 * 8 * len(costs) / 2**20)
+        long.step(seen)
+        if seen.frame_index == last_tenth:
+            memory.append(_rss_mb())
+            fresh = _Run(folder / "fresh", LIMITS)
+        if fresh:
+            fresh.step(seen)
+        if seen.frame_index == frames // 10:
+            memory.append(_rss_mb())
         if seen.frame_index % 1000 == 0:
             tell(f"{seen.frame_index} of {frames} frames")
-    journal.close()
-    return costs, memory
+    long.journal.close()
+    assert fresh is not None
+    fresh.journal.close()
+    return long.costs.tolist(), fresh.costs.tolist(), memory
+
+
+class _Run:
+    """An agent with its journal, and what its steps cost, in milliseconds of processor time."""
+
+    def __init__(self, folder: Path, limits: Limits) -> None:
+        folder.mkdir(exist_ok=True)
+        self.agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
+        self.journal = _journal(folder, limits)
+        self._costs = array("f")
+
+    @property
+    def costs(self) -> NDArray[np.float64]:
+        return np.asarray(self._costs, np.float64)
+
+    def step(self, seen: Observation) -> None:
+        begin = time.process_time()
+        self.journal.record(self.agent.rethink(seen))
+        self._costs.append((time.process_time() - begin) * 1e3)
 
 
 def _events_of(folder: Path, frames: int) -> str:
