@@ -12,11 +12,10 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 import cv2
 from scipy.spatial.distance import pdist
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from visup.agent.behaviour import Contract
 from visup.agent.errors import SettingsError

@@ -66,8 +66,7 @@ def build_agent(
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     return Agent(
-        behaviours=_behaviours(settings, database, sizes(tasks, settings.actors)),
-        behaviours=[*_behaviours(settings, database), *also],
+        behaviours=[*_behaviours(settings, database, sizes(tasks, settings.actors)), *also],
         thinkers=_thinkers(settings, tasks),
         actors=settings.actors,
         zones=zones,
@@ -83,13 +82,11 @@ def reasoning_agent(settings: WatchSettings) -> Agent:
         VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
             task has.
     """
-    tasks = [load_task(name) for name in settings.tasks]
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    zones = load_zones(settings.zones) if settings.zones else ()
+    _check_zones(tasks, {z.name for z in zones})
     _check_actors(settings, tasks, None)
-    return Agent(
-        thinkers=_thinkers(settings, tasks),
-        actors=settings.actors,
-        zones=load_zones(settings.zones) if settings.zones else (),
-    )
+    return Agent(thinkers=_thinkers(settings, tasks), actors=settings.actors, zones=zones)
 
 
 def final_verdict(mind: Mind) -> Verdict:
