@@ -23,6 +23,8 @@ from visup.agent.recording import JOURNAL, Recording, event_text, export_events
 from visup.resume import recorded_settings
 from visup.settings import WatchSettings
 from visup.supervisor import final_verdict, reasoning_agent
+from visup.tasks import load_tasks
+from visup.tasks.structure import task_actors
 
 Line = Mapping[str, Any]
 STAGE = "stage_"
@@ -95,9 +97,17 @@ class _Listener:
 
 
 def settings_for(recording: Recording, **changed: Any) -> WatchSettings:
-    """The settings of a recorded run with some of them changed; None and () change nothing."""
+    """The settings of a recorded run with some of them changed; None and () change nothing.
+
+    Where tasks are changed and actors are not, bindings of actors that the new tasks lack are dropped.
+    """
     settings = recorded_settings(recording.facts(), str(recording.path))
-    return replace(settings, **{k: v for k, v in changed.items() if v})
+    wanted = {k: v for k, v in changed.items() if v}
+    if "tasks" in wanted and "actors" not in wanted:
+        tasks = [t for name in wanted["tasks"] for t in load_tasks(name)]
+        known = {actor for task in tasks for actor in task_actors(task)}
+        wanted["actors"] = {a: m for a, m in settings.actors.items() if a in known}
+    return replace(settings, **wanted)
 
 
 def replay(

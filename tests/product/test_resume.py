@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sqlite3
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -141,7 +142,7 @@ def test_a_folder_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:
 
 
 def test_a_replay_tells_the_same_and_another_rule_is_seen(
-    clip: WatchSettings, tmp_path: Path
+    clip: WatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     supervise(clip, fresh_folder(tmp_path / "run", ""), options=BARE)
     run = Recording.open(tmp_path / "run")
@@ -160,6 +161,10 @@ def test_a_replay_tells_the_same_and_another_rule_is_seen(
     strict.write_text("<go> ::= <near>\n<near> ::= converging(arm, satellite)\n")
     changed = difference(recorded(run), replay(run, settings_for(run, tasks=(str(strict),))))
     assert changed.verdicts[0] != changed.verdicts[1]
+    bound = replace(settings_for(run), actors={"arm": ("a",), "crane": ("b",)})
+    with monkeypatch.context() as patched:
+        patched.setattr("visup.replay.recorded_settings", lambda facts, where: bound)
+        assert settings_for(run, tasks=(str(strict),)).actors == {"arm": ("a",)}
 
 
 class Shaky:
