@@ -19,10 +19,10 @@ from visup.agent.agent import Agent, Step
 from visup.agent.codec import packed
 from visup.agent.errors import OutputError, SourceError
 from visup.agent.recording import Recording
-from visup.conditions import Conditions
 from visup.percepts.video import Source
 from visup.settings import WatchSettings
 from visup.states import State, read_state
+from visup.troubles import Troubles
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ def caught_up(
     for seen in past.recording.observations(after):
         frame = _frame(frames, seen, source)
         again = agent.look(frame)
-        differing += packed(_without_conditions(again)) != packed(_without_conditions(seen))
+        differing += packed(_without_troubles(again)) != packed(_without_troubles(seen))
         tell(agent.rethink(seen, answers.get(seen.frame_index, {})), frame)
     notes = []
     if not whole and past.steps:
@@ -163,8 +163,8 @@ def _frame(frames: Iterator[Frame], seen: Observation, source: Source) -> Frame:
     )
 
 
-def _without_conditions(seen: Observation) -> Observation:
-    name = Conditions.contract.name
+def _without_troubles(seen: Observation) -> Observation:
+    name = Troubles.contract.name
     return replace(seen, reports=tuple(r for r in seen.reports if r.behaviour != name))
 
 

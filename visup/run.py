@@ -12,7 +12,6 @@ from visup.agent import Frame, Severity, Verdict
 from visup.agent.agent import Agent, Observer, Step
 from visup.agent.errors import OutputError
 from visup.agent.journal import Limits
-from visup.conditions import Conditions
 from visup.percepts.video import Source
 from visup.percepts.video.live import LiveSource
 from visup.recorder import Recorder, kept_of
@@ -22,6 +21,7 @@ from visup.sinks import Sinks
 from visup.states import StateKeeper
 from visup.steady import Steady
 from visup.supervisor import build_agent, final_verdict, open_video
+from visup.troubles import Troubles
 
 if TYPE_CHECKING:
     from visup.operator import Operator
@@ -141,9 +141,9 @@ def supervise(
     """
     options = options or RunOptions()
     tally = _Tally(past.grave if past else False)
-    conditions = Conditions()
+    troubles = Troubles()
     with ExitStack() as stack:
-        agent = build_agent(settings, also=(conditions,))
+        agent = build_agent(settings, also=(troubles,))
         source = stack.enter_context(open_video(settings))
         recorder = _recorder(settings, source, folder, options, past is not None, stack)
         sinks = Sinks(options.sinks, settings.source)
@@ -158,13 +158,13 @@ def supervise(
         answering = (_attending(operator, agent, recorder, past),) if operator else ()
         agent.observers = (tally, *recording, *observers, sinks, *answering)
         if recorder:
-            conditions.ask(recorder.troubles)
-        conditions.ask(sinks.troubles)
+            troubles.ask(recorder.troubles)
+        troubles.ask(sinks.troubles)
         steady = Steady(frames, source.fps, agent.mind.time if past and past.steps else None)
-        conditions.ask(steady.troubles)
+        troubles.ask(steady.troubles)
         if isinstance(source, LiveSource):
             source.notify = notify(sinks, notice)
-            conditions.ask(source.troubles)
+            troubles.ask(source.troubles)
         steps = past.steps if past else 0
         try:
             for step in agent.steps(steady):

@@ -9,7 +9,6 @@ from visup.agent import Behaviour, Mind, Severity, Verdict
 from visup.agent.agent import Agent, Observer, Thinkers
 from visup.agent.errors import SettingsError
 from visup.agent.registry import discover, from_file
-from visup.conditions import tell_conditions
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
@@ -22,6 +21,7 @@ from visup.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.structure import sizes, task_actors, undrawn
 from visup.tasks.supervise import finish, task_thinker
+from visup.troubles import tell_troubles
 from visup.zones import load_zones
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def _behaviours(
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     rules = tuple(rule for path in settings.rules for rule in load_rules(path))
     interpreting = default_thinkers(rules=rules or None)
-    match = (*((task_thinker(tasks),) if tasks else ()), tell_conditions)
+    match = (*((task_thinker(tasks),) if tasks else ()), tell_troubles)
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 

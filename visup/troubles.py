@@ -11,14 +11,14 @@ from typing import Any
 
 from visup.agent import Concern, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
 
-CONDITION = "condition"
+TROUBLE = "trouble"
 Teller = Callable[[], Iterable[Concern]]
 
 
-class Conditions:
+class Troubles:
     """A behaviour that asks parts of the product for their troubles before each step."""
 
-    contract = Contract("conditions", gives=(CONDITION,))
+    contract = Contract("troubles", gives=(TROUBLE,))
 
     def __init__(self) -> None:
         self._tellers: list[Teller] = []
@@ -37,11 +37,11 @@ class Conditions:
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One percept of kind 'condition' for each trouble that holds now."""
-        troubles = [concern for teller in self._tellers for concern in teller()]
-        return [Percept(CONDITION, c, frame.time, self.contract.name) for c in troubles]
+        """One percept of kind 'trouble' for each trouble that holds now."""
+        now = [concern for teller in self._tellers for concern in teller()]
+        return [Percept(TROUBLE, c, frame.time, self.contract.name) for c in now]
 
 
-def tell_conditions(mind: Mind, seen: Observation) -> Outcome:
+def tell_troubles(mind: Mind, seen: Observation) -> Outcome:
     """The thinker to it: every trouble is a concern."""
-    return Outcome(mind, concerns=seen.of(CONDITION))
+    return Outcome(mind, concerns=seen.of(TROUBLE))
