@@ -67,6 +67,7 @@ class MotionSegmenter:
         # Cells and points do not need each other: one core each. What is found is the same.
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+        self._ids = 0  # never begun anew: a number that was told stays the region's
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -79,7 +80,7 @@ class MotionSegmenter:
         self._camera: dict[int, Rate] = {}
         self._fixed_until: float | None = None
         self._resting = RestingView()
-        self._count = self._born = self._ids = 0
+        self._count = self._born = 0
 
     @property
     def resting(self) -> bool:
