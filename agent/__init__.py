@@ -2,11 +2,13 @@
 
 Read in this order: `records.py` (what flows), `mind.py` (what is believed),
 `relations.py` (what holds between objects), `behaviour.py` (what
-may be plugged in), `agent.py` (the cycle on one screen), `registry.py`, `journal.py`.
+may be plugged in), `agent.py` (the cycle on one screen), `perceive.py`, `slot.py`, `limits.py` (how
+behaviours are contained), `registry.py`, `journal.py`.
 """
 
 from visup.agent.behaviour import Behaviour, Contract, Outcome, Thinker
 from visup.agent.errors import VisupError
+from visup.agent.limits import Limits
 from visup.agent.mind import (
     Binding,
     Candidate,
@@ -35,6 +37,7 @@ from visup.agent.records import (
     HealthStatus,
     Hypothesis,
     Observation,
+    Past,
     Percept,
     Region,
     Report,
@@ -61,10 +64,12 @@ __all__ = [
     "Health",
     "HealthStatus",
     "Hypothesis",
+    "Limits",
     "Mind",
     "ObjectBelief",
     "Observation",
     "Outcome",
+    "Past",
     "Percept",
     "Pose",
     "Presence",

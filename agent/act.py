@@ -5,33 +5,45 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from visup.agent.records import Alert, Concern, Event, Observation, ReportState, Severity
+from visup.agent.records import BROKEN, Alert, Concern, Event, Observation, ReportState, Severity
 
 GRACE_S = 1.0
 """A concern may be silent this long before its alert closes: alerts must not flicker."""
+
+SETTLE_S = 3.0
+"""After a kind of percept was unknown, rules need so long to see again what they had seen; until
+then no alert that needs it is told to be over."""
 
 Key = tuple[str, tuple[int, ...], str]
 
 
 def faults(observation: Observation) -> tuple[Concern, ...]:
-    """Concerns about behaviours that failed or are suspended: their part of the mind is unknown."""
-    broken = (ReportState.FAILED, ReportState.SUSPENDED)
+    """Concerns about behaviours that failed, are late or suspended: their part of the mind is unknown."""
     return tuple(
         Concern(
             "behaviour_failed",
             (),
             Severity.WARNING,
-            f"The behaviour '{r.behaviour}' failed; what it gives is unknown.",
+            f"The behaviour '{r.behaviour}' {_ails(r.state)}; what it gives is unknown.",
             (r.error,),
             key=r.behaviour,
+            needs=(),
         )
         for r in observation.reports
-        if r.state in broken
+        if r.state in BROKEN
     )
 
 
+def _ails(state: ReportState) -> str:
+    return "gave no answer in time" if state is ReportState.LATE else "failed"
+
+
 def update_alerts(
-    alerts: Sequence[Alert], concerns: Iterable[Concern], time: float, next_id: int
+    alerts: Sequence[Alert],
+    concerns: Iterable[Concern],
+    time: float,
+    next_id: int,
+    unknown: frozenset[str] = frozenset(),
 ) -> tuple[tuple[Alert, ...], tuple[Alert, ...], tuple[Alert, ...]]:
     """Alerts after the concerns of one step.
 
@@ -40,6 +52,8 @@ def update_alerts(
         concerns: Those that hold now; of two alike the graver stays.
         time: Seconds.
         next_id: Number of the next alert that opens.
+        unknown: Kinds of percept that are unknown now: an alert that needs one of them stays open,
+            for nobody can tell that it is over.
 
     Returns:
         The alerts that are open now, those that opened, those that closed.
@@ -47,9 +61,9 @@ def update_alerts(
     now = _by_key(concerns)
     known = {_key(a): a for a in alerts}
     renewed = [_renew(a, now[k], time) for k, a in known.items() if k in now]
-    silent = [a for k, a in known.items() if k not in now]
-    closed = tuple(replace(a, closed=time) for a in silent if time - a.updated > GRACE_S)
-    kept = [a for a in silent if time - a.updated <= GRACE_S]
+    silent = [_unsure(a, unknown, time) for k, a in known.items() if k not in now]
+    closed = tuple(replace(a, closed=time) for a in silent if _is_over(a, time))
+    kept = [a for a in silent if not _is_over(a, time)]
     fresh = [c for k, c in now.items() if k not in known]
     opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(fresh))
     still = sorted([*renewed, *kept, *opened], key=lambda a: a.id)
@@ -99,10 +113,20 @@ def _open(concern: Concern, time: float, number: int) -> Alert:
         cause=concern.cause,
         evidence=concern.evidence,
         key=concern.key,
+        needs=concern.needs,
     )
 
 
 def _renew(alert: Alert, concern: Concern, time: float) -> Alert:
     # The cause keeps its first wording, so that the narrative and the report tell one story.
     severity = max(alert.severity, concern.severity)
-    return replace(alert, updated=time, severity=severity, evidence=concern.evidence)
+    return replace(alert, updated=time, severity=severity, evidence=concern.evidence, unsure=None)
+
+
+def _unsure(alert: Alert, unknown: frozenset[str], time: float) -> Alert:
+    return replace(alert, unsure=time) if unknown.intersection(alert.needs) else alert
+
+
+def _is_over(alert: Alert, time: float) -> bool:
+    settled = alert.unsure is None or time - alert.unsure > SETTLE_S
+    return settled and time - alert.updated > GRACE_S

@@ -10,8 +10,9 @@ from typing import Any
 from visup.agent.act import alert_events, faults, update_alerts
 from visup.agent.answers import understood, with_answers
 from visup.agent.behaviour import Behaviour, Outcome, Thinker
+from visup.agent.limits import Limits
 from visup.agent.mind import Mind, Zone
-from visup.agent.perceive import Slot, in_order, perceive
+from visup.agent.perceive import in_order, perceive
 from visup.agent.records import (
     Alert,
     Concern,
@@ -22,7 +23,10 @@ from visup.agent.records import (
     Report,
     Severity,
 )
+from visup.agent.running import worded
+from visup.agent.slot import Slot
 from visup.agent.state import Keeps
+from visup.agent.thinking import joined
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +90,7 @@ class Agent:
         zones: Parts of the scene that rules can name.
         observers: Told of each step.
         models: Names of models that the operator may answer with, besides those spoken of.
+        limits: What behaviours are held to.
         mind: The mental model now.
     """
 
@@ -95,6 +100,7 @@ class Agent:
     observers: Sequence[Observer] = ()
     zones: Sequence[Zone] = ()
     models: Sequence[str] = ()
+    limits: Limits = field(default_factory=Limits)
     mind: Mind = field(init=False)
     directives: tuple[Directive, ...] = field(default=(), init=False)
     _slots: list[Slot] = field(init=False, repr=False)
@@ -103,7 +109,7 @@ class Agent:
 
     def __post_init__(self) -> None:
         self.mind = Mind(actors=MappingProxyType(dict(self.actors)), zones=tuple(self.zones))
-        self._slots = in_order(self.behaviours)
+        self._slots = in_order(self.behaviours, self.limits)
 
     def step(self, frame: Frame) -> Step:
         """Perceive, update, cogitate, match, act: one turn of the cycle.
@@ -139,6 +145,11 @@ class Agent:
         step = self._act(seen, self._reason(seen))
         self.mind, self.directives = step.mind, step.directives
         return step
+
+    def close(self) -> None:
+        """Let go of threads and processes of behaviours; they would also go with the agent itself."""
+        for slot in self._slots:
+            slot.runner.close()
 
     def run(
         self, frames: Iterable[Frame], until: Callable[[Step], bool] | None = None
@@ -180,11 +191,11 @@ class Agent:
         Returns:
             `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
         """
-        kept = [s.behaviour for s in self._slots if isinstance(s.behaviour, Keeps)]
-        whole = len(kept) == len(self._slots)
+        whole = all(s.keeps for s in self._slots)
+        kept = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.keeps}
         return {
             "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
-            "behaviours": {b.contract.name: b.save() for b in kept} if whole else None,
+            "behaviours": {n: _saved(b) for n, b in kept.items()} if whole else None,
             "slots": {s.behaviour.contract.name: s.conduct() for s in self._slots},
         }
 
@@ -213,8 +224,8 @@ class Agent:
         outcome = Outcome(begin, told)
         for thinker in phases:
             try:
-                outcome = _joined(outcome, thinker(outcome.mind, seen))
-            except Exception as fault:
+                outcome = joined(outcome, thinker(outcome.mind, seen), seen)
+            except (Exception, SystemExit) as fault:
                 # The half-made mind is dropped: beliefs stay as they were and count as unknown.
                 return replace(_fault(begin, seen, thinker, fault), events=told)
         return outcome
@@ -222,7 +233,7 @@ class Agent:
     def _act(self, seen: Observation, thought: Outcome) -> Step:
         concerns = (*thought.concerns, *faults(seen))
         alerts, opened, closed = update_alerts(
-            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1
+            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1, thought.mind.unknown
         )
         self._alerts_opened += len(opened)
         events = (*thought.events, *alert_events(opened, closed, seen.time, seen.frame_index))
@@ -237,27 +248,25 @@ class Agent:
         )
 
 
-def _joined(so_far: Outcome, more: Outcome) -> Outcome:
-    return Outcome(
-        more.mind,
-        so_far.events + more.events,
-        so_far.concerns + more.concerns,
-        so_far.directives + more.directives,
-    )
+def _saved(behaviour: Behaviour) -> Mapping[str, Any]:
+    assert isinstance(behaviour, Keeps)
+    return behaviour.save()
 
 
-def _fault(mind: Mind, seen: Observation, thinker: Thinker, fault: Exception) -> Outcome:
+def _fault(mind: Mind, seen: Observation, thinker: Thinker, fault: BaseException) -> Outcome:
     name = getattr(thinker, "__name__", type(thinker).__name__)
     concern = Concern(
         "thinking_failed",
         (),
         Severity.CRITICAL,
         f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",
-        (f"{type(fault).__name__}: {fault}",),
+        (worded(fault),),
         key=name,
+        needs=(),
     )
     held = tuple(
-        Concern(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key) for a in mind.alerts
+        Concern(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key, a.needs)
+        for a in mind.alerts
     )
     unknown = frozenset(kind for r in seen.reports for kind in r.gives)
     return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, concern))

@@ -6,30 +6,21 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from visup.agent.contract import Contract
 from visup.agent.mind import Mind
 from visup.agent.records import Concern, Directive, Event, Frame, Observation, Percept
 
-
-@dataclass(frozen=True, slots=True)
-class Contract:
-    """What a behaviour declares of itself.
-
-    Attributes:
-        name: Its name, unique within an agent.
-        gives: Kinds of percept that it reports.
-        needs: Kinds of percept that must be there before it runs in a step.
-        every_s: Least time between two runs, seconds; 0 for every frame.
-    """
-
-    name: str
-    gives: tuple[str, ...]
-    needs: tuple[str, ...] = ()
-    every_s: float = 0.0
+__all__ = ["Behaviour", "Contract", "Outcome", "Thinker"]
 
 
 @runtime_checkable
 class Behaviour(Protocol):
-    """A perception routine: frames in, percepts out. May keep state between frames."""
+    """A perception routine: frames in, percepts out. May keep state between frames.
+
+    A method `start(self)`, if there is one, is called once before the first run, in the process in
+    which the behaviour runs: the place to open what cannot be sent to another process, such as a
+    model, a socket or a device.
+    """
 
     contract: Contract
 
@@ -39,8 +30,9 @@ class Behaviour(Protocol):
         """Report about one frame.
 
         Args:
-            frame: The frame; its image must not be written to.
-            seen: What behaviours before this one reported of the same frame.
+            frame: The frame; its image cannot be written to.
+            seen: What behaviours before this one reported of the same frame; `seen.past` holds as
+                many frames before it as the contract's `history` asks for.
             directives: What cogitation asked for after the last step.
 
         Returns:

@@ -208,8 +208,14 @@ class ReportState(StrEnum):
 
     RAN = "ran"
     RESTED = "rested"
+    BLIND = "blind"
     FAILED = "failed"
+    LATE = "late"
     SUSPENDED = "suspended"
+
+
+BROKEN = frozenset({ReportState.FAILED, ReportState.LATE, ReportState.SUSPENDED})
+"""States of a behaviour that is at fault itself; one that is blind only misses what it needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,10 +224,11 @@ class Report:
 
     Attributes:
         behaviour: Its name.
-        state: Ran, rested (it was not its turn), failed, or suspended after failing.
+        state: Ran; rested (it was not its turn); blind (what it needs is unknown); failed; late (it
+            gave no answer in time); or suspended (waiting after it failed or was late).
         gives: The kinds it would have reported.
         percepts: What it reported; empty unless it ran.
-        error: What went wrong, when it failed.
+        error: What went wrong, unless it ran.
         elapsed_ms: Wall time; for people, never for decisions.
     """
 
@@ -242,20 +249,49 @@ class Observation:
         time: Seconds.
         frame_size: (width, height) pixels.
         reports: One for each behaviour.
+        past: Frames before, oldest first, with what was observed of them: only for a behaviour that
+            asked for them; nobody else is given frames.
     """
 
     frame_index: int
     time: float
     frame_size: tuple[int, int]
     reports: tuple[Report, ...] = ()
+    past: tuple[Past, ...] = field(default=(), repr=False, compare=False)
 
     def of(self, kind: str) -> tuple[Any, ...]:
         """Values of all percepts of one kind, in order."""
         return tuple(p.value for r in self.reports for p in r.percepts if p.kind == kind)
 
     def observed(self, kind: str) -> bool:
-        """Whether some behaviour looked for this kind; seeing none then means none is there."""
-        return any(r.state is ReportState.RAN and kind in r.gives for r in self.reports)
+        """Whether this kind was looked for; seeing none then means none is there.
+
+        Somebody looked for it, and nobody who should have could not.
+        """
+        ran = any(r.state is ReportState.RAN and kind in r.gives for r in self.reports)
+        return ran and kind not in self.unknown
+
+    @property
+    def unknown(self) -> frozenset[str]:
+        """Kinds that some behaviour should have reported but could not.
+
+        Nothing follows from their absence.
+        """
+        unable = (r for r in self.reports if r.state in BROKEN or r.state is ReportState.BLIND)
+        return frozenset(kind for r in unable for kind in r.gives)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Past:
+    """A frame that is over, with what was observed of it.
+
+    Attributes:
+        frame: The frame.
+        seen: Its observation.
+    """
+
+    frame: Frame
+    seen: Observation
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,6 +332,7 @@ class Concern:
         cause: The sentence for the narrative, with full stop.
         evidence: Facts that led to it, one sentence each.
         key: What tells two concerns of one kind and the same objects apart (such as a stage).
+        needs: Kinds of percept without which it cannot be told whether it is over.
     """
 
     kind: str
@@ -304,6 +341,7 @@ class Concern:
     cause: str
     evidence: tuple[str, ...] = ()
     key: str = ""
+    needs: tuple[str, ...] = ("region",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,6 +359,8 @@ class Alert:
         cause: One sentence.
         evidence: Facts, one sentence each.
         key: As of its concern.
+        needs: As of its concern.
+        unsure: Seconds when it last could not be told whether it is over, since it was updated; or None.
     """
 
     id: int
@@ -333,6 +373,8 @@ class Alert:
     evidence: tuple[str, ...] = ()
     closed: float | None = None
     key: str = ""
+    needs: tuple[str, ...] = ()
+    unsure: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -252,6 +252,8 @@ class Measuring:
     ) -> tuple[Floats, Floats]:
         """The trend, or the speed at which bodies in contact surely part."""
         s, diagonal = self.settings, scale(mind.frame_size)
+        if not len(h.times):
+            return slope, sigma  # nobody has looked for longer than the window
         speed, spread = parting_speed(objects, h.support[-1], mind.time)
         with np.errstate(invalid="ignore"):
             sure = speed > np.maximum(2.0 * s.rate_enter * diagonal, s.quick_sigmas * spread)

@@ -19,7 +19,6 @@ from visup.agent import (
     Percept,
     Presence,
     Region,
-    ReportState,
 )
 
 OWNERS = "rules.objects"
@@ -86,7 +85,7 @@ class UpdateObjects:
             time=observation.time,
             frame_index=observation.frame_index,
             frame_size=observation.frame_size,
-            unknown=unknown_kinds(observation),
+            unknown=observation.unknown,
             percepts=self._fresh(mind.percepts, observation),
         )
         for health in observation.of("health"):
@@ -139,13 +138,6 @@ class UpdateObjects:
         if belief.presence is Presence.LEFT:
             return unseen > self.settings.forget_left_s
         return belief.presence is Presence.HIDDEN and unseen > self.settings.forget_hidden_s
-
-
-def unknown_kinds(observation: Observation) -> frozenset[str]:
-    """Kinds that a behaviour should have reported but could not, and no other one did."""
-    broken = (ReportState.FAILED, ReportState.SUSPENDED)
-    missing = {k for r in observation.reports if r.state in broken for k in r.gives}
-    return frozenset(k for k in missing if not observation.observed(k))
 
 
 def _held(mind: Mind, owner: Mapping[int, int], region: Region) -> bool:

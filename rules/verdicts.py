@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from visup.rules.bounds import variables_of
 from visup.rules.facts import Facts
 from visup.rules.formula import Predicate, Rule
+from visup.rules.inputs import blind
 from visup.rules.intervals import Arrays, Box
 from visup.rules.operators import Pick
 from visup.rules.program import Compiler, Moment, Place, Program, Scope
@@ -86,6 +87,8 @@ class Values:
         others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
         found: Any = word.look(self.facts, *others)
         value: Box = TRUTHS[:, found + 1] if fact else found
+        if blind(self.facts.mind, node.name):
+            value = np.stack([np.full(value.shape[1:], -np.inf), np.full(value.shape[1:], np.inf)])
         if len(axes) == 2 and axes[0] > axes[1]:
             value = value.swapaxes(1, 2)
         n = len(self.facts.ids)

@@ -15,6 +15,7 @@ import numpy as np
 
 from visup.agent import Truth
 from visup.rules.facts import MAYBE, NO, YES, Facts
+from visup.rules.inputs import blind
 from visup.rules.units import ANGLE, LENGTH, SHARE, SPEED, TIME, TURNING, Dimension
 from visup.rules.vocabulary import QUANTITIES, WORDS
 from visup.rules.zones import asked, contains
@@ -138,7 +139,9 @@ def _facts(task: Task) -> Iterator[Fact]:
 def _word(name: str) -> Look:
     def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
-        return Truth.UNKNOWN if rows is None else TRUTHS[int(WORDS[name].look(facts)[rows])]
+        if rows is None or blind(facts.mind, name):
+            return Truth.UNKNOWN
+        return TRUTHS[int(WORDS[name].look(facts)[rows])]
 
     return look
 
@@ -162,7 +165,7 @@ def _comparison(name: str, sign: str, bound: float) -> Look:
 
     def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
-        if rows is None:
+        if rows is None or blind(facts.mind, name):
             return Truth.UNKNOWN
         low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
         told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}

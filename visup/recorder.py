@@ -116,6 +116,7 @@ class Recorder:
                 Severity.WARNING,
                 "The run is not being recorded; supervision goes on.",
                 (self._fault, lost),
+                needs=(),
             )
 
     def close(self) -> None:

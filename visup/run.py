@@ -144,6 +144,7 @@ def supervise(
     troubles = Troubles()
     with ExitStack() as stack:
         agent = build_agent(settings, also=(troubles,))
+        stack.callback(agent.close)
         source = stack.enter_context(open_video(settings))
         recorder = _recorder(settings, source, folder, options, past is not None, stack)
         sinks = Sinks(options.sinks, settings.source)

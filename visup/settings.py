@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from visup.agent.errors import SettingsError
 
@@ -19,8 +20,11 @@ class WatchSettings:
         models: Model database, or None to go without identities.
         rules: Rules files; the shipped safety rules when empty.
         actors: Actor -> names of the models that it may be.
-        behaviours: Files with behaviours of the user's own.
+        behaviours: Behaviours of the user's own: files, or `package.module:Class`.
         plugins: Names of installed behaviours to add.
+        plugin_settings: Name of such a behaviour -> values for its settings.
+        isolate: Names of behaviours that run in processes of their own.
+        budgets: Whether behaviours are held to the budgets that they declare; for live sources.
         every: Use every n-th frame.
         fps: Frame rate to assume where the source has none, or None.
         fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
@@ -33,8 +37,11 @@ class WatchSettings:
     models: Path | None = None
     rules: tuple[Path, ...] = ()
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    behaviours: tuple[Path, ...] = ()
+    behaviours: tuple[Path | str, ...] = ()
     plugins: tuple[str, ...] = ()
+    plugin_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    isolate: tuple[str, ...] = ()
+    budgets: bool = False
     every: int = 1
     fps: float | None = None
     fov_vertical_deg: float | None = None

@@ -45,4 +45,4 @@ class Steady:
         """Once after a jump: that there was one."""
         said, self._said = self._said, None
         if said:
-            yield Concern("clock_jumped", (), Severity.WARNING, said, key=NAME)
+            yield Concern("clock_jumped", (), Severity.WARNING, said, key=NAME, needs=())

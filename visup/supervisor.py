@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from visup.agent import Behaviour, Mind, Severity, Verdict
 from visup.agent.agent import Agent, Observer, Thinkers
 from visup.agent.errors import SettingsError
-from visup.agent.registry import discover, from_file
+from visup.agent.limits import Limits
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.video import Source, open_source
+from visup.plugins import plug_ins
 from visup.rules.language import load_rules
 from visup.rules.thinkers import default_thinkers
 from visup.settings import WatchSettings
@@ -72,6 +73,7 @@ def build_agent(
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
+        limits=Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate)),
     )
 
 
@@ -118,10 +120,7 @@ def _behaviours(
             ShapeBehaviour(database),
             DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
         ]
-    registry = discover() if settings.plugins else None
-    named = [registry.make(name) for name in settings.plugins] if registry else []
-    own = [b for path in settings.behaviours for b in from_file(path)]
-    return [*seeing, *named, *own]
+    return [*seeing, *plug_ins(settings)]
 
 
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:

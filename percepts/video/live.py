@@ -90,7 +90,7 @@ class LiveSource(Source):
         """Once after it came back: how long nothing was delivered."""
         said, self._came_back = self._came_back, None
         if said:
-            yield Concern("source_dropped", (), Severity.WARNING, said, key=self.name)
+            yield Concern("source_dropped", (), Severity.WARNING, said, key=self.name, needs=())
 
     def _grab(self) -> bool:
         return self._capture.grab() or (self._received > 0 and self._back_again())

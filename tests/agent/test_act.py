@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Alert, Concern, Severity
-from visup.agent.act import GRACE_S, update_alerts
+from visup.agent.act import GRACE_S, SETTLE_S, update_alerts
 
 STEP_S = 0.25
 
@@ -40,3 +40,19 @@ def test_two_concerns_alike_make_one_alert_of_the_graver_severity() -> None:
     alerts, opened, _ = update_alerts((), [mild, grave, mild], 0.0, 1)
     assert [a.severity for a in alerts] == [Severity.CRITICAL]
     assert alerts == opened
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=60), st.sampled_from(["region", "lamp"]))
+def test_no_alert_is_over_while_nobody_can_tell(blind: list[bool], kind: str) -> None:
+    """Its concern held once; then it closes as soon as sight has been back for long enough."""
+    alerts, _, _ = update_alerts((), [concern("a")], 0.0, 1)
+    last_blind = float("-inf")
+    for i, unknown in enumerate(blind, start=1):
+        now = i * STEP_S
+        kinds = frozenset({kind}) if unknown else frozenset()
+        alerts, _, closed = update_alerts(alerts, [], now, 2, kinds)
+        if unknown and "region" in kinds:
+            last_blind = now
+        assert bool(closed) == (now > GRACE_S and now - last_blind > SETTLE_S)
+        if closed:
+            return

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Percept, Region, ReportState
 from visup.agent.errors import BehaviourError
-from visup.agent.perceive import FIRST_SUSPENSION_S, PATIENCE, in_order, perceive
+from visup.agent.perceive import in_order, perceive
+from visup.agent.slot import FIRST_SUSPENSION_S, PATIENCE
 
 
 @given(st.permutations(["a", "b", "c", "d"]))
@@ -59,7 +60,7 @@ def test_who_needs_what_was_not_observed_rests_instead_of_seeing_nothing() -> No
 
     slots = in_order([Scripted("eye", ("x",), says), Scripted("namer", ("y",), needs=("x",))])
     seen = perceive(slots, next(frames(1)), ())
-    assert [r.state for r in seen.reports] == [ReportState.FAILED, ReportState.RESTED]
+    assert [r.state for r in seen.reports] == [ReportState.FAILED, ReportState.BLIND]
     assert not seen.observed("y")
 
 

@@ -8,7 +8,8 @@ from tests.agent.scripted import Scripted, frames
 from visup.agent import ReportState
 from visup.agent.agent import Agent
 from visup.agent.errors import BehaviourError
-from visup.agent.registry import Registry, discover, from_file
+from visup.agent.loading import load
+from visup.agent.registry import Registry, discover
 
 PLUGIN = """
 from visup.agent import Contract, Percept
@@ -24,7 +25,7 @@ class Brightness:
 def test_a_behaviour_in_a_file_runs(tmp_path: Path) -> None:
     path = tmp_path / "brightness.py"
     path.write_text(PLUGIN)
-    last = Agent(from_file(path)).run(frames(4))
+    last = Agent(load(str(path))).run(frames(4))
     assert last is not None
     assert last.reports[0].state is ReportState.RAN
     assert last.observation.of("brightness") == (3.0,)
@@ -56,7 +57,7 @@ def test_a_file_that_is_no_plug_in_is_refused_in_words(
     if text is not None:
         path.write_text(text)
     with pytest.raises(BehaviourError, match=message):
-        from_file(path)
+        load(str(path))
 
 
 def test_installed_behaviours_are_found_by_entry_point() -> None:

@@ -72,7 +72,7 @@ def test_flicker_and_jitter_change_no_event_of_coming_and_going(seed: int, dropp
 @settings(max_examples=4, deadline=None)
 @given(st.integers(0, 10**6), st.floats(0.05, 0.3))
 def test_flicker_and_jitter_change_no_event_of_being_hidden(seed: int, dropped: float) -> None:
-    plain = story(being_hidden, 170, 0, 0.0)
+    plain = story(being_hidden, 200, 0, 0.0)
     assert [k for k, _ in plain] == ["entry", "entry", "exit", "occlusion", "reappearance"]
-    noisy = story(being_hidden, 170, seed, dropped)
+    noisy = story(being_hidden, 200, seed, dropped)
     assert [k for k, _ in noisy] == [k for k, _ in plain]

@@ -23,6 +23,7 @@ EXTRAS = {
     "report": ("plotly",),
     "render": ("trimesh", "embreex"),
     "eval": ("motmetrics", "mahotas", "pyefd"),
+    "onnx": ("onnxruntime",),
 }
 
 

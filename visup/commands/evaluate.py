@@ -11,6 +11,7 @@ import typer
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
 from visup.commands.eval_tasks import tasks
+from visup.commands.faults import faults
 from visup.commands.lasting import resume, soak
 from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
@@ -26,6 +27,7 @@ app.command("clips")(clips)
 app.command("scale")(scale)
 app.command("robustness")(robustness)
 app.command("views")(views)
+app.command("faults")(faults)
 app.command("relations")(relations)
 app.command("rules")(rules)
 app.command("reasoning")(reasoning)

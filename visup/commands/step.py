@@ -10,9 +10,12 @@ from visup.commands.watch import (
     Every,
     Fov,
     Fps,
+    Isolate,
     Models,
     Plugins,
     Rules,
+    Set,
+    SettingsFile,
     Source,
     Tasks,
     Zones,
@@ -32,13 +35,29 @@ def step(
     fps: Fps = None,
     fov: Fov = None,
     zones: Zones = None,
+    setting: Set = None,
+    settings_file: SettingsFile = None,
+    isolate: Isolate = None,
 ) -> None:
     """Step through a video and look into the agent's mind."""
     from visup.session import Session, read_commands
     from visup.supervisor import build_agent, open_video
 
     settings = settings_of(
-        source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
+        source,
+        task,
+        models,
+        rules,
+        actor,
+        every,
+        behaviour,
+        plugin,
+        fps,
+        fov,
+        zones,
+        setting,
+        settings_file,
+        isolate,
     )
     with open_video(settings) as video:
         session = Session(build_agent(settings), video)

@@ -35,12 +35,27 @@ Actors = Annotated[
 ]
 Every = Annotated[int, typer.Option(help="Use every n-th frame.")]
 Behaviours = Annotated[
-    list[Path] | None,
-    typer.Option("--behaviour", metavar="FILE", help="Python file with a behaviour of your own."),
+    list[str] | None,
+    typer.Option("--behaviour", metavar="FILE", help="Your own: FILE.py or package.module:Class."),
 ]
 Plugins = Annotated[
     list[str] | None,
     typer.Option("--plugin", metavar="NAME", help="Name of an installed behaviour to add."),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME.KEY=VALUE", help="A setting of a behaviour of your own."),
+]
+SettingsFile = Annotated[
+    Path | None,
+    typer.Option("--settings", metavar="TOML", help="Settings, in tables [behaviours.NAME]."),
+]
+Isolate = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="Run this behaviour in a process of its own."),
+]
+Budgets = Annotated[
+    bool, typer.Option("--budgets", help="Give up what exceeds its budget; for live sources.")
 ]
 Fps = Annotated[float | None, typer.Option(help="Frame rate, where the source has none.")]
 Fov = Annotated[float | None, typer.Option(help="Vertical field of view of the camera, degrees.")]
@@ -58,13 +73,18 @@ def settings_of(
     rules: list[Path] | None,
     actor: list[str] | None,
     every: int,
-    behaviour: list[Path] | None,
+    behaviour: list[str] | None,
     plugin: list[str] | None,
     fps: float | None,
     fov: float | None,
     zones: Path | None = None,
+    setting: list[str] | None = None,
+    settings_file: Path | None = None,
+    isolate: list[str] | None = None,
+    budgets: bool = False,
 ) -> WatchSettings:
     """The settings of a run, from the command's options."""
+    from visup.agent.plugin_settings import merged, parse_settings, read_settings
     from visup.settings import WatchSettings, parse_actors
 
     return WatchSettings(
@@ -75,6 +95,11 @@ def settings_of(
         actors=parse_actors(actor or ()),
         behaviours=tuple(behaviour or ()),
         plugins=tuple(plugin or ()),
+        plugin_settings=merged(
+            read_settings(settings_file) if settings_file else {}, parse_settings(setting or ())
+        ),
+        isolate=tuple(isolate or ()),
+        budgets=budgets,
         every=every,
         fps=fps,
         fov_vertical_deg=fov,
@@ -99,6 +124,10 @@ def watch(
     fps: Fps = None,
     fov: Fov = None,
     zones: Zones = None,
+    setting: Set = None,
+    settings_file: SettingsFile = None,
+    isolate: Isolate = None,
+    budgets: Budgets = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only the verdict.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Events as JSON, one a line.")] = False,
     video: Annotated[bool, typer.Option(help="Write the annotated video.")] = True,
@@ -142,13 +171,28 @@ def watch(
     )
     if resume:
         given = (source, task, models, rules, out, actor, behaviour, plugin, fps, fov, zones)
-        settings, past = _past(resume, *given, every != 1)
+        more = (setting, settings_file, isolate, budgets, every != 1)
+        settings, past = _past(resume, *given, *more)
     elif source is None:
         raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
     else:
         past = None
         settings = settings_of(
-            source, task, models, rules, actor, every, behaviour, plugin, fps, fov, zones
+            source,
+            task,
+            models,
+            rules,
+            actor,
+            every,
+            behaviour,
+            plugin,
+            fps,
+            fov,
+            zones,
+            setting,
+            settings_file,
+            isolate,
+            budgets,
         )
     result = run_and_tell(
         settings,

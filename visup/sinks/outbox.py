@@ -86,6 +86,7 @@ class Outbox:
                 f"The sink '{self.sink.name}' does not take all that it is told.",
                 tuple(part for part in (self.fault, _dropped(self.dropped)) if part),
                 key=self.sink.name,
+                needs=(),
             )
 
     def _run(self) -> None:

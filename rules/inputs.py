@@ -1,0 +1,35 @@
+"""What each word of the rule language reads: while that is unknown, so is the word.
+
+Words about the image now read regions. What an object is (`named`, `actor`, `unexpected`) and what
+a task expects are beliefs that are held while nobody can look, as votes are; they read nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from visup.agent import Mind
+
+REMEMBERED = frozenset({"expected", "engaged", "unexpected", "actor", "named"})
+"""Words about beliefs that outlive what they came from."""
+
+_SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
+    {
+        **dict.fromkeys(REMEMBERED, frozenset()),
+        "stale": frozenset(),  # it tells of this very thing
+        "healthy": frozenset({"health"}),
+        "depth_difference": frozenset({"region", "depth"}),
+        "spin": frozenset({"region", "hypothesis"}),
+    }
+)
+
+
+def inputs(word: str) -> frozenset[str]:
+    """Kinds of percept that a word reads: regions, unless it is known to read something else."""
+    return _SPECIAL.get(word, frozenset({"region"}))
+
+
+def blind(mind: Mind, word: str) -> bool:
+    """Whether something that a word reads is unknown now."""
+    return bool(mind.unknown) and not mind.unknown.isdisjoint(inputs(word))

@@ -1,0 +1,158 @@
+"""`visup behaviours`: list what is installed, check one of your own, begin a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from visup.agent import Contract
+    from visup.agent.loading import Offer
+
+app = typer.Typer(no_args_is_help=True)
+
+TEMPLATE = '''\
+"""The behaviour `{name}`: say here in one line what it perceives.
+
+Check it:  visup behaviours check {name}.py
+Run it:    visup watch CLIP.mp4 --behaviour {name}.py
+Set it:    visup watch CLIP.mp4 --behaviour {name}.py --set {name}.contrast=80
+"""
+
+from pydantic import BaseModel, Field
+
+from visup.agent import Contract
+
+
+class {title}:
+    """Reports where the brightest spot is, when it stands out."""
+
+    contract = Contract("{name}", gives=("{name}",), cost_ms=50)
+
+    class Settings(BaseModel):
+        contrast: float = Field(100, gt=0, description="grey levels above the mean")
+
+    def __init__(self, settings=None):
+        self.settings = settings or self.Settings()
+
+    def perceive(self, frame, seen, directives):
+        grey = frame.image.mean(axis=2)
+        y, x = divmod(int(grey.argmax()), grey.shape[1])
+        contrast = float(grey[y, x] - grey.mean())
+        if contrast > self.settings.contrast:
+            yield self.contract.percept(frame, (x, y), confidence=min(contrast / 255, 1.0))
+'''
+
+
+@app.command("list")
+def list_behaviours() -> None:
+    """Installed behaviours: what they give, need and cost."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from visup.agent.errors import BehaviourError
+    from visup.agent.registry import discover
+
+    registry, console = discover(), Console(highlight=False)
+    table = Table(padding=(0, 0))
+    for heading in ("name", "gives", "needs", "every", "budget", "found in"):
+        table.add_column(heading, overflow="fold")
+    broken = []
+    for name in registry.names():
+        try:
+            offer = registry.offer(name)
+            table.add_row(name, *_row(offer.contract), offer.where)
+        except BehaviourError as fault:
+            broken.append(str(fault))
+    console.print(table)
+    for line in broken:
+        console.print(line, style="yellow", markup=False)
+
+
+@app.command("check")
+def check(
+    where: Annotated[
+        str, typer.Argument(metavar="FILE", help="A Python file, package.module:Class, or a name.")
+    ],
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME.KEY=VALUE", help="A setting of the behaviour."),
+    ] = None,
+) -> None:
+    """Run a behaviour on clips of all sorts and see whether it keeps its contract.
+
+    Exit code: 0 when it does, 1 when it does not, 2 when it cannot be loaded.
+    """
+    from rich.console import Console
+
+    from visup.agent.plugin_settings import parse_settings
+
+    console, values = Console(highlight=False), parse_settings(setting or ())
+    kept = [_check(console, offer, values) for offer in _offers(where)]
+    raise typer.Exit(0 if all(kept) else 1)
+
+
+@app.command("new")
+def new(
+    name: Annotated[str, typer.Argument(help="Of the behaviour, such as lamp.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the file.")] = Path(),
+) -> None:
+    """Write a behaviour that runs at once, to be changed into your own."""
+    from keyword import iskeyword
+
+    from visup.agent.errors import OutputError, SettingsError
+
+    if not name.isidentifier() or iskeyword(name):
+        raise SettingsError(
+            f"'{name}' is no name for a behaviour",
+            expected="a word of letters, digits and underscores, such as lamp",
+        )
+    path = out / f"{name}.py"
+    title = "".join(part.capitalize() for part in name.split("_")) or name
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(TEMPLATE.format(name=name, title=title))
+    except FileExistsError as fault:
+        raise OutputError("the file exists already", where=str(path)) from fault
+    except OSError as fault:
+        raise OutputError(f"cannot be written: {fault.strerror}", where=str(path)) from fault
+    typer.echo(f"{path}: change it, then\n  visup behaviours check {path}")
+
+
+def _offers(where: str) -> list[Offer]:
+    from visup.agent.loading import offers
+    from visup.agent.registry import discover
+
+    registry = discover()
+    return [registry.offer(where)] if where in registry.names() else offers(where)
+
+
+def _check(console: Console, offer: Offer, values: dict[str, dict[str, object]]) -> bool:
+    from visup.testing import findings
+
+    name = offer.contract.name if offer.contract else offer.where
+    given = values.get(name, {})
+    offer.make(given)  # what cannot be made at all is an error, not a finding
+    found = findings(lambda: offer.make(given))
+    console.print(f"{name} ({offer.where})", markup=False, style="bold")
+    for finding in found:
+        mark = "[green]ok[/green]    " if finding.passed else "[red]failed[/red]"
+        console.print(f"  {mark} ", end="")
+        detail = f": {finding.detail}" if finding.detail else ""
+        console.print(f"{finding.check}{detail}", markup=False, soft_wrap=True)
+    return all(f.passed for f in found)
+
+
+def _row(contract: Contract | None) -> Iterator[str]:
+    if contract is None:
+        yield from ("?",) * 4
+        return
+    yield " ".join(contract.gives)
+    yield " ".join(contract.needs) or "-"
+    yield f"{contract.every_s:g} s" if contract.every_s else "frame"
+    yield f"{contract.cost_ms:g} ms" if contract.cost_ms else "-"

@@ -1,0 +1,116 @@
+"""Behaviours and sources that do what a script says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from visup.agent import (
+    Behaviour,
+    Contract,
+    Depth,
+    Directive,
+    Frame,
+    Health,
+    HealthStatus,
+    Hypothesis,
+    Observation,
+    Percept,
+)
+from visup.agent.errors import BehaviourError, SettingsError
+from visup.percepts.video.base import Ending, Source
+from visup.testing.clips import Shot
+
+Says = Callable[[Frame], object]
+"""What is perceived of a frame: one value, or a list of them; None for nothing."""
+
+
+class Scripted:
+    """A behaviour that reports what a function of the frame says.
+
+    Args:
+        name: Its name.
+        gives: The kinds that it gives; what is said is of the first.
+        says: One value, a list of values, or None for nothing.
+        declared: Other fields of its contract.
+    """
+
+    def __init__(self, name: str, gives: tuple[str, ...], says: Says, **declared: Any) -> None:
+        self.contract = Contract(name, gives, **declared)
+        self.says = says
+        self.directives: list[tuple[Directive, ...]] = []
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report what the script says of one frame; directives are kept to be looked at."""
+        self.directives.append(tuple(directives))
+        said = self.says(frame)
+        values = said if isinstance(said, list) else [] if said is None else [said]
+        return [self.contract.percept(frame, value) for value in values]
+
+
+class ScriptedSource(Source):
+    """A source of frames that are given.
+
+    Args:
+        frames: At least one.
+        fps: Frames per second that it announces.
+        problem: Why it breaks off after the last one, one sentence; None when it is complete.
+
+    Raises:
+        SettingsError: There is no frame.
+    """
+
+    def __init__(
+        self, frames: Iterable[Frame], fps: float = 25.0, problem: str | None = None
+    ) -> None:
+        script = list(frames)
+        if not script:
+            raise SettingsError("a scripted source has no frames", expected="at least one")
+        super().__init__("script", fps=fps, size=script[0].size, frame_count=len(script))
+        self._script: Iterator[Frame] = iter(script)
+        self._breaks_off = problem
+
+    def _next(self) -> Frame | None:
+        frame = next(self._script, None)
+        if frame is None and self._breaks_off:
+            self._end(Ending.TRUNCATED, self._breaks_off)
+        return frame
+
+    def _release(self) -> None:
+        self._script = iter(())
+
+
+def stand_ins(
+    kinds: Iterable[str],
+    shots: Sequence[Shot],
+    provide: Mapping[str, Says] | None = None,
+) -> list[Behaviour]:
+    """Behaviours that give what others need, from what is true of a clip.
+
+    Args:
+        kinds: What is needed.
+        shots: The clip.
+        provide: What is said of a frame, for kinds that a clip knows nothing of.
+
+    Raises:
+        BehaviourError: A kind is not known.
+    """
+    truth = {shot.frame.index: shot for shot in shots}
+    known: dict[str, Says] = {
+        "region": lambda f: list(truth[f.index].regions),
+        "hypothesis": lambda f: [
+            Hypothesis(r.id, "disc", 0, 0.9, 0.0, 1.0) for r in truth[f.index].regions
+        ],
+        "depth": lambda f: [Depth(r.id, "disc", 10.0, 0.5) for r in truth[f.index].regions],
+        "health": lambda f: Health(HealthStatus.OK),
+        **(provide or {}),
+    }
+    for kind in kinds:
+        if kind not in known:
+            raise BehaviourError(
+                f"the clips know nothing of '{kind}', which the behaviour needs",
+                hint=f"say it: provide={{'{kind}': lambda frame: ...}}",
+            )
+    return [Scripted(f"true_{kind}", (kind,), known[kind]) for kind in kinds]
