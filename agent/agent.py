@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 from visup.agent.act import alert_events, faults, update_alerts
 from visup.agent.answers import understood, with_answers
@@ -24,6 +25,7 @@ from visup.agent.records import (
 )
 from visup.agent.running import worded
 from visup.agent.slot import Slot
+from visup.agent.state import Keeps
 from visup.agent.thinking import joined
 
 
@@ -118,12 +120,30 @@ class Agent:
         Returns:
             The whole record of the step; `mind` has become `Step.mind`.
         """
-        seen = perceive(self._slots, frame, self.directives)
-        thought = self._reason(seen)
-        step = self._act(seen, thought)
-        self.mind, self.directives = step.mind, step.directives
+        step = self.rethink(self.look(frame))
         for observer in self.observers:
             observer(step, frame)
+        return step
+
+    def look(self, frame: Frame) -> Observation:
+        """Perceive only: behaviours see the frame, the mind stays as it is."""
+        return perceive(self._slots, frame, self.directives)
+
+    def rethink(self, seen: Observation, answers: Mapping[int, str] | None = None) -> Step:
+        """Reason about what was perceived, now or in a recorded run; observers are not told.
+
+        Args:
+            seen: What was perceived of the next frame.
+            answers: What the operator had said before that step of a recorded run: object id ->
+                model name, as 'answer' events tell it. None when there is no such run.
+
+        Returns:
+            The whole record of the step; `mind` has become `Step.mind`.
+        """
+        if answers is not None:
+            self._answers = dict(answers)
+        step = self._act(seen, self._reason(seen))
+        self.mind, self.directives = step.mind, step.directives
         return step
 
     def close(self) -> None:
@@ -165,6 +185,34 @@ class Agent:
         """
         self._answers[object_id] = understood(self.mind, object_id, name, self.models)
 
+    def save(self) -> Mapping[str, Any]:
+        """All that this agent has become, to be frozen by `visup.agent.state`.
+
+        Returns:
+            `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
+        """
+        whole = all(s.keeps for s in self._slots)
+        kept = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.keeps}
+        return {
+            "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
+            "behaviours": {n: _saved(b) for n, b in kept.items()} if whole else None,
+            "slots": {s.behaviour.contract.name: s.conduct() for s in self._slots},
+        }
+
+    def load(self, state: Mapping[str, Any]) -> bool:
+        """Become what an agent of the same settings was; `state` is used up.
+
+        Returns:
+            Whether behaviours too are as they were; else they are new, and only the mind is.
+        """
+        self.mind, self.directives, self._alerts_opened, self._answers = state["mind"]
+        behaviours = state["behaviours"]
+        for slot in self._slots if behaviours is not None else ():
+            name = slot.behaviour.contract.name
+            slot.behaviour.load(behaviours[name])  # type: ignore[attr-defined]  # it gave its state
+            slot.take_up(state["slots"][name])
+        return behaviours is not None
+
     def _reason(self, seen: Observation) -> Outcome:
         """Update, cogitate, match: all or nothing."""
         phases = (*self.thinkers.update, *self.thinkers.cogitate, *self.thinkers.match)
@@ -198,6 +246,11 @@ class Agent:
             alerts=(*opened, *closed),
             directives=thought.directives,
         )
+
+
+def _saved(behaviour: Behaviour) -> Mapping[str, Any]:
+    assert isinstance(behaviour, Keeps)
+    return behaviour.save()
 
 
 def _fault(mind: Mind, seen: Observation, thinker: Thinker, fault: BaseException) -> Outcome:

@@ -8,8 +8,9 @@ failure until it has run again, also in the steps in which it would not have run
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 from visup.agent.behaviour import Behaviour
 from visup.agent.contract import Contract
@@ -26,11 +27,16 @@ from visup.agent.running import (
     told_seconds,
     worded,
 )
+from visup.agent.state import Keeps
 
 PATIENCE = 3
 FIRST_SUSPENSION_S = 1.0
 LONGEST_SUSPENSION_S = 60.0
 NEVER = float("-inf")
+
+
+_SETTLED = frozenset({"behaviour", "contract", "limits", "runner"})
+"""What of a slot is settled when the agent is made; all else is conduct."""
 
 
 @dataclass(slots=True)
@@ -60,6 +66,20 @@ class Slot:
     suspended_at: float = NEVER
     grown_mb: float = 0.0
     past: deque[Past] = field(default_factory=deque)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the behaviour can tell its state; that of another process is out of reach."""
+        return isinstance(self.behaviour, Keeps) and not self.limits.isolated(self.contract)
+
+    def conduct(self) -> dict[str, Any]:
+        """What the agent knows of its behaviour's conduct, to be frozen by `visup.agent.state`."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SETTLED}
+
+    def take_up(self, conduct: Mapping[str, Any]) -> None:
+        """Go on from the conduct that another slot told."""
+        for name, value in conduct.items():
+            setattr(self, name, value)
 
     @property
     def suspension_s(self) -> float:

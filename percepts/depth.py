@@ -12,6 +12,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 import cv2
 from scipy.spatial.distance import pdist
@@ -62,6 +63,13 @@ class DepthBehaviour:
         self._areas = {(v.name, v.number): v.area for v in views if v.area is not None}
         known = extents(database, sizes_m) if database is not None else {}
         self._enlarged = {n: sizes_m[n] / extent for n, extent in known.items()}
+
+    def save(self) -> Mapping[str, Any]:
+        """Nothing: each frame stands for itself."""
+        return {}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Nothing is remembered."""
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]

@@ -16,6 +16,7 @@ from visup.commands.doctor import doctor
 from visup.commands.evaluate import app as evaluate_app
 from visup.commands.models import app as models_app
 from visup.commands.render import render
+from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task import app as task_app
@@ -38,6 +39,7 @@ app = typer.Typer(
 app.command("watch")(watch)
 app.command("demo")(demo)
 app.command("step")(step)
+app.command("replay")(replay)
 app.command("render")(render)
 app.command("doctor")(doctor)
 app.add_typer(task_app, name="task", help="Check, show and list task files.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.console import Console
@@ -46,7 +47,11 @@ class Narrator:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Print the events of one step."""
-        for event in step.events if self.as_json else worded_once(step.events):
+        self.tell_all(step.events)
+
+    def tell_all(self, events: Sequence[Event]) -> None:
+        """Print the events of one step."""
+        for event in events if self.as_json else worded_once(events):
             self.tell(event)
 
     def tell(self, event: Event) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Thread
 
-from visup.agent import Frame
+from visup.agent import Frame, Mind
 from visup.agent.agent import Agent, Observer, Step
 from visup.agent.answers import model_named
 from visup.agent.errors import SettingsError, VisupError
@@ -97,8 +97,13 @@ class Operator:
     typed: Callable[[], list[str]] | None = None
     tell: Callable[[str], None] = print
 
-    def attend(self, agent: Agent) -> Observer:
+    def attend(self, agent: Agent, *, at_once: bool = False) -> Observer:
         """An observer that hands answers to an agent after each step.
+
+        Args:
+            agent: The agent.
+            at_once: Whether to hand over now what its mind is ready for; a run that was killed may
+                have been killed before it was.
 
         Raises:
             SettingsError: An answer that was given beforehand names what nobody knows.
@@ -107,9 +112,15 @@ class Operator:
             model_named(agent.mind, name, agent.models)
         waiting = dict(self.answers)
 
-        def after(step: Step, frame: Frame) -> None:
-            for number in [i for i in waiting if _known(step, i)]:
+        def hand() -> None:
+            for number in [i for i in waiting if _known(agent.mind, i)]:
                 agent.answer(number, waiting.pop(number))
+
+        if at_once:
+            hand()
+
+        def after(step: Step, frame: Frame) -> None:
+            hand()
             if self.typed is None:
                 return
             for event in step.events:
@@ -133,6 +144,6 @@ class Operator:
             self.tell(str(fault))
 
 
-def _known(step: Step, object_id: int) -> bool:
-    belief = step.mind.objects.get(object_id)
+def _known(mind: Mind, object_id: int) -> bool:
+    belief = mind.objects.get(object_id)
     return belief is not None and belief.confirmed

@@ -2,28 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import visup
 from visup.agent import Frame, Severity, Verdict
-from visup.agent.agent import Observer, Step
-from visup.agent.encode import plain
-from visup.agent.errors import ExtraMissingError, OutputError
-from visup.agent.journal import Journal, export_events
+from visup.agent.agent import Agent, Observer, Step
+from visup.agent.errors import OutputError
+from visup.agent.journal import Limits
 from visup.percepts.video import Source
+from visup.percepts.video.live import LiveSource
+from visup.recorder import Recorder, kept_of
+from visup.resume import Past, caught_up
 from visup.settings import WatchSettings
+from visup.sinks import Sinks
+from visup.states import StateKeeper
+from visup.steady import Steady
 from visup.supervisor import build_agent, final_verdict, open_video
+from visup.troubles import Troubles
 
 if TYPE_CHECKING:
     from visup.operator import Operator
-    from visup.report.records import RunData
 
 Progress = Callable[[int, int | None], None]
 """Told after each step how many frames are done and how many there are (None when not known)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How a run is recorded.
+
+    Attributes:
+        video: Whether to write the annotated video.
+        report: Whether to write the report.
+        limits: Of the journal.
+        state_every_s: Seconds of the source between two states from which it could be resumed; 0 for
+            none.
+        sinks: Where alerts go besides, as of `--sink`.
+    """
+
+    video: bool = True
+    report: bool = True
+    limits: Limits = field(default_factory=Limits)
+    state_every_s: float = 30.0
+    sinks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,18 +116,22 @@ def supervise(
     *,
     observers: Sequence[Observer] = (),
     progress: Progress | None = None,
-    video: bool = True,
     operator: Operator | None = None,
+    notice: Callable[[str], None] | None = None,
+    options: RunOptions | None = None,
+    past: Past | None = None,
 ) -> RunResult:
     """Watch a source from start to end.
 
     Args:
         settings: What to watch and against what.
-        folder: A folder from `fresh_folder`, or None to record nothing.
-        observers: Told of each step besides the recorders.
+        folder: A folder from `fresh_folder`, that of `past`, or None to record nothing.
+        observers: Told of each step after it is recorded.
         progress: Told of each step.
-        video: Whether to write the annotated video.
         operator: Who answers questions; nobody by default.
+        notice: Told what cannot wait for a step, such as that a camera dropped: one sentence.
+        options: How it is recorded and told.
+        past: The run to go on with; `settings` are its own.
 
     Returns:
         How it ended. A source that breaks off is told in `problem`; all that was seen is kept.
@@ -111,25 +139,109 @@ def supervise(
     Raises:
         VisupError: Something given is not as it should be.
     """
-    tally = _Tally()
+    options = options or RunOptions()
+    tally = _Tally(past.grave if past else False)
+    troubles = Troubles()
     with ExitStack() as stack:
-        agent = build_agent(settings)
+        agent = build_agent(settings, also=(troubles,))
+        stack.callback(agent.close)
         source = stack.enter_context(open_video(settings))
-        recorder = _Recorder(settings, source, folder, video, stack) if folder else None
+        recorder = _recorder(settings, source, folder, options, past is not None, stack)
+        sinks = Sinks(options.sinks, settings.source)
+        stack.callback(sinks.close)
+        states = StateKeeper(folder, options.state_every_s) if folder else None
+        frames: Iterator[Frame] = source
+        notes: tuple[str, ...] = ()
+        if past:
+            frames, notes = _caught_up(agent, source, past, recorder)
+        # The journal comes first: what is told was recorded before.
         recording = (recorder,) if recorder else ()
-        answering = (operator.attend(agent),) if operator else ()
-        agent.observers = (tally, *recording, *observers, *answering)
-        steps = 0
+        answering = (_attending(operator, agent, recorder, past),) if operator else ()
+        agent.observers = (tally, *recording, *observers, sinks, *answering)
+        if recorder:
+            troubles.ask(recorder.troubles)
+        troubles.ask(sinks.troubles)
+        steady = Steady(frames, source.fps, agent.mind.time if past and past.steps else None)
+        troubles.ask(steady.troubles)
+        if isinstance(source, LiveSource):
+            source.notify = notify(sinks, notice)
+            troubles.ask(source.troubles)
+        steps = past.steps if past else 0
         try:
-            for steps, _ in enumerate(agent.steps(source), start=1):
+            for step in agent.steps(steady):
+                steps += 1
+                if states:
+                    states.offer(agent, step, lambda: kept_of(recorder))
                 if progress:
                     progress(steps, _steps_of(source, settings))
         except KeyboardInterrupt:
             tally.stopped = True
+        if states:
+            states.close()
+            notes += (states.note,) if states.note else ()
         verdict = final_verdict(agent.mind) if agent.mind.tasks else tally.verdict
         problem = "stopped by the user" if tally.stopped else source.problem
-        result = RunResult(verdict, steps, problem, folder)
-        return recorder.finish(result, agent.mind.tasks) if recorder else result
+        notes += sinks.end(verdict, steps)
+        if recorder is None:
+            return RunResult(verdict, steps, problem, notes=notes)
+        ended = source.ended.value if source.ended and not tally.stopped else "stopped"
+        report, more = recorder.finish(verdict, steps, problem, ended, agent.mind.tasks)
+        return RunResult(verdict, steps, problem, folder, report, (*notes, *more))
+
+
+def _attending(
+    operator: Operator, agent: Agent, recorder: Recorder | None, past: Past | None
+) -> Observer:
+    """The operator of a run, who does not say again what was taken up before the run was killed."""
+    if recorder and not past:
+        recorder.journal.note(answers=operator.answers)
+    given = {**past.answers, **operator.answers} if past else operator.answers
+    waiting = {i: name for i, name in given.items() if i not in agent.mind.answers}
+    attend = replace(operator, answers=waiting)
+    return attend.attend(agent, at_once=past is not None)
+
+
+def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:
+    """What tells a sentence to sinks and to `notice` at once."""
+
+    def tell(text: str) -> None:
+        sinks.notice(text)
+        if notice:
+            notice(text)
+
+    return tell
+
+
+def _recorder(
+    settings: WatchSettings,
+    source: Source,
+    folder: Path | None,
+    options: RunOptions,
+    resume: bool,
+    stack: ExitStack,
+) -> Recorder | None:
+    if folder is None:
+        return None
+    made = Recorder(
+        settings,
+        source,
+        folder,
+        video=options.video,
+        report=options.report,
+        limits=options.limits,
+        resume=resume,
+    )
+    stack.callback(made.close)
+    return made
+
+
+def _caught_up(
+    agent: Agent, source: Source, past: Past, recorder: Recorder | None
+) -> tuple[Iterator[Frame], tuple[str, ...]]:
+    if recorder and past.state:
+        recorder.collector.load(past.state.kept)
+    tell = recorder.catch_up if recorder else lambda step, frame: None
+    return caught_up(agent, source, past, tell)
 
 
 def _steps_of(source: Source, settings: WatchSettings) -> int | None:
@@ -140,8 +252,8 @@ def _steps_of(source: Source, settings: WatchSettings) -> int | None:
 class _Tally:
     """Whether anything grave was told, for runs without a task."""
 
-    def __init__(self) -> None:
-        self.grave = False
+    def __init__(self, grave: bool = False) -> None:
+        self.grave = grave
         self.stopped = False
 
     def __call__(self, step: Step, frame: Frame) -> None:
@@ -150,78 +262,3 @@ class _Tally:
     @property
     def verdict(self) -> Verdict | None:
         return Verdict.INTERRUPTED if self.grave else None
-
-
-class _Recorder:
-    """Writes the run folder: the journal as the run goes, what is derived from it at the end."""
-
-    def __init__(
-        self,
-        settings: WatchSettings,
-        source: Source,
-        folder: Path,
-        video: bool,
-        stack: ExitStack,
-    ) -> None:
-        from visup.report.data import Collector
-        from visup.report.video import AnnotatedVideo
-
-        self.folder = folder
-        self.journal = Journal(folder / "journal.sqlite")
-        stack.callback(self.journal.close)
-        self.facts: dict[str, Any] = {
-            "visup": visup.__version__,
-            "source": source.name,
-            "fps": source.fps,
-            "size": source.size,
-            "settings": plain(settings),
-        }
-        self.journal.note(**self.facts)
-        self.notes = source.notes
-        self.collector = Collector()
-        path = folder / "annotated.webm"
-        self.video = AnnotatedVideo(path, source.fps / settings.every) if video else None
-        self._derived = {"report": self.collector.add}
-        if self.video:
-            self._derived["annotated video"] = self.video.add
-
-    def __call__(self, step: Step, frame: Frame) -> None:
-        self.journal.record(step, frame)
-        for name, add in list(self._derived.items()):
-            try:
-                add(step, frame)
-            except Exception as fault:
-                # What is derived may be lost; supervision and the journal go on.
-                del self._derived[name]
-                said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
-                self.notes = (*self.notes, said)
-
-    def finish(self, result: RunResult, tasks: Sequence[Any]) -> RunResult:
-        """Everything that is made once the last frame was seen."""
-        if self.video:
-            self.video.close()
-        verdict = result.verdict.value if result.verdict else None
-        self.journal.note(verdict=verdict, steps=result.steps, problem=result.problem, tasks=tasks)
-        export_events(self.folder / "journal.sqlite", self.folder / "events.jsonl")
-        report, notes = self._report(result)
-        return RunResult(result.verdict, result.steps, result.problem, result.folder, report, notes)
-
-    def _report(self, result: RunResult) -> tuple[Path | None, tuple[str, ...]]:
-        from visup.report.html import write_report
-
-        path = self.folder / "report.html"
-        try:
-            write_report(self._run_data(result), path)
-        except ExtraMissingError as missing:
-            return None, (str(missing),)
-        except OutputError:
-            raise
-        except Exception as fault:
-            # The run itself is recorded already; a report that cannot be made must not hide it.
-            return None, (f"the report was not made: {type(fault).__name__}: {fault}",)
-        return path, ()
-
-    def _run_data(self, result: RunResult) -> RunData:
-        return self.collector.finish(
-            result.verdict, self.facts, problem=result.problem, notes=self.notes
-        )

@@ -29,6 +29,7 @@ class WatchSettings:
         fps: Frame rate to assume where the source has none, or None.
         fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
         zones: Settings file with zones that rules can name, or None.
+        patience_s: How long a camera or stream that drops is tried again, seconds.
     """
 
     source: str
@@ -45,6 +46,7 @@ class WatchSettings:
     fps: float | None = None
     fov_vertical_deg: float | None = None
     zones: Path | None = None
+    patience_s: float = 60.0
 
     def __post_init__(self) -> None:
         if self.every < 1:

@@ -22,12 +22,13 @@ from visup.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.structure import sizes, task_actors, undrawn
 from visup.tasks.supervise import finish, task_thinker
+from visup.troubles import tell_troubles
 from visup.zones import load_zones
 
 if TYPE_CHECKING:
     from visup.tasks.tree import Task
 
-__all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video"]
+__all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
 
 def open_video(settings: WatchSettings) -> Source:
@@ -36,11 +37,25 @@ def open_video(settings: WatchSettings) -> Source:
     Raises:
         SourceError: It cannot be opened.
     """
-    return open_source(settings.source, every=settings.every, fps=settings.fps)
+    return open_source(
+        settings.source,
+        every=settings.every,
+        fps=settings.fps,
+        patience_s=settings.patience_s,
+    )
 
 
-def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> Agent:
+def build_agent(
+    settings: WatchSettings,
+    observers: Sequence[Observer] = (),
+    also: Sequence[Behaviour] = (),
+) -> Agent:
     """An agent that supervises as the settings say.
+
+    Args:
+        settings: What to supervise against.
+        observers: Told of each step.
+        also: Behaviours besides those of the settings.
 
     Raises:
         VisupError: A task, rules file, zones file, model database or behaviour is not as it should
@@ -52,7 +67,7 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     return Agent(
-        behaviours=_behaviours(settings, database, sizes(tasks, settings.actors)),
+        behaviours=[*_behaviours(settings, database, sizes(tasks, settings.actors)), *also],
         thinkers=_thinkers(settings, tasks),
         actors=settings.actors,
         zones=zones,
@@ -60,6 +75,20 @@ def build_agent(settings: WatchSettings, observers: Sequence[Observer] = ()) -> 
         models=database.names() if database is not None else (),
         limits=Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate)),
     )
+
+
+def reasoning_agent(settings: WatchSettings) -> Agent:
+    """An agent that reasons as the settings say about what was perceived before; it sees nothing.
+
+    Raises:
+        VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
+            task has.
+    """
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    zones = load_zones(settings.zones) if settings.zones else ()
+    _check_zones(tasks, {z.name for z in zones})
+    _check_actors(settings, tasks, None)
+    return Agent(thinkers=_thinkers(settings, tasks), actors=settings.actors, zones=zones)
 
 
 def final_verdict(mind: Mind) -> Verdict:
@@ -97,7 +126,7 @@ def _behaviours(
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     rules = tuple(rule for path in settings.rules for rule in load_rules(path))
     interpreting = default_thinkers(rules=rules or None)
-    match = (task_thinker(tasks),) if tasks else ()
+    match = (*((task_thinker(tasks),) if tasks else ()), tell_troubles)
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 

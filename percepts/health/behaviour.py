@@ -8,7 +8,8 @@ one frame to the next as nothing in a scene does, and it must last.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from visup.agent import (
     Contract,
@@ -19,6 +20,7 @@ from visup.agent import (
     Observation,
     Percept,
 )
+from visup.agent.state import held
 from visup.percepts.health.arrivals import Arrivals
 from visup.percepts.health.cells import Cells
 from visup.percepts.health.picture import Picture, measure
@@ -49,6 +51,14 @@ class HealthBehaviour:
         self._same_since: float | None = None
         self._fault_since: float | None = None
         self._harmed = False
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        return held(self, "_settings")
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a behaviour of the same settings remembered."""
+        vars(self).update(state)
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from visup.agent import Contract, Directive, Frame, HealthStatus, Observation, Percept
 from visup.percepts.motion.lookback import LookBack
@@ -25,6 +26,20 @@ class MotionBehaviour:
     def __init__(self, settings: MotionSettings | None = None) -> None:
         self._segmenter = MotionSegmenter(settings)
         self._back = LookBack()
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        return {"segmenter": self._segmenter.save(), "back": self._back}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a behaviour of the same settings remembered."""
+        self._segmenter.load(state["segmenter"])
+        self._back = state["back"]
+
+    def missed(self, seen: Observation) -> None:
+        """Be told of regions reported since the state that was taken on: their ids are used."""
+        for region in seen.of("region"):
+            self._segmenter.used(region.id)
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]

@@ -7,13 +7,15 @@ them best, and the outlines so found say which constraints a layer may use in th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
 
 import cv2
 import numpy as np
 
 from visup.agent import Directive, Frame, Region
+from visup.agent.state import held
 from visup.percepts.motion.background import bare_ground, find_background
 from visup.percepts.motion.constraints import (
     Constraints,
@@ -65,6 +67,7 @@ class MotionSegmenter:
         # Cells and points do not need each other: one core each. What is found is the same.
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+        self._ids = 0  # never begun anew: a number that was told stays the region's
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -77,12 +80,24 @@ class MotionSegmenter:
         self._camera: dict[int, Rate] = {}
         self._fixed_until: float | None = None
         self._resting = RestingView()
-        self._count = self._born = self._ids = 0
+        self._count = self._born = 0
 
     @property
     def resting(self) -> bool:
         """Whether the camera is seen to rest, and what moves is told before the picture of that."""
         return self._resting.active
+
+    def save(self) -> dict[str, Any]:
+        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        return held(self, "settings", "looked", "_beside", "_engine")
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a segmenter of the same settings remembered."""
+        vars(self).update(state)
+
+    def used(self, region_id: int) -> None:
+        """A region of this id was told before: none is called so anew."""
+        self._ids = max(self._ids, region_id)
 
     def step(self, frame: Frame, directives: Sequence[Directive] = ()) -> tuple[Region, ...]:
         """Segment one frame.

@@ -7,8 +7,9 @@ matches.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -83,6 +84,14 @@ class ShapeBehaviour:
         self.database = database
         self.settings = settings or ShapeSettings()
         self._remembered: dict[int, _Remembered] = {}
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        return {"remembered": self._remembered}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a behaviour of the same settings remembered."""
+        self._remembered = dict(state["remembered"])
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
-from visup.agent import Frame
+from visup.agent import Concern, Frame, Severity
 from visup.agent.errors import SourceError
 from visup.percepts.video.base import Ending, Source
 from visup.percepts.video.capture import Capture, frame_rate, take
 
+FIRST_WAIT_S = 0.5
+LONGEST_WAIT_S = 10.0
+
 
 class LiveSource(Source):
     """A camera or stream; the time of a frame is when it was received.
+
+    When it delivers nothing any more it is opened again, at first soon and then ever more seldom, until
+    it is back or patience is at an end. Numbers and times of frames go on.
 
     Args:
         name: What the user named.
@@ -20,6 +26,12 @@ class LiveSource(Source):
         every: Only every n-th frame is given.
         fps: Frame rate to assume, or None for what the camera says.
         clock: Seconds from any start; an argument so that a run can be repeated.
+        reopen: Opens it again; None to end when it drops.
+        patience_s: How long to try, seconds.
+        wait: Waits so many seconds; an argument for tests.
+
+    Attributes:
+        notify: Told at once when it drops, while nobody can step: one sentence.
 
     Raises:
         SourceError: It delivers no frame.
@@ -33,8 +45,14 @@ class LiveSource(Source):
         every: int = 1,
         fps: float | None = None,
         clock: Callable[[], float] = time.monotonic,
+        reopen: Callable[[], Capture] | None = None,
+        patience_s: float = 0.0,
+        wait: Callable[[float], None] = time.sleep,
     ) -> None:
         rate, notes = frame_rate(capture, fps)
+        self.notify: Callable[[str], None] | None = None
+        self._reopen, self._patience_s, self._wait = reopen, patience_s, wait
+        self._came_back: str | None = None
         self._capture = capture
         self._clock = clock
         self._received = 0
@@ -68,9 +86,36 @@ class LiveSource(Source):
             return None
         return frame
 
+    def troubles(self) -> Iterable[Concern]:
+        """Once after it came back: how long nothing was delivered."""
+        said, self._came_back = self._came_back, None
+        if said:
+            yield Concern("source_dropped", (), Severity.WARNING, said, key=self.name, needs=())
+
+    def _grab(self) -> bool:
+        return self._capture.grab() or (self._received > 0 and self._back_again())
+
+    def _back_again(self) -> bool:
+        """Open it again and again; whether a frame can be received."""
+        if self._reopen is None or self._patience_s <= 0:
+            return False
+        if self.notify:
+            self.notify(f"{self.name} delivers nothing; it is tried again.")
+        since, pause = self._clock(), FIRST_WAIT_S
+        while (gone := self._clock() - since) < self._patience_s:
+            self._capture.release()
+            self._wait(min(pause, self._patience_s - gone))
+            pause = min(2 * pause, LONGEST_WAIT_S)
+            self._capture = self._reopen()
+            if self._capture.isOpened() and self._capture.grab():
+                gone = self._clock() - since
+                self._came_back = f"{self.name} delivered nothing for {gone:.1f} s."
+                return True
+        return False
+
     def _advance(self, every: int) -> Frame | None:
         """Receive until a wanted frame is there."""
-        while self._capture.grab():
+        while self._grab():
             index, self._received = self._received, self._received + 1
             now = self._clock()
             if index == 0:

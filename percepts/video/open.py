@@ -28,6 +28,7 @@ def open_source(
     every: int = 1,
     fps: float | None = None,
     factory: CaptureFactory = open_capture,
+    patience_s: float = 0.0,
 ) -> Source:
     """Open a source of frames.
 
@@ -37,6 +38,7 @@ def open_source(
         every: Give only every n-th frame; frames keep their number and time in the source.
         fps: Frames per second to assume in place of what the source says.
         factory: What opens files, cameras and URLs.
+        patience_s: How long a camera or stream that drops is tried again, seconds.
 
     Returns:
         The source, its first frame decoded. Use it in a `with` statement.
@@ -49,10 +51,30 @@ def open_source(
     if not source.strip():
         raise SourceError("no source was named", hint="name a video file or a folder of images")
     if source.isdecimal():
-        return LiveSource(f"camera {source}", _camera(int(source), factory), every=every, fps=fps)
+        camera = _camera(int(source), factory)
+        return _live(f"camera {source}", camera, int(source), every, fps, factory, patience_s)
     if URL.match(source):
-        return _open_url(source, every=every, fps=fps, factory=factory)
-    return _open_path(Path(source).expanduser(), every=every, fps=fps, factory=factory)
+        return _open_url(source, every, fps, factory, patience_s)
+    return _open_path(Path(source).expanduser(), every, fps, factory, patience_s)
+
+
+def _live(
+    name: str,
+    capture: Capture,
+    opened: str | int,
+    every: int,
+    fps: float | None,
+    factory: CaptureFactory,
+    patience_s: float,
+) -> LiveSource:
+    return LiveSource(
+        name,
+        capture,
+        every=every,
+        fps=fps,
+        reopen=lambda: factory(opened),
+        patience_s=patience_s,
+    )
 
 
 def _check(every: int, fps: float | None) -> None:
@@ -77,7 +99,7 @@ def _camera(camera: int | str, factory: CaptureFactory) -> Capture:
 
 
 def _open_url(
-    url: str, *, every: int, fps: float | None, factory: CaptureFactory
+    url: str, every: int, fps: float | None, factory: CaptureFactory, patience_s: float
 ) -> VideoFile | LiveSource:
     """A recording when the stream knows how many frames it has, else a live source."""
     if url.split(":", 1)[0].lower() not in SCHEMES:
@@ -94,15 +116,18 @@ def _open_url(
         )
     if announced_frames(capture):
         return VideoFile(url, capture, every=every, fps=fps)
-    return LiveSource(url, capture, every=every, fps=fps)
+    return _live(url, capture, url, every, fps, factory, patience_s)
 
 
-def _open_path(path: Path, *, every: int, fps: float | None, factory: CaptureFactory) -> Source:
+def _open_path(
+    path: Path, every: int, fps: float | None, factory: CaptureFactory, patience_s: float
+) -> Source:
     try:
         if path.is_dir():
             return open_folder(path, every=every, fps=fps)
         if path.is_char_device():
-            return LiveSource(str(path), _camera(str(path), factory), every=every, fps=fps)
+            camera = _camera(str(path), factory)
+            return _live(str(path), camera, str(path), every, fps, factory, patience_s)
         regular, exists = path.is_file(), path.exists()
     except (OSError, ValueError) as e:  # a name that is too long or has a NUL in it
         raise SourceError("this is not a usable file name", where=str(path)) from e

@@ -13,7 +13,8 @@ import pytest
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from visup.agent.agent import Agent, Thinkers
 from visup.agent.errors import OutputError
-from visup.agent.journal import Journal, export_events, read_events, read_facts, read_steps
+from visup.agent.journal import Journal
+from visup.agent.recording import export_events, read_events, read_facts, read_steps
 
 CRASH = """
 import os, signal, sys

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from visup.run import Progress, RunResult
+    from visup.resume import Past
+    from visup.run import Progress, RunOptions, RunResult
     from visup.settings import WatchSettings
 
 Source = Annotated[str, typer.Argument(help="Video file, folder of images, camera index or URL.")]
@@ -107,7 +108,9 @@ def settings_of(
 
 
 def watch(
-    source: Source,
+    source: Annotated[
+        str | None, typer.Argument(help="Video file, folder of images, camera index or URL.")
+    ] = None,
     task: Tasks = None,
     models: Models = None,
     rules: Rules = None,
@@ -135,30 +138,71 @@ def watch(
     answers: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Such answers, one a line.")
     ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Go on with this run, which was stopped or killed."),
+    ] = None,
+    sink: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND:PLACE", help="Send alerts there too: jsonl:- or webhook:URL ..."
+        ),
+    ] = None,
+    keep_gb: Annotated[
+        float | None, typer.Option(min=0.0, help="Keep so much of the journal, gigabytes.")
+    ] = None,
+    state_every: Annotated[
+        float, typer.Option(min=0.0, help="Seconds between states to resume from; 0 for none.")
+    ] = 30.0,
 ) -> None:
     """Watch a video and say whether the work goes well.
 
     Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
     """
-    settings = settings_of(
-        source,
-        task,
-        models,
-        rules,
-        actor,
-        every,
-        behaviour,
-        plugin,
-        fps,
-        fov,
-        zones,
-        setting,
-        settings_file,
-        isolate,
-        budgets,
+    from visup.agent.journal import Limits
+    from visup.run import RunOptions
+
+    keep = None if keep_gb is None else int(keep_gb * 1e9)
+    options = RunOptions(
+        video=video,
+        limits=Limits(keep_bytes=keep),
+        state_every_s=state_every,
+        sinks=tuple(sink or ()),
     )
-    given = _answers(answer or [], answers)
-    result = run_and_tell(settings, out, quiet=quiet, as_json=as_json, video=video, answers=given)
+    if resume:
+        given = (source, task, models, rules, out, actor, behaviour, plugin, fps, fov, zones)
+        more = (setting, settings_file, isolate, budgets, every != 1)
+        settings, past = _past(resume, *given, *more)
+    elif source is None:
+        raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
+    else:
+        past = None
+        settings = settings_of(
+            source,
+            task,
+            models,
+            rules,
+            actor,
+            every,
+            behaviour,
+            plugin,
+            fps,
+            fov,
+            zones,
+            setting,
+            settings_file,
+            isolate,
+            budgets,
+        )
+    result = run_and_tell(
+        settings,
+        out,
+        quiet=quiet,
+        as_json=as_json,
+        answers=_answers(answer or [], answers),
+        options=options,
+        past=past,
+    )
     raise typer.Exit(result.exit_code)
 
 
@@ -166,6 +210,20 @@ def _answers(given: list[str], path: Path | None) -> dict[int, str]:
     from visup.operator import parse_answers, read_answers
 
     return {**(read_answers(path) if path else {}), **parse_answers(given)}
+
+
+def _past(run: Path, *given: object) -> tuple[WatchSettings, Past]:
+    """The run that goes on; what it is about was settled when it began."""
+    from visup.agent.errors import SettingsError
+    from visup.resume import past_of
+
+    if any(given):
+        raise SettingsError(
+            "a run goes on as it was begun: --resume takes no source, task or other settings",
+            hint=f"visup watch --resume {run}",
+        )
+    past = past_of(run)
+    return past.settings, past
 
 
 def demo(
@@ -191,18 +249,20 @@ def run_and_tell(
     *,
     quiet: bool = False,
     as_json: bool = False,
-    video: bool = True,
     answers: dict[int, str] | None = None,
+    options: RunOptions | None = None,
+    past: Past | None = None,
 ) -> RunResult:
     """Run, print the narrative as it goes and the verdict last."""
     from rich.console import Console
+    from rich.markup import escape
 
     from visup.narrative import Narrator
     from visup.operator import Operator, typed_lines
     from visup.run import fresh_folder, supervise
 
     console = Console(highlight=False)
-    folder = fresh_folder(out, settings.source)
+    folder = past.recording.path.parent if past else fresh_folder(out, settings.source)
     narrator = Narrator(console, as_json)
     silent = quiet or as_json
     # Whoever reads events from a pipe does not type answers.
@@ -214,8 +274,12 @@ def run_and_tell(
             folder,
             observers=() if quiet else (narrator,),
             progress=progress,
-            video=video,
             operator=operator,
+            notice=None
+            if as_json
+            else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]"),
+            options=options,
+            past=past,
         )
     _tell_end(console, result, as_json=as_json)
     return result

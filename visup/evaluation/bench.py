@@ -40,7 +40,16 @@ def main() -> int:
     # Rendered clips and what is damaged on purpose need no data.
     results = [
         _run(kind, None, given.out)
-        for kind in ("clips", "robustness", "relations", "rules", "tasks", "faults")
+        for kind in (
+            "clips",
+            "robustness",
+            "relations",
+            "rules",
+            "tasks",
+            "faults",
+            "resume",
+            "soak",
+        )
         if (given.only or "") in kind
     ]
     if not given.data.is_dir():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import cv2
@@ -153,6 +153,19 @@ class Collector:
         if weight and self._pictures.has_room_for(weight):
             self._pictures.add(self._picture(mind, frame, events, weight))
             self._last_pictured = frame.index
+
+    def save(self) -> Mapping[str, Any]:
+        """All that was kept so far; see `visup.agent.state`."""
+        names = (f.name for f in fields(self) if f.name not in ("limits", "_pictures"))
+        return {n: getattr(self, n) for n in names} | {"pictures": self._pictures.items()}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Go on from what a collector with the same limits kept."""
+        for name, value in state.items():
+            if name != "pictures":
+                setattr(self, name, value)
+        for picture in state.get("pictures", ()):
+            self._pictures.add(picture)
 
     def finish(
         self,

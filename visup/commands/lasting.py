@@ -1,0 +1,68 @@
+"""`visup eval resume` and `visup eval soak`: runs that are killed, and runs of hours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+KEYS = ("kills", "early", "resumed", "equal", "lost", "resume_s")
+
+
+def resume(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures to this file too.")
+    ] = None,
+    kills: Annotated[int, typer.Option(min=1, help="How many runs are killed.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of the moments.")] = 0,
+    demo: Annotated[bool, typer.Option("--demo", help="Kill runs of the shipped clip.")] = False,
+) -> None:
+    """Kill runs with SIGKILL, resume them, and compare them with an unbroken run."""
+    from rich.console import Console
+
+    from visup.commands.evaluate import print_table, told, writable
+    from visup.demo import demo_settings
+    from visup.evaluation.record import write_record
+    from visup.evaluation.resume import evaluate_resume
+
+    writable(json_file)
+    with told("killing") as tell:
+        figures = evaluate_resume(
+            demo_settings(5) if demo else None,
+            kills=kills,
+            seed=seed,
+            state_every_s=4.0 if demo else 0.4,
+            progress=tell,
+        )
+    console = Console()
+    print_table(console, "resume", figures, KEYS)
+    for text in figures["failures"]:
+        console.print(text, soft_wrap=True)
+    if json_file:
+        write_record(json_file, figures, {"kills": kills, "seed": seed, "demo": demo})
+    raise typer.Exit(int(figures["total"]["equal"] < kills or figures["total"]["lost"] > 0))
+
+
+def soak(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures to this file too.")
+    ] = None,
+    frames: Annotated[int, typer.Option(help="Length of the run.")] = 200_000,
+) -> None:
+    """A run of hours of scripted percepts: time of a step and memory at its start and end."""
+    from rich.console import Console
+
+    from visup.commands.evaluate import print_table, told, writable
+    from visup.evaluation.record import write_record
+    from visup.evaluation.soak import evaluate_soak
+
+    writable(json_file)
+    with told("soaking") as tell:
+        figures = evaluate_soak(frames, progress=tell)
+    console = Console()
+    print_table(console, "soak", figures, ("ms", "rss_mb"))
+    for name, value in figures["total"].items():
+        console.print(f"{name}: {value:.6g}")
+    if json_file:
+        write_record(json_file, figures, {"frames": frames})

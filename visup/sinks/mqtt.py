@@ -1,0 +1,61 @@
+"""Alerts to an MQTT broker; needs `visup[mqtt]` (paho-mqtt, licensed EPL 2.0 or BSD 3-clause)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from visup.agent.errors import ExtraMissingError, SettingsError
+from visup.sinks.plain import TIMEOUT_S, text_of
+
+PORT = 1883
+ONCE_AT_LEAST = 1
+
+
+class Mqtt:
+    """Publishes each record as JSON, at least once (QoS 1).
+
+    Args:
+        place: `HOST[:PORT]/TOPIC`.
+
+    Raises:
+        SettingsError: It is not of that form.
+        ExtraMissingError: paho-mqtt is not installed.
+    """
+
+    def __init__(self, place: str) -> None:
+        address, slash, topic = place.partition("/")
+        host, _, port = address.partition(":")
+        if not (host and slash and topic) or (port and not port.isdecimal()):
+            raise SettingsError(f"--sink mqtt:{place}", expected="mqtt:HOST[:PORT]/TOPIC")
+        try:
+            from paho.mqtt import client
+        except ModuleNotFoundError as missing:
+            raise ExtraMissingError("a sink for MQTT", "mqtt") from missing
+        self.name = f"mqtt:{place}"
+        self._topic = topic
+        self._place = host, int(port or PORT)
+        self._client = client.Client(client.CallbackAPIVersion.VERSION2)
+        self._client.connect_timeout = TIMEOUT_S
+        self._connected = False
+
+    def deliver(self, record: Mapping[str, Any]) -> None:
+        """Publish one record and wait until the broker has it.
+
+        Raises:
+            OSError, RuntimeError: The broker did not take it.
+        """
+        if not self._connected:
+            self._client.connect(*self._place)
+            self._client.loop_start()
+            self._connected = True
+        told = self._client.publish(self._topic, text_of(record), qos=ONCE_AT_LEAST)
+        told.wait_for_publish(TIMEOUT_S)
+        if not told.is_published():
+            raise TimeoutError("the broker did not answer")
+
+    def close(self) -> None:
+        """Say goodbye to the broker."""
+        if self._connected:
+            self._client.disconnect()
+            self._client.loop_stop()

@@ -1,0 +1,119 @@
+"""Between the cycle and a sink: a queue of bounded length, and a thread that empties it.
+
+The cycle never waits. When a sink is slower than what is told, the newest goes overboard; how much is
+counted and told as an alert. A sink that fails is tried again with the next record.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from queue import Empty, Full, Queue
+from typing import Any, Protocol
+
+from visup.agent import Concern, Severity
+
+MOST_WAITING = 1000
+CLOSING_S = 5.0
+
+
+class Sink(Protocol):
+    """Where records go. Its methods run in a thread of their own, and may wait and raise."""
+
+    name: str
+
+    def deliver(self, record: Any) -> None:
+        """Send one record."""
+        ...
+
+    def close(self) -> None:
+        """Let go of files and connections."""
+        ...
+
+
+class Outbox:
+    """The queue and the thread of one sink.
+
+    Args:
+        sink: Where the records go.
+        most: How many may wait.
+
+    Attributes:
+        sink: As given.
+        delivered: Records that the sink took.
+        dropped: Records for which there was no room.
+        failed: Records that the sink could not deliver.
+        fault: Why the last one was not delivered; empty when it was.
+    """
+
+    def __init__(self, sink: Sink, most: int = MOST_WAITING) -> None:
+        self.sink = sink
+        self.delivered = self.dropped = self.failed = 0
+        self.fault = ""
+        self._queue: Queue[Any] = Queue(most)
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"sink {sink.name}", daemon=True)
+        self._thread.start()
+
+    def offer(self, record: Any) -> None:
+        """Leave a record for the sink; returns at once."""
+        try:
+            self._queue.put_nowait(record)
+        except Full:
+            self.dropped += 1
+
+    def close(self, wait_s: float = CLOSING_S) -> None:
+        """Give the sink a last time to empty the queue; what then still waits is dropped."""
+        self._closing.set()
+        self._thread.join(wait_s)
+        self.dropped += self._queue.qsize()
+
+    @property
+    def note(self) -> str | None:
+        """What the user should know at the end, or None when all was delivered."""
+        if not (self.dropped or self.failed):
+            return None
+        why = f": {self.fault}" if self.fault else ""
+        return f"sink {self.sink.name}: {self.failed} records failed, {self.dropped} dropped{why}"
+
+    def troubles(self) -> Iterable[Concern]:
+        """What is wrong with the sink now."""
+        if self.fault or self.dropped:
+            yield Concern(
+                "sink_failed",
+                (),
+                Severity.WARNING,
+                f"The sink '{self.sink.name}' does not take all that it is told.",
+                tuple(part for part in (self.fault, _dropped(self.dropped)) if part),
+                key=self.sink.name,
+                needs=(),
+            )
+
+    def _run(self) -> None:
+        while True:
+            try:
+                record = self._queue.get(timeout=0.1)
+            except Empty:
+                if self._closing.is_set():
+                    break
+                continue
+            self._deliver(record)
+        try:
+            self.sink.close()
+        except Exception as fault:
+            self.fault = f"{type(fault).__name__}: {fault}"
+
+    def _deliver(self, record: Any) -> None:
+        try:
+            self.sink.deliver(record)
+        except Exception as fault:
+            # Whatever a sink does is its own failure, never the supervisor's.
+            self.failed += 1
+            self.fault = f"{type(fault).__name__}: {fault}"
+        else:
+            self.delivered += 1
+            self.fault = ""
+
+
+def _dropped(count: int) -> str:
+    return f"{count} records were dropped." if count else ""

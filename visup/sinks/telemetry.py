@@ -1,0 +1,122 @@
+"""Traces and metrics for OpenTelemetry; needs `visup[otel]`.
+
+A step is a span with a child for each behaviour that ran, both as long as they took; counters tell of
+steps, events, alerts and failures. The exporter is what the environment sets up (such as with
+`OTEL_EXPORTER_OTLP_ENDPOINT`), or standard error with `otel:console`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from visup.agent import ReportState
+from visup.agent.agent import Step
+from visup.agent.errors import ExtraMissingError, SettingsError
+
+NAME = "visup"
+
+
+class Telemetry:
+    """A sink of whole steps.
+
+    Args:
+        place: 'console', or 'otlp' for what the environment says.
+        providers: Tracer and meter providers to use instead; for programs that have their own.
+
+    Raises:
+        SettingsError: `place` is neither.
+        ExtraMissingError: OpenTelemetry is not installed.
+    """
+
+    def __init__(self, place: str, providers: tuple[Any, Any] | None = None) -> None:
+        if place not in ("console", "otlp"):
+            raise SettingsError(f"--sink otel:{place}", expected="otel:console or otel:otlp")
+        self.name = f"otel:{place}"
+        self._traces, self._figures = providers or _providers(place)
+        self._tracer = self._traces.get_tracer(NAME)
+        meter = self._figures.get_meter(NAME)
+        self._steps = meter.create_counter("visup.steps", description="frames supervised")
+        self._events = meter.create_counter("visup.events", description="events by kind")
+        self._alerts = meter.create_counter("visup.alerts", description="alerts opened by kind")
+        self._failures = meter.create_counter("visup.behaviour.failures")
+        self._duration = meter.create_histogram("visup.behaviour.duration", unit="ms")
+        self._objects = meter.create_histogram("visup.objects", description="objects in view")
+
+    def deliver(self, record: Step) -> None:
+        """Tell of one step."""
+        self._count(record)
+        self._trace(record)
+
+    def close(self) -> None:
+        """Export what is left."""
+        for provider in (self._traces, self._figures):
+            provider.shutdown()
+
+    def _count(self, step: Step) -> None:
+        self._steps.add(1)
+        self._objects.record(len(step.mind.present()))
+        for event in step.events:
+            self._events.add(1, {"kind": event.kind, "severity": event.severity.name.lower()})
+        for alert in step.alerts:
+            if alert.closed is None:
+                self._alerts.add(1, {"kind": alert.kind})
+        for report in step.reports:
+            who = {"behaviour": report.behaviour}
+            if report.state is ReportState.RAN:
+                self._duration.record(report.elapsed_ms, who)
+            self._failures.add(int(report.state is ReportState.FAILED), who)
+
+    def _trace(self, step: Step) -> None:
+        from opentelemetry import trace
+
+        end = time.time_ns()
+        took = sum(int(r.elapsed_ms * 1e6) for r in step.reports)
+        facts: Mapping[str, Any] = {"frame_index": step.frame_index, "time": step.time}
+        whole = self._tracer.start_span("step", start_time=end - took, attributes=facts)
+        for event in step.events:
+            whole.add_event(event.kind, {"text": event.text}, timestamp=end)
+        inside = trace.set_span_in_context(whole)
+        at = end - took
+        for report in step.reports:
+            if report.state is ReportState.RESTED:
+                continue
+            span = self._tracer.start_span(
+                report.behaviour,
+                inside,
+                start_time=at,
+                attributes={"state": report.state.value, "percepts": len(report.percepts)},
+            )
+            at += int(report.elapsed_ms * 1e6)
+            span.end(at)
+        whole.end(end)
+
+
+def _providers(place: str) -> tuple[Any, Any]:
+    try:
+        from opentelemetry.sdk.metrics import MeterProvider
+        from opentelemetry.sdk.metrics.export import PeriodicExportingMetricReader
+        from opentelemetry.sdk.trace import TracerProvider
+        from opentelemetry.sdk.trace.export import BatchSpanProcessor
+
+        spans, metrics = _exporters(place)
+    except ModuleNotFoundError as missing:
+        raise ExtraMissingError("a sink for OpenTelemetry", "otel") from missing
+    traces = TracerProvider()
+    traces.add_span_processor(BatchSpanProcessor(spans))
+    return traces, MeterProvider([PeriodicExportingMetricReader(metrics)])
+
+
+def _exporters(place: str) -> tuple[Any, Any]:
+    if place == "console":
+        import sys
+
+        from opentelemetry.sdk.metrics.export import ConsoleMetricExporter
+        from opentelemetry.sdk.trace.export import ConsoleSpanExporter
+
+        return ConsoleSpanExporter(out=sys.stderr), ConsoleMetricExporter(out=sys.stderr)
+    from opentelemetry.exporter.otlp.proto.http.metric_exporter import OTLPMetricExporter
+    from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
+
+    return OTLPSpanExporter(), OTLPMetricExporter()

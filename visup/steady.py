@@ -1,0 +1,48 @@
+"""Time only goes on: what reasons relies on it, whatever a source's clock does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+from visup.agent import Concern, Frame, Severity
+
+NAME = "clock"
+
+
+class Steady:
+    """Frames whose times always grow; those that do not are put one frame after the one before.
+
+    Args:
+        frames: A source, or frames of any other origin.
+        fps: Its frame rate.
+        after: Time of the frame before the first one, seconds; None when there was none.
+    """
+
+    def __init__(self, frames: Iterable[Frame], fps: float, after: float | None = None) -> None:
+        self._frames = iter(frames)
+        self._pause = 1.0 / fps
+        self._last = after
+        self._shift = 0.0
+        self._said: str | None = None
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self
+
+    def __next__(self) -> Frame:
+        frame = next(self._frames)
+        time = frame.time + self._shift
+        if not math.isfinite(time) or (self._last is not None and time <= self._last):
+            begin = 0.0 if self._last is None else self._last + self._pause
+            self._said = f"The clock of the source jumped from {self._last} s to {time} s."
+            # A clock that was set stays so: later frames keep their distance to this one.
+            self._shift += begin - time if math.isfinite(time) else 0.0
+            time = begin
+        self._last = time
+        return frame if time == frame.time else Frame(frame.index, time, frame.image)
+
+    def troubles(self) -> Iterable[Concern]:
+        """Once after a jump: that there was one."""
+        said, self._said = self._said, None
+        if said:
+            yield Concern("clock_jumped", (), Severity.WARNING, said, key=NAME, needs=())

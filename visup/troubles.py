@@ -1,0 +1,47 @@
+"""What goes wrong round the agent, as percepts: the journal, a sink, a source that dropped.
+
+What lies outside the cycle enters it here, so that it opens alerts like anything else, is recorded
+with the percepts, and comes out the same when the run is replayed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from visup.agent import Concern, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
+
+TROUBLE = "trouble"
+Teller = Callable[[], Iterable[Concern]]
+
+
+class Troubles:
+    """A behaviour that asks parts of the product for their troubles before each step."""
+
+    contract = Contract("troubles", gives=(TROUBLE,))
+
+    def __init__(self) -> None:
+        self._tellers: list[Teller] = []
+
+    def ask(self, teller: Teller) -> None:
+        """Ask also this one from now on."""
+        self._tellers.append(teller)
+
+    def save(self) -> Mapping[str, Any]:
+        """Nothing: each teller answers for now."""
+        return {}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Nothing is remembered."""
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """One percept of kind 'trouble' for each trouble that holds now."""
+        now = [concern for teller in self._tellers for concern in teller()]
+        return [Percept(TROUBLE, c, frame.time, self.contract.name) for c in now]
+
+
+def tell_troubles(mind: Mind, seen: Observation) -> Outcome:
+    """The thinker to it: every trouble is a concern."""
+    return Outcome(mind, concerns=seen.of(TROUBLE))
