@@ -22,11 +22,14 @@ class DepthSettings:
         tau_s: Time constant of smoothing.
         fade_s: Depth not renewed for this long is unknown.
         least_visible: An object of which less shows is not measured, its area being too small.
+        clear: Weight of the best identity among all, each by its votes squared, from which it tells
+            a depth.
     """
 
     tau_s: float = 0.5
     fade_s: float = 1.5
     least_visible: float = 0.8
+    clear: float = 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +46,8 @@ class Kept:
 class BelieveDepth:
     """Thinker of the cogitate phase, after the votes: the depth of each object.
 
-    Depths under another identity are left out, as are those of objects hidden in part.
+    Depths under another identity are left out, as are those of objects hidden in part. While other
+    identities are nearly as likely the depth is unknown: it hangs on the size of the model.
     """
 
     settings: DepthSettings = field(default_factory=DepthSettings)
@@ -57,9 +61,12 @@ class BelieveDepth:
         beliefs: list[ObjectBelief] = []
         for i, belief in mind.objects.items():
             new = told.get((i, belief.name))
-            if visible_share(mind, i) < self.settings.least_visible:
+            before = old.get(i)
+            if not self._clear(belief):
+                new = before = None
+            elif visible_share(mind, i) < self.settings.least_visible:
                 new = None
-            now = self._smooth(old.get(i), new, belief.name, observation.time)
+            now = self._smooth(before, new, belief.name, observation.time)
             if now is not None:
                 kept[i] = now
             depth, sigma = (now.depth, now.sigma) if now else (None, None)
@@ -67,6 +74,10 @@ class BelieveDepth:
                 beliefs.append(replace(belief, depth=depth, depth_sigma=sigma))
         mind = mind.with_objects(*beliefs) if beliefs else mind
         return Outcome(mind.remember(DEPTHS, MappingProxyType(kept)))
+
+    def _clear(self, belief: ObjectBelief) -> bool:
+        weights = [c.share**2 for c in belief.candidates]
+        return bool(weights) and weights[0] >= self.settings.clear * sum(weights)
 
     def _smooth(self, old: Kept | None, new: Depth | None, name: str, now: float) -> Kept | None:
         if old is not None and (old.name != name or now - old.time > self.settings.fade_s):

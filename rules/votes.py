@@ -8,7 +8,9 @@ For each object o and each model name n, in each step of length dt:
 where s is the best similarity with which any view of n was hypothesised for o's region in this
 step (nothing at or below 0.4 counts; section 7.3), k the place of n among the names of this step
 (0 for the best), p(o, n) how well its views hang together over time (`pose_support`), and visible(o)
-the share of o that is in sight. Hypotheses that follow each other fast are of the same picture:
+the share of o that is in sight. What a task expects to see, and no other object is believed to be,
+counts as a little more similar: it was more likely before anybody looked. Hypotheses that follow
+each other fast are of the same picture:
 `new` is the time since the last ones, as a share of `apart_s`, at most 1. The three principles:
 
 1. recurrent and temporally stable hypotheses are more likely: votes add up over steps;
@@ -27,7 +29,7 @@ the operator answers is no evidence but a fact, and settles the vote.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from math import exp
 from types import MappingProxyType
@@ -66,6 +68,8 @@ class VoteSettings:
         least_share: Names with a smaller share of the votes are dropped.
         known_votes: Votes that the best name needs for the object to be known at all.
         stranger: Similarity that an object has to some model even when it is none of them.
+        awaited: How much more similar a model counts that an actor of a task stands for, while no
+            other object is believed to be it.
         apart_s: Hypotheses this far apart in time are of different pictures.
         evidence: How much a vote tells, in units of log likelihood.
         settle: Likelihood at which a name is told.
@@ -81,6 +85,7 @@ class VoteSettings:
     least_share: float = 0.03
     known_votes: float = 0.3
     stranger: float = 0.5
+    awaited: float = 0.06
     apart_s: float = 0.2
     evidence: float = 2.2
     settle: float = 0.7
@@ -121,12 +126,17 @@ class Ballots:
     of: Mapping[int, Ballot] = field(default_factory=lambda: MappingProxyType({}))
 
 
-def weights(hypotheses: tuple[Hypothesis, ...], settings: VoteSettings) -> dict[str, float]:
+def weights(
+    hypotheses: tuple[Hypothesis, ...],
+    settings: VoteSettings,
+    awaited: Collection[str] = (),
+) -> dict[str, float]:
     """Weights of the names hypothesised for one region in one step.
 
     Args:
         hypotheses: All of them, in any order.
         settings: Threshold and rank discount.
+        awaited: Models that are expected and not yet found.
 
     Returns:
         Name -> weight, 0 to 1, best first.
@@ -134,9 +144,21 @@ def weights(hypotheses: tuple[Hypothesis, ...], settings: VoteSettings) -> dict[
     best: dict[str, float] = {}
     for h in hypotheses:
         if h.similarity > settings.least_similarity:
-            best[h.name] = max(best.get(h.name, 0.0), h.similarity)
+            similarity = min(1.0, h.similarity + settings.awaited * (h.name in awaited))
+            best[h.name] = max(best.get(h.name, 0.0), similarity)
     ranked = sorted(best.items(), key=lambda item: (-item[1], item[0]))
     return {name: settings.rank**k * _worth(s, settings) for k, (name, s) in enumerate(ranked)}
+
+
+def awaited(mind: Mind, object_id: int) -> frozenset[str]:
+    """Models that actors of tasks stand for and that no other object in view is believed to be."""
+    wanted = {model for models in mind.actors.values() for model in models}
+    found = {
+        b.name
+        for b in mind.objects.values()
+        if b.id != object_id and b.confirmed and b.presence is not Presence.LEFT
+    }
+    return frozenset(wanted - found)
 
 
 def _worth(similarity: float, settings: VoteSettings) -> float:
@@ -251,8 +273,9 @@ class Votes:
             tally = count(ballot.tally, {}, dt, tau, s.most_candidates)
             return replace(ballot, tally=tally, stranger=stranger)
         new = 1.0 if ballot.heard is None else min(1.0, (mind.time - ballot.heard) / s.apart_s)
+        heard = weights(said, s, awaited(mind, belief.id))
         # Views that do not hang together over time speak against a name (paper, figure 5).
-        likely = {n: w * pose_support(mind, belief.id, n) for n, w in weights(said, s).items()}
+        likely = {n: w * pose_support(mind, belief.id, n) for n, w in heard.items()}
         tally = count(ballot.tally, likely, dt, tau, s.most_candidates, new * visible)
         stranger += new * visible * _worth(s.stranger, s)
         return replace(ballot, tally=tally, stranger=stranger, heard=mind.time)
