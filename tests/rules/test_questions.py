@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ class Scripted:
 
     def perceive(self, frame: Frame, *_: object) -> list[Percept]:
         reports = self.at(frame.index).reports
-        return [p for r in reports for p in r.percepts if p.kind in self.contract.gives]
+        return [replace(p, source="script") for r in reports for p in r.percepts]
 
 
 def agent_of(at: Callable[[int], Observation]) -> Agent:
@@ -36,7 +37,7 @@ def agent_of(at: Callable[[int], Observation]) -> Agent:
     return Agent(
         behaviours=[Scripted(at)],
         thinkers=Thinkers(rules.update, rules.cogitate),
-        actors={"arm": ("rms_arm",)},
+        actors={"arm": ("rms_arm",), "guitar": ("guitar",)},
     )
 
 
@@ -45,7 +46,7 @@ def steps(agent: Agent, first: int, last: int) -> list[Step]:
 
 
 def both(i: int) -> list[tuple[str, float]]:
-    """Two names that take turns, neither better."""
+    """Two names that take turns, neither better, and both awaited."""
     return (
         [("rms_arm", 0.7), ("guitar", 0.69)] if i // 5 % 2 else [("guitar", 0.7), ("rms_arm", 0.69)]
     )
