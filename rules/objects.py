@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from visup.agent import (
+    Hypothesis,
     Mind,
     ObjectBelief,
     Observation,
@@ -50,6 +51,19 @@ def owners(mind: Mind) -> Mapping[int, int]:
     """Region id -> object id, for all regions that are remembered."""
     found: Mapping[int, int] = mind.memory.get(OWNERS, MappingProxyType({}))
     return found
+
+
+def hypotheses_by_object(
+    mind: Mind, observation: Observation
+) -> Mapping[int, tuple[Hypothesis, ...]]:
+    """Object id -> what was hypothesised of its region in this step; only objects of which something was."""
+    owner = owners(mind)
+    said: dict[int, tuple[Hypothesis, ...]] = {}
+    for h in observation.of("hypothesis"):
+        object_id = owner.get(h.region_id)
+        if object_id is not None:
+            said[object_id] = (*said.get(object_id, ()), h)
+    return said
 
 
 def give_region(mind: Mind, region_id: int, object_id: int) -> Mind:

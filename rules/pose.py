@@ -30,7 +30,7 @@ from visup.rules.interpretation import (
     planted,
     rival_gap,
 )
-from visup.rules.objects import owners
+from visup.rules.objects import hypotheses_by_object
 from visup.rules.presence import visible_share
 from visup.rules.spin import Rate, SpinSettings, measured_rate, spin_of
 from visup.rules.spin_fit import Turns
@@ -152,7 +152,7 @@ class BelievePose:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Take in one step's view hypotheses; see `Thinker`."""
-        said = _by_object(mind, observation)
+        said = hypotheses_by_object(mind, observation)
         known, kept, beliefs = tracks(mind), {}, []
         for object_id, belief in mind.objects.items():
             track = known.get(object_id, Track())
@@ -334,13 +334,3 @@ def _last(track: Track, name: str, tree: Tree) -> Floats:
         if number != NONE:
             return np.asarray(levels[name].between[number])
     return np.asarray(tree.orientation[tree.best])
-
-
-def _by_object(mind: Mind, observation: Observation) -> dict[int, list[Hypothesis]]:
-    owner = owners(mind)
-    said: dict[int, list[Hypothesis]] = {}
-    for h in observation.of("hypothesis"):
-        object_id = owner.get(h.region_id)
-        if object_id is not None:
-            said.setdefault(object_id, []).append(h)
-    return said

@@ -45,7 +45,7 @@ from visup.agent import (
     Presence,
 )
 from visup.agent.mind import UNKNOWN_OBJECT
-from visup.rules.objects import owners
+from visup.rules.objects import hypotheses_by_object
 from visup.rules.pose import pose_support
 from visup.rules.presence import visible_share
 from visup.rules.sentences import called, seems, spaced
@@ -236,7 +236,7 @@ class Votes:
         """Count one step; see `Thinker`."""
         old: Ballots = mind.memory.get(VOTES, Ballots(observation.time))
         dt = max(0.0, observation.time - old.time)
-        said = _by_object(mind, observation)
+        said = hypotheses_by_object(mind, observation)
         ballots: dict[int, Ballot] = {}
         events: list[Event] = []
         beliefs: list[ObjectBelief] = []
@@ -300,16 +300,6 @@ class Votes:
         settled = leader is not None and now - since >= s.settle_s - 1e-9
         told = leader if settled else ballot.told
         return replace(ballot, leader=leader, leads_since=since, told=told)
-
-
-def _by_object(mind: Mind, observation: Observation) -> dict[int, tuple[Hypothesis, ...]]:
-    owner = owners(mind)
-    said: dict[int, tuple[Hypothesis, ...]] = {}
-    for h in observation.of("hypothesis"):
-        object_id = owner.get(h.region_id)
-        if object_id is not None:
-            said[object_id] = (*said.get(object_id, ()), h)
-    return said
 
 
 def _identified(

@@ -119,16 +119,6 @@ class _Check:
         if whole:
             yield from AlikeCheck(self.parsed.task, self.source, self.grammar).faults()
 
-    def fault(
-        self,
-        code: str,
-        what: str,
-        span: Span,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> TaskFault:
-        return TaskFault(code, what, self.source.at(span), expected=expected, hint=hint)
-
     def misread(self, stage: Stage) -> str:
         """What a plain list of names was meant to be when it is no action, or empty."""
         if not isinstance(stage.body, Actors) or stage.name in self.actions:
@@ -155,15 +145,15 @@ class _Check:
                 case "action":
                     meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
                     what = f"the actors of `{names[0]}` stand without brackets"
-                    yield self.fault("E219", what, stage.body.span, meant)
+                    yield self.source.fault("E219", what, stage.body.span, meant)
                 case "infix":
                     what = f"`{names[1]}` stands between its actors"
                     meant = f"`{names[1]}({names[0]}, {names[2]})`"
-                    yield self.fault("E219", what, stage.body.span, meant)
+                    yield self.source.fault("E219", what, stage.body.span, meant)
                 case "stages":
                     meant = f"`{' '.join(f'<{n}>' for n in names)}`"
                     what = "stages are referred to without angle brackets"
-                    yield self.fault("E220", what, stage.body.span, meant)
+                    yield self.source.fault("E220", what, stage.body.span, meant)
 
     def reserved(self) -> Iterator[TaskFault]:
         task = self.parsed.task
@@ -172,7 +162,7 @@ class _Check:
         for name in named:
             if str(name) in WORDS:
                 what = f"`{name}` is a word of the language"
-                yield self.fault("E123", what, name.span, "another name")
+                yield self.source.fault("E123", what, name.span, "another name")
 
     def unknown_actions(self) -> Iterator[TaskFault]:
         told = set()
@@ -188,7 +178,7 @@ class _Check:
             what = f"unknown action `{name}`"
             if self.is_head(span):
                 what = f"`<{name}>` is given actors, but `{name}` is no action"
-            yield self.fault("E201", what, at, shown, hint)
+            yield self.source.fault("E201", what, at, shown, hint)
 
     def is_head(self, span: Span) -> bool:
         return id(span) in self.heads
@@ -203,10 +193,10 @@ class _Check:
                 expected = _count(meaning.arity, "actor")
                 if "zone" in meaning.kinds:
                     expected = "an actor and a zone"
-                yield self.fault("E205", what, span, expected)
+                yield self.source.fault("E205", what, span, expected)
             elif len({str(a) for a in actors}) < len(actors):
                 what = f"`{name}` between `{actors[0]}` and itself"
-                yield self.fault("E211", what, span, "different actors")
+                yield self.source.fault("E211", what, span, "different actors")
 
     @cached_property
     def undefined(self) -> dict[str, Reference]:
@@ -226,14 +216,14 @@ class _Check:
         for name, reference in self.undefined.items():
             if name in heads:
                 what = f"`::=` is missing after `<{name}>`"
-                yield self.fault("E102", what, heads[name].span, f"`<{name}> ::= ...`")
+                yield self.source.fault("E102", what, heads[name].span, f"`<{name}> ::= ...`")
                 continue
             expected = f"a rule `<{name}> ::= ...`"
             if name in self.actions:
                 expected = f"a rule `<{name}> ::= arm satellite`, or `{name}(arm, satellite)`"
             hint = did_you_mean(name, defined, "`<{}>`")
             what = f"stage `<{name}>` is not defined"
-            yield self.fault("E202", what, reference.span, expected, hint)
+            yield self.source.fault("E202", what, reference.span, expected, hint)
 
     def headless(self) -> dict[str, Reference]:
         """Undefined stages at the beginning of a line, where a rule without `::=` would stand."""
@@ -252,14 +242,14 @@ class _Check:
             if stage.name in first:
                 what = f"stage `<{stage.name}>` is defined twice"
                 hint = f"it is also defined in {_line(first[stage.name])}; join both with `|`"
-                yield self.fault("E203", what, stage.span, "one rule for each stage", hint)
+                yield self.source.fault("E203", what, stage.span, "one rule for each stage", hint)
             first.setdefault(stage.name, stage.span)
         declared: dict[str, Span] = {}
         for actor in self.parsed.task.actors:
             if actor.name in declared:
                 what = f"actor `{actor.name}` is declared twice"
                 hint = f"it is also declared in {_line(declared[actor.name])}"
-                yield self.fault("E212", what, actor.span, "`or` between its models", hint)
+                yield self.source.fault("E212", what, actor.span, "`or` between its models", hint)
             declared.setdefault(actor.name, actor.span)
 
     def unreached(self) -> Iterator[TaskFault]:
@@ -279,7 +269,7 @@ class _Check:
                 if len(roots) > 1:
                     what = f"no task of the file comes to stage `<{stage.name}>`"
                 hint = "refer to it from another stage, or take it out; the first rule is the task"
-                yield self.fault("E204", what, stage.span, hint=hint)
+                yield self.source.fault("E204", what, stage.span, hint=hint)
 
     def slips(self) -> Iterator[TaskFault]:
         """Actors that are named once and look like another that is declared or named more often."""
@@ -297,7 +287,9 @@ class _Check:
                 meant = next((o for o in sure if _slip(name, o)), None)
                 if meant is not None:
                     what = f"actor `{name}` is named only here"
-                    yield self.fault("E214", what, actor.span, hint=f"did you mean `{meant}`?")
+                    yield self.source.fault(
+                        "E214", what, actor.span, hint=f"did you mean `{meant}`?"
+                    )
 
     def idle_actors(self) -> Iterator[TaskFault]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
@@ -307,7 +299,7 @@ class _Check:
             if not any(_slip(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
                 hint = did_you_mean(actor.name, named)
-                yield self.fault("E213", what, actor.span, "an action with this actor", hint)
+                yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
 
 
 def _line(span: Span) -> str:

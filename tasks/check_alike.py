@@ -82,7 +82,7 @@ class AlikeCheck:
 
     def fault(self, what: str, span: Span, hint: str) -> TaskFault:
         """A fault at the place of a course."""
-        return TaskFault("E230", what, self.source.at(span), hint=hint)
+        return self.source.fault("E230", what, span, hint=hint)
 
     def bare(self, course: Course) -> Fact | None:
         """What a course asks for when that is one action without `for` and signs, or None."""

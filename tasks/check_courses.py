@@ -24,7 +24,6 @@ from visup.tasks.tree import (
     Judged,
     Reference,
     Repeated,
-    Span,
     Task,
     Timed,
     Together,
@@ -69,30 +68,23 @@ class CourseCheck:
         yield from self.invariants()
         yield from self.repetitions()
 
-    def fault(
-        self,
-        code: str,
-        what: str,
-        span: Span,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> TaskFault:
-        """A fault at the place of a node."""
-        return TaskFault(code, what, self.source.at(span), expected=expected, hint=hint)
-
     def endless(self) -> Iterator[TaskFault]:
         """Stages that never begin or never end."""
         begins = self.grammar.begin_with_themselves()
         for stage in begins:
             what = f"stage `<{stage.name}>` begins with itself and so never begins"
             hint = f"let something come first, such as `<try> | <try> <{stage.name}>`"
-            yield self.fault("E206", what, stage.span, "an action before it comes again", hint)
+            yield self.source.fault(
+                "E206", what, stage.span, "an action before it comes again", hint
+            )
         if begins or not self.whole:
             return
         for stage in self.grammar.never_end():
             what = f"stage `<{stage.name}>` can never end"
             hint = f"offer a way out, such as `( ... <{stage.name}> )?` or `| ...`"
-            yield self.fault("E207", what, stage.span, "a course without the stage itself", hint)
+            yield self.source.fault(
+                "E207", what, stage.span, "a course without the stage itself", hint
+            )
 
     def clauses(self) -> Iterator[TaskFault]:
         """Clauses said twice, that contradict each other, or that hold nothing."""
@@ -104,17 +96,19 @@ class CourseCheck:
             for word, clauses in (("for", holds), ("within", deadlines)):
                 if len(clauses) > 1:
                     span = clauses[1].span
-                    yield self.fault("E208", f"`{word}` is said twice", span, f"one `{word}`")
+                    yield self.source.fault(
+                        "E208", f"`{word}` is said twice", span, f"one `{word}`"
+                    )
             least = self.grammar.least_time(course)
             for deadline in deadlines[:1]:
                 if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
                     what = f"what takes at least {least:g} s cannot be over {deadline}"
-                    yield self.fault("E208", what, deadline.span, "a longer `within`")
+                    yield self.source.fault("E208", what, deadline.span, "a longer `within`")
             if holds and self.grammar.follows_on(course.item):
                 what = f"`{holds[0]}` stands behind things that follow one another"
                 hint = "put `for` behind the one that must hold"
                 expected = "one action, or several at the same time"
-                yield self.fault("E216", what, holds[0].span, expected, hint)
+                yield self.source.fault("E216", what, holds[0].span, expected, hint)
 
     def together(self) -> Iterator[TaskFault]:
         """Actions that can never hold at the same time."""
@@ -126,7 +120,7 @@ class CourseCheck:
                 for b in parts[i + 1 :]:
                     if a and b and self.excluding(a, b):
                         what = f"`{a}` and `{b}` can never hold at the same time"
-                        yield self.fault("E209", what, course.span, hint="in turn is `a b`")
+                        yield self.source.fault("E209", what, course.span, hint="in turn is `a b`")
 
     def excluding(self, a: Fact, b: Fact) -> bool:
         """Whether two facts can never hold at the same time."""
@@ -149,7 +143,7 @@ class CourseCheck:
                 if stage in meant and self.breaks(invariant, fact):
                     what = f"`{invariant}`, but stage `<{stage}>` asks for `{fact}`"
                     hint = "say for which stage it is meant with `during <stage>`"
-                    yield self.fault("E210", what, invariant.span, hint=hint)
+                    yield self.source.fault("E210", what, invariant.span, hint=hint)
                     break
 
     def meant(self, during: tuple[Reference, ...]) -> AnySet[str]:
@@ -178,28 +172,32 @@ class CourseCheck:
                 if sign.kind in told:
                     what = f"`{sign.kind} when` is said twice"
                     hint = "join the conditions with `or` or `and`"
-                    yield self.fault("E235", what, sign.span, f"one `{sign.kind} when`", hint)
+                    yield self.source.fault(
+                        "E235", what, sign.span, f"one `{sign.kind} when`", hint
+                    )
                 told.add(sign.kind)
                 if sign.kind in ("begins", "ends") and self.grammar.follows_on(course.item):
                     what = f"`{sign.kind} when` stands behind things that follow one another"
                     hint = f"put it behind the one that {sign.kind} so"
                     expected = "one action, or several at the same time"
-                    yield self.fault("E232", what, sign.span, expected, hint)
+                    yield self.source.fault("E232", what, sign.span, expected, hint)
 
     def counts(self) -> Iterator[TaskFault]:
         """Numbers of times that contradict each other, and orders that are too many."""
         for course in self.courses:
             if isinstance(course, Counted) and course.most is not None:
                 if course.most == 0:
-                    yield self.fault("E233", "`at most 0 times` asks for nothing", course.span)
+                    yield self.source.fault(
+                        "E233", "`at most 0 times` asks for nothing", course.span
+                    )
                 elif course.most < course.least:
                     what = f"at least {course.least} and at most {course.most} times is never"
-                    yield self.fault("E233", what, course.span, "a greater `at most`")
+                    yield self.source.fault("E233", what, course.span, "a greater `at most`")
             if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
                 what = f"{len(course.items)} things in any order have too many orders to follow"
                 hint = "put those together that follow one another"
                 expected = f"at most {MOST_IN_ANY_ORDER}"
-                yield self.fault("E234", what, course.span, expected, hint)
+                yield self.source.fault("E234", what, course.span, expected, hint)
 
     def repetitions(self) -> Iterator[TaskFault]:
         """Repetitions of what may be left out."""
@@ -210,4 +208,4 @@ class CourseCheck:
             if self.grammar.may_be_left_out(course.item):
                 what = f"`{mark}` repeats what may be left out, so it has no end"
                 hint = "leave the `?` or `*` inside away"
-                yield self.fault("E215", what, course.span, hint=hint)
+                yield self.source.fault("E215", what, course.span, hint=hint)

@@ -66,17 +66,6 @@ class WordCheck:
         yield from self.unused()
         yield from self.unobserved()
 
-    def fault(
-        self,
-        code: str,
-        what: str,
-        span: Span,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> TaskFault:
-        """A fault at the place of a node."""
-        return TaskFault(code, what, self.source.at(span), expected=expected, hint=hint)
-
     def used(self) -> Iterator[tuple[Amount, str]]:
         """Every amount that is used, with what it should measure; empty when nobody knows."""
         for course in self.courses:
@@ -96,7 +85,7 @@ class WordCheck:
             if parameter.amount.parameter:
                 what = f"parameter `{parameter.name}` is not given a number"
                 expected = "a number and a unit, such as `90 s`"
-                yield self.fault("E132", what, parameter.amount.span, expected)
+                yield self.source.fault("E132", what, parameter.amount.span, expected)
             else:
                 yield from self.amount(parameter.amount, "")
         known = {p.name: p.amount for p in self.task.parameters}
@@ -108,7 +97,7 @@ class WordCheck:
                     hint = did_you_mean(amount.parameter, known) if len(known) < MANY else None
                     what = f"parameter `{amount.parameter}` is not declared"
                     expected = f"`parameter {amount.parameter} is 90 s`"
-                    yield self.fault("E223", what, amount.span, expected, hint)
+                    yield self.source.fault("E223", what, amount.span, expected, hint)
             else:
                 yield from self.of_kind(known[amount.parameter], wanted, amount)
 
@@ -121,13 +110,15 @@ class WordCheck:
                 hint = "did you mean `min`?"
             what = f"`{amount.unit}` is not a unit{' of time' if wanted == TIME else ''}"
             expected = units_of(wanted) if wanted in _MEASURED else ", ".join(UNITS)
-            yield self.fault("E218", what, amount.span, expected, hint)
+            yield self.source.fault("E218", what, amount.span, expected, hint)
         elif isinf(amount.number):
-            yield self.fault("E217", "the number is too large", amount.span, "a smaller number")
+            yield self.source.fault(
+                "E217", "the number is too large", amount.span, "a smaller number"
+            )
         elif amount.number <= 0 and wanted == TIME:
-            yield self.fault("E217", f"`{amount}` is no time at all", amount.span)
+            yield self.source.fault("E217", f"`{amount}` is no time at all", amount.span)
         elif amount.number <= 0 and wanted == SIZE:
-            yield self.fault("E217", f"`{amount}` is no size at all", amount.span)
+            yield self.source.fault("E217", f"`{amount}` is no size at all", amount.span)
         else:
             yield from self.of_kind(amount, wanted, amount)
 
@@ -139,7 +130,7 @@ class WordCheck:
             if used.parameter:
                 what = f"parameter `{used}` is `{amount}`, which is no {WORDS.get(wanted, wanted)}"
             hint = "did you mean `min`?" if (wanted, amount.unit) == (TIME, "m") else None
-            yield self.fault("E226", what, used.span, units_of(wanted), hint)
+            yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
 
     def compared(self) -> Iterator[TaskFault]:
         """Quantities that are not compared, comparisons of what is none."""
@@ -150,11 +141,11 @@ class WordCheck:
                 continue
             if meaning.measures and id(span) not in compared:
                 what = f"`{name}` is a quantity and is not compared with anything"
-                yield self.fault("E227", what, span, f"such as `{written(meaning)}`")
+                yield self.source.fault("E227", what, span, f"such as `{written(meaning)}`")
             elif not meaning.measures and id(span) in compared:
                 what = f"`{name}` is no quantity, so it cannot be compared"
                 some = sorted(m.name for m in self.actions.values() if m.measures)
-                yield self.fault("E228", what, span, f"a quantity: {', '.join(some)}")
+                yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
     def kinds(self) -> Iterator[TaskFault]:
         """Zones where actors belong, and the other way round."""
@@ -169,10 +160,10 @@ class WordCheck:
                 if kind == "zone" and not known:
                     what = f"`{name}` speaks of a zone, and `{said}` is none"
                     hint = did_you_mean(said, zones)
-                    yield self.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
+                    yield self.source.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
                 elif kind == "object" and said in zones:
                     what = f"`{said}` is a zone, and `{name}` speaks of an actor here"
-                    yield self.fault("E229", what, actor.span, "an actor")
+                    yield self.source.fault("E229", what, actor.span, "an actor")
 
     def declared(self) -> Iterator[TaskFault]:
         """Names declared twice; those of actors alone are told elsewhere."""
@@ -181,7 +172,7 @@ class WordCheck:
             for one in declared:
                 if one.name in first:
                     what = f"`{one.name}` is declared as {kind} and is {first[one.name]} already"
-                    yield self.fault("E224", what, one.span, "another name")
+                    yield self.source.fault("E224", what, one.span, "another name")
                 first.setdefault(one.name, kind)
 
     def unused(self) -> Iterator[TaskFault]:
@@ -194,7 +185,7 @@ class WordCheck:
             for one in declared:
                 if one.name not in named and not one.span.file:
                     what = f"{kind} `{one.name}` is declared but not used"
-                    yield self.fault("E225", what, one.span)
+                    yield self.source.fault("E225", what, one.span)
 
     def unobserved(self) -> Iterator[TaskFault]:
         """Actions that need percepts that will not be at hand, each told once."""
@@ -207,7 +198,7 @@ class WordCheck:
                 said = " and ".join(f"`{m}`" for m in missing)
                 what = f"`{name}` can never be observed: it needs {said}, which nothing will give"
                 hint = "switch the behaviour on that gives it, or ask for something else"
-                yield self.fault("E231", what, span, hint=hint)
+                yield self.source.fault("E231", what, span, hint=hint)
 
 
 MANY = 500  # so many names are not compared with one another

@@ -143,6 +143,17 @@ class Source:
         length = span.end_column - span.column if one_line else 10_000
         return self.place(span.line, span.column, length)
 
+    def fault(
+        self,
+        code: str,
+        what: str,
+        span: Span,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> TaskFault:
+        """A fault at the place of a node."""
+        return TaskFault(code, what, self.at(span), expected=expected, hint=hint)
+
     def _line(self, line: int) -> str:
         return self._lines[line - 1].rstrip("\r")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from visup.agent.errors import TaskError
 from visup.tasks.cleaning import clean
-from visup.tasks.faults import Source, TaskFault
+from visup.tasks.faults import Source
 from visup.tasks.read import moved
 from visup.tasks.syntax import Parsed, parse
 from visup.tasks.tree import Include, Task
@@ -74,8 +74,7 @@ class _Joiner:
     def fault(
         self, code: str, what: str, include: Include, expected: str | None, hint: str | None
     ) -> Parsed:
-        place = self.source.at(include.span)
-        return Parsed(Task(()), (TaskFault(code, what, place, expected=expected, hint=hint),))
+        return Parsed(Task(()), (self.source.fault(code, what, include.span, expected, hint),))
 
 
 def _joined(one: Parsed, other: Parsed) -> Parsed:
