@@ -89,7 +89,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
 
 
 def test_a_report_of_a_resumed_run_tells_the_whole(clip: WatchSettings, tmp_path: Path) -> None:
-    pytest.importorskip("plotly")
+    pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
     options = RunOptions(video=False, state_every_s=0.2)
     broken_run(clip, tmp_path / "run", 30, options)
     past = past_of(tmp_path / "run")

@@ -229,7 +229,7 @@ def broker(listening: socket.socket, got: list[tuple[str, bytes]]) -> None:
 
 
 def test_alerts_reach_an_mqtt_broker() -> None:
-    pytest.importorskip("paho.mqtt")
+    pytest.importorskip("paho.mqtt", reason="the extra visup[mqtt] is not installed")
     got: list[tuple[str, bytes]] = []
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=broker, args=(listening, got))
@@ -243,7 +243,7 @@ def test_alerts_reach_an_mqtt_broker() -> None:
 
 
 def test_steps_become_spans_and_figures() -> None:
-    pytest.importorskip("opentelemetry.sdk")
+    pytest.importorskip("opentelemetry.sdk", reason="the extra visup[otel] is not installed")
     from opentelemetry.sdk.metrics import MeterProvider
     from opentelemetry.sdk.metrics.export import InMemoryMetricReader
     from opentelemetry.sdk.trace import TracerProvider
@@ -270,7 +270,7 @@ def test_steps_become_spans_and_figures() -> None:
 
 
 def test_steps_are_written_for_rerun(tmp_path: Path) -> None:
-    pytest.importorskip("rerun")
+    pytest.importorskip("rerun", reason="the extra visup[rerun] is not installed")
     path = tmp_path / "run.rrd"
     sink = open_sink(f"rerun:{path}")
     sink.deliver((step(ALERT), FRAME))

@@ -66,6 +66,9 @@ def robustness(formula: Formula, history: Sequence[Sample]) -> Values:
 
     Returns:
         One interval for each sample, from what was known then.
+
+    Raises:
+        TypeError: The formula speaks of objects.
     """
     return _Oracle(history).formula(formula).values
 
@@ -111,7 +114,7 @@ class _Oracle:
                 return self.often(f)
             case Last(part=part, duration=age):
                 return self.last(self.formula(part), _micro(age))
-        raise NotImplementedError(f)
+        raise TypeError(f"the oracle knows signals, not objects: {f}")
 
     def each(self, value: Callable[[int], Interval]) -> Values:
         return [value(k) for k in range(len(self.times))]
@@ -271,7 +274,7 @@ class _Oracle:
                     (_number(v[0] - w[1], -inf) / span.base, _number(v[1] - w[0], inf) / span.base)
                     for v, w in zip(now, then, strict=True)
                 ]
-        raise NotImplementedError(t)
+        raise TypeError(f"the oracle knows signals, not objects: {t}")
 
 
 def _both(v: Interval, w: Interval) -> Interval:

@@ -80,7 +80,11 @@ def _declared(monitor: Any, formula: Formula, names: tuple[str, ...]) -> Any:
 
 
 def written(node: Formula | Term) -> str:
-    """A formula in rtamt's syntax, its windows counted in samples."""
+    """A formula in rtamt's syntax, its windows counted in samples.
+
+    Raises:
+        TypeError: rtamt has nothing like it.
+    """
     match node:
         case Number(value=value):
             return f"{value:g}"
@@ -107,7 +111,7 @@ def written(node: Formula | Term) -> str:
             return f"({written(left)} since{_counted(window)} {written(right)})"
         case Until(left=left, right=right, window=window):
             return f"({written(left)} until{_counted(window)} {written(right)})"
-    raise NotImplementedError(node)
+    raise TypeError(f"rtamt has nothing like {node}")
 
 
 def _counted(window: Window | None) -> str:
