@@ -10,10 +10,23 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import count
+from typing import TypeVar
 
-from visup.tasks.course import Move, State, Step, begin, enter, form, leaves, moves, with_leaves
+from visup.tasks.course import (
+    Leaf,
+    Move,
+    State,
+    Step,
+    begin,
+    enter,
+    form,
+    leaves,
+    moves,
+    with_leaves,
+)
 from visup.tasks.tree import Task
 
+W = TypeVar("W")
 END = -1
 """In place of a node: the course is over."""
 NEW = -1
@@ -69,9 +82,13 @@ class Automaton:
             self._ways[node] = self._worked_out(node)
         return self._ways[node]
 
-    def node(self, state: State[object]) -> int | None:
-        """The number of a state that has been come to, or None."""
-        return self._numbers.get(form(state))
+    def node(self, state: State[W]) -> int:
+        """The number of a state, whatever is kept about its steps."""
+        return self._number(with_leaves(state, (Leaf(x.step, NEW) for x in leaves(state))))
+
+    def state(self, node: int) -> State[int]:
+        """The state of a node; about each step its position is kept."""
+        return self._states[node]
 
     def explored(self, most: int) -> list[int]:
         """The first nodes, breadth first from the start."""

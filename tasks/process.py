@@ -70,6 +70,12 @@ class Process:
         spurious: Probability that something is seen that is not so.
         phases: Number of phases in which a step goes on whose course says `for`; each takes an
             equal part of that time on average.
+        unseen: Probability that the course goes on without the beginning of the next step being
+            seen, although that is seen to come nearer.
+        pass_over: Probability that a step is left that was not seen through; its square where the
+            step was seen not to happen.
+        look_s: What is seen of one thing in neighbouring frames is seen wrongly together: it counts
+            as one look in so many seconds.
     """
 
     begin: float = 1.0
@@ -81,6 +87,9 @@ class Process:
     missing: float = 0.1
     spurious: float = 0.1
     phases: int = 3
+    unseen: float = 0.15
+    pass_over: float = 5e-4
+    look_s: float = 0.4
 
     def count(self, step: Step) -> int:
         """Number of phases in which a step goes on."""
@@ -145,6 +154,21 @@ class Process:
         of, idle = self.chances[kind][seen], self.chances[Kind.WAITING][seen]
         return (confidence * of + blur) / (confidence * idle + blur)
 
+    def fit(self, seen: Seen, confidence: float, dt: float) -> float:
+        """How well something seen for `dt` seconds fits a step that should go on; 1 at best.
+
+        The likelihood of what is seen against that of seeing it hold, one look in `look_s`. Where
+        nothing is seen it fits as well as looks at what is going on do on average, so that a course
+        of which nothing can be seen is not held against one that is seen to go on.
+        """
+        blur, going = (1.0 - confidence) / 3, self.chances[Kind.GOING]
+        whole = confidence * going[Seen.HOLDS] + blur
+        if seen is Seen.UNKNOWN:
+            ratio = sum(p * p for p in going) / going[Seen.HOLDS]
+        else:
+            ratio = (confidence * going[seen] + blur) / whole
+        return float(ratio ** (dt / self.look_s))
+
     def fate(self, step: Step, phase: int) -> float:
         """Probability that a step in a phase is left at all, and not lost before."""
         return self._fates(step.hold_s)[phase]
@@ -187,3 +211,6 @@ def within(
 
 
 DEFAULT_PROCESS = Process()
+
+SUPERVISED = Process(begin=0.1, missing=0.37, spurious=0.075)
+"""Of relations in the mind, which are true for a while, then neither for a while, and then again."""
