@@ -15,6 +15,7 @@ from visup.agent import Frame, Mind, ObjectBelief, Relation, RelationTable
 from visup.agent.agent import Agent, Step
 from visup.agent.errors import VisupError
 from visup.narrative import line
+from visup.tasks.sentences import prospects_text
 from visup.wording import worded_once
 
 Predicate = Callable[[Step], bool]
@@ -221,6 +222,7 @@ def _task_tree(mind: Mind, number: int) -> Tree:
     for b in task.bindings:
         who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
         tree.add(f"  {b.actor} is played by {who}")
+    tree.add(f"  {prospects_text(task)}")
     return tree
 
 
