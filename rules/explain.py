@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from visup.agent import Truth
+from visup.agent.changing import replace
 from visup.rules.formula import (
     And,
     Comparison,

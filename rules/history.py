@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Presence
+from visup.agent.changing import replace
 from visup.rules.geometry import FAN, Floats, hull_separation, reach
 from visup.rules.tracks import merged_pairs, tracks
 

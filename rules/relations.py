@@ -26,7 +26,7 @@ How to read them off a mind:
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from visup.agent import (
     RelationTable,
     Truth,
 )
+from visup.agent.changing import replace
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
+from visup.agent.changing import replace
 from visup.rules.explain import evidence
 from visup.rules.facts import RELATION_NAMES, Facts
 from visup.rules.formula import Predicate, Rule, calls
