@@ -14,7 +14,7 @@ from visup.rules.formula import Predicate, Rule, calls
 from visup.rules.operators import SPACING
 from visup.rules.sentences import sentence, with_names
 from visup.rules.units import ticks
-from visup.rules.verdicts import States, Values, rerowed, ruled
+from visup.rules.verdicts import Ruled, States, Values, rerowed, ruled
 
 SAFETY = "rules.safety"
 MOST_RETOLD = 3
@@ -71,6 +71,11 @@ class RuleThinker:
     """
 
     rules: tuple[Rule, ...]
+    _prepared: Ruled = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # Rules are long trees: to look up by them what was prepared costs as much as a rule.
+        object.__setattr__(self, "_prepared", ruled(self.rules))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
@@ -79,7 +84,7 @@ class RuleThinker:
             old = Kept(self.rules)
         if old.now is not None and now - old.now < SPACING:
             return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
-        prepared, facts = ruled(self.rules), Facts(mind)
+        prepared, facts = self._prepared, Facts(mind)
         before = prepared.program.fresh if old.now is None else old.after
         if old.now is not None and old.ids != facts.ids:
             before = rerowed(prepared, before, now, old.ids, facts.ids)

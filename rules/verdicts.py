@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import combinations
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.rules.bounds import variables_of
-from visup.rules.facts import Facts
+from visup.rules.facts import RELATION_NAMES, Facts
 from visup.rules.formula import Predicate, Rule
 from visup.rules.inputs import blind
 from visup.rules.intervals import Arrays, Box
@@ -24,6 +24,35 @@ from visup.rules.vocabulary import RULES, Quantity, Word
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
 """Intervals of what is false, unknown, true; by code + 1."""
 States = tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A fact that rules look up.
+
+    Attributes:
+        key: By which a step finds it.
+        codes: Of all objects.
+        axes: Axes of its objects.
+        name: Its word.
+    """
+
+    key: tuple[int, tuple[int, ...]]
+    codes: Callable[[Facts], Any]
+    axes: tuple[int, ...]
+    name: str
+
+
+def _asked(node: Predicate | Measure) -> Callable[[Facts], Any]:
+    """What a fact or quantity looks at, with those of its arguments that are no objects."""
+    fact = isinstance(node, Predicate)
+    word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
+    others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
+    return partial(_look, word.look, others) if others else word.look
+
+
+def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
+    return look(facts, *others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +73,18 @@ class Ruled:
     def program(self) -> Program:
         """All steps of all rules."""
         return self.compiler.program
+
+    @cached_property
+    def relations(self) -> tuple[str, ...]:
+        """Relations that the rules name."""
+        named = {n.name for n, _ in self.program.looks if n.name in RELATION_NAMES}
+        return tuple(sorted(named))
+
+    @cached_property
+    def facts(self) -> tuple[Fact, ...]:
+        """What the rules look up that is true, false or unknown."""
+        looks = ((node, axes) for node, axes in self.program.looks if isinstance(node, Predicate))
+        return tuple(Fact((id(node), axes), _asked(node), axes, node.name) for node, axes in looks)
 
 
 @lru_cache(maxsize=16)
@@ -76,23 +117,48 @@ class Values:
         self.facts = facts
         self.axes = prepared.compiler.algebra.axes
         self._same: dict[tuple[int, int], NDArray[np.bool_]] = {}
+        self._shapes: dict[tuple[int, ...], tuple[int, ...]] = {}
+        facts.relate(prepared.relations)
+        self._found = self._truths()
         moment = Moment(now, before, self._look, self._same_object)
         self._values: list[Box] = prepared.program.step(moment)
         self.after: States = tuple(moment.after)
 
+    def _truths(self) -> dict[tuple[int, tuple[int, ...]], Box]:
+        """All facts at once, since there are dozens of small ones."""
+        facts, wanted = self.facts, self.prepared.facts
+        if not wanted:
+            return {}
+        facts.relate(self.prepared.relations)
+        codes = [fact.codes(facts).ravel() for fact in wanted]
+        whole = TRUTHS.take(np.concatenate(codes) + 1, axis=1)
+        found, end = {}, 0
+        for fact, code in zip(wanted, codes, strict=True):
+            begin, end = end, end + len(code)
+            value = whole[:, begin:end]
+            if blind(facts.mind, fact.name):
+                value = _nothing_known(value)
+            found[fact.key] = self._laid(value, fact.axes)
+        return found
+
     def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:
         """A fact or quantity of all objects, laid along its axes."""
-        fact = isinstance(node, Predicate)
-        word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
-        others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
-        found: Any = word.look(self.facts, *others)
-        value: Box = TRUTHS[:, found + 1] if fact else found
-        if blind(self.facts.mind, node.name):
-            value = np.stack([np.full(value.shape[1:], -np.inf), np.full(value.shape[1:], np.inf)])
-        if len(axes) == 2 and axes[0] > axes[1]:
-            value = value.swapaxes(1, 2)
+        found = self._found.get((id(node), axes))
+        if found is not None:
+            return found
+        value: Box = _asked(node)(self.facts)
+        return self._laid(_nothing_known(value) if blind(self.facts.mind, node.name) else value, axes)
+
+    def _laid(self, value: Box, axes: tuple[int, ...]) -> Box:
+        """(2, ...) values of one or two objects along the axes of these."""
         n = len(self.facts.ids)
-        return value.reshape(2, *(n if axis in axes else 1 for axis in range(self.axes)))
+        if len(axes) == 2 and axes[0] > axes[1]:
+            value = value.reshape(2, n, n).swapaxes(1, 2)
+        shape = self._shapes.get(axes)
+        if shape is None:
+            shape = (2, *(n if axis in axes else 1 for axis in range(self.axes)))
+            self._shapes[axes] = shape
+        return value.reshape(shape)
 
     def _same_object(self, one: int, other: int) -> NDArray[np.bool_]:
         """Whether two axes stand for one object."""
@@ -127,6 +193,10 @@ class Values:
         shape = (len(ids),) * count + (1,) * (self.axes - count)
         for rows in np.argwhere(np.broadcast_to(holds, shape)):
             yield tuple(ids[row] for row in rows[:count])
+
+
+def _nothing_known(value: Box) -> Box:
+    return np.stack([np.full(value.shape[1:], -np.inf), np.full(value.shape[1:], np.inf)])
 
 
 def rerowed(
