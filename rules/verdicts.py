@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from itertools import combinations
 from typing import Any
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from visup.rules.bounds import variables_of
 from visup.rules.facts import RELATION_NAMES, Facts
-from visup.rules.formula import Predicate, Rule
+from visup.rules.formula import Formula, Predicate, Rule, calls, mark, named
 from visup.rules.inputs import blind
 from visup.rules.intervals import Arrays, Box
 from visup.rules.operators import Pick
 from visup.rules.program import Compiler, Moment, Place, Program, Scope
-from visup.rules.terms import Measure
+from visup.rules.terms import Measure, Term
 from visup.rules.vocabulary import RULES, Quantity, Word
 
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
@@ -68,11 +68,40 @@ class Ruled:
     rules: tuple[Rule, ...]
     compiler: Compiler
     places: tuple[tuple[Place, ...], ...]
+    _placed: dict[tuple[int, Scope], Place] = field(default_factory=dict, repr=False)
+    _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
+    _texts: dict[tuple[int, tuple[str, ...]], str] = field(default_factory=dict, repr=False)
 
     @property
     def program(self) -> Program:
         """All steps of all rules."""
         return self.compiler.program
+
+    def place(self, node: Formula | Term, scope: Scope) -> Place:
+        """Where the value of a part of these rules is found."""
+        key = (id(node), scope)
+        if key not in self._placed:
+            make = self.compiler.term if isinstance(node, Term) else self.compiler.formula
+            self._placed[key] = make(node, scope)  # type: ignore[operator]
+        return self._placed[key]
+
+    def related(self, rule: Rule) -> tuple[Predicate, ...]:
+        """The relations between its objects that the `when` of one of these rules names."""
+        if id(rule) not in self._related:
+            self._related[id(rule)] = tuple(
+                call
+                for call in calls(rule.when)
+                if isinstance(call, Predicate) and call.name in RELATION_NAMES
+                if set(call.words) <= set(rule.variables)
+            )
+        return self._related[id(rule)]
+
+    def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
+        """The source of a part of these rules, with marks where its variables stand."""
+        key = (id(node), variables)
+        if key not in self._texts:
+            self._texts[key] = str(named(node, {v: mark(v) for v in variables}))
+        return self._texts[key]
 
     @cached_property
     def relations(self) -> tuple[str, ...]:
@@ -81,10 +110,23 @@ class Ruled:
         return tuple(sorted(named))
 
     @cached_property
+    def verdicts(self) -> tuple[tuple[Rule, tuple[Place, ...], tuple[tuple[int, int], ...]], ...]:
+        """Each rule with its places, and the pairs of its variables that must not be one object."""
+        return tuple(
+            (rule, places, tuple(_apart(rule)))
+            for rule, places in zip(self.rules, self.places, strict=True)
+        )
+
+    @cached_property
     def facts(self) -> tuple[Fact, ...]:
         """What the rules look up that is true, false or unknown."""
         looks = ((node, axes) for node, axes in self.program.looks if isinstance(node, Predicate))
         return tuple(Fact((id(node), axes), _asked(node), axes, node.name) for node, axes in looks)
+
+
+def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
+    once = [i for i, v in enumerate(rule.variables) if v not in rule.may_repeat]
+    return combinations(once, 2)
 
 
 @lru_cache(maxsize=16)
@@ -147,7 +189,9 @@ class Values:
         if found is not None:
             return found
         value: Box = _asked(node)(self.facts)
-        return self._laid(_nothing_known(value) if blind(self.facts.mind, node.name) else value, axes)
+        return self._laid(
+            _nothing_known(value) if blind(self.facts.mind, node.name) else value, axes
+        )
 
     def _laid(self, value: Box, axes: tuple[int, ...]) -> Box:
         """(2, ...) values of one or two objects along the axes of these."""
@@ -176,23 +220,28 @@ class Values:
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
-        for rule, places in zip(self.prepared.rules, self.prepared.places, strict=True):
-            holds = self.at(places[0])[0] > 0
-            if len(places) > 1 and holds.any():
-                holds = holds & ~(self.at(places[1])[0] > 0)
-            if holds.any():
-                yield from ((rule, ids) for ids in self._choices(rule, holds))
+        values = self._values
+        for rule, places, apart in self.prepared.verdicts:
+            holds = values[places[0].step][0] > 0
+            if not holds.any():
+                continue
+            if len(places) > 1:
+                holds = holds & ~(values[places[1].step][0] > 0)
+            yield from ((rule, ids) for ids in self._choices(rule, holds, apart))
 
-    def _choices(self, rule: Rule, holds: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
+    def _choices(
+        self, rule: Rule, holds: NDArray[np.bool_], apart: tuple[tuple[int, int], ...]
+    ) -> Iterator[tuple[int, ...]]:
         count, ids = len(rule.variables), self.facts.ids
-        for i, j in combinations(range(count), 2):
-            if rule.variables[i] not in rule.may_repeat and (
-                rule.variables[j] not in rule.may_repeat
-            ):
-                holds = holds & ~self._same_object(i, j)
+        if not count:
+            yield ()
+            return
         shape = (len(ids),) * count + (1,) * (self.axes - count)
-        for rows in np.argwhere(np.broadcast_to(holds, shape)):
-            yield tuple(ids[row] for row in rows[:count])
+        if holds.shape != shape:
+            holds = np.broadcast_to(holds, shape)
+        for rows in zip(*(axis.tolist() for axis in holds.nonzero()[:count]), strict=True):
+            if all(rows[i] != rows[j] for i, j in apart):
+                yield tuple([ids[row] for row in rows])
 
 
 def _nothing_known(value: Box) -> Box:
