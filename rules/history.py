@@ -143,7 +143,7 @@ def extended(history: History, row: tuple[Any, ...]) -> History:
     count = len(history.times)
     end = history.start + count
     memory = [a.base for a in history.arrays]
-    # A row without a time belongs to nobody yet.
+    # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
     if any(m is None or len(m) <= end for m in memory) or not np.isnan(memory[0][end]):
         history = _with_room(history, max(ROOM, count))
         end = count
