@@ -48,6 +48,7 @@ def main() -> int:
             "tasks",
             "faults",
             "resume",
+            "pace",
             "soak",
         )
         if (given.only or "") in kind
