@@ -16,8 +16,10 @@ debugger), `diff.py`, `whatif.py`, `why.py`, `whynot.py`.
 
 from visup.stepping.diff import Change, MindDiff, difference
 from visup.stepping.feeds import Feed, Given, GivenFeed, LiveFeed, RecordedFeed
-from visup.stepping.stepper import Mark, Midway, Stepper, Stopped
-from visup.stepping.stops import Stop, stop_of
+from visup.stepping.places import Mark, Midway, Stopped
+from visup.stepping.stepper import Stepper
+from visup.stepping.stopping import stop_of
+from visup.stepping.stops import Stop
 from visup.stepping.watching import Breakpoint, Watch
 
 __all__ = [

@@ -4,85 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from visup.agent import Event, Frame, Mind, Observation, Outcome
+from visup.agent import Event, Frame, Mind
 from visup.agent.agent import Agent, Step, Thinkers
 from visup.agent.encode import event_line
 from visup.agent.errors import SettingsError
-from visup.agent.phases import Phase, Snapshot
+from visup.agent.phases import Phase
 from visup.agent.recording import Recording
 from visup.replay import Difference, Told, settings_for
 from visup.replay import difference as told_difference
 from visup.stepping import asking
+from visup.stepping.course import Course
 from visup.stepping.diff import MindDiff, difference
 from visup.stepping.evidence import Why
 from visup.stepping.feeds import Feed, LiveFeed, RecordedFeed
 from visup.stepping.history import LATEST, SPACING, History
-from visup.stepping.stops import PhaseStop, Predicate, Stop, stop_of
+from visup.stepping.places import Stopped
+from visup.stepping.stopping import stop_of
+from visup.stepping.stops import PhaseStop, Predicate, Stop
 from visup.stepping.watching import Breakpoint, Watch
 from visup.stepping.whatif import Belief, insisted, insisting, without_tasks
 from visup.stepping.why import Reasons
 from visup.supervisor import final_verdict, reasoning_agent
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Midway:
-    """A step that is stopped inside its cycle.
-
-    Attributes:
-        phase: The phase that is over.
-        seen: What was perceived.
-        thought: What was concluded so far; its mind is half-made. None after `perceive`.
-    """
-
-    phase: Phase
-    seen: Observation
-    thought: Outcome | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stopped:
-    """Where and why a run of steps ended.
-
-    Attributes:
-        taken: How many steps were completed.
-        steps: The latest of them, at most `LATEST`.
-        reasons: Which conditions were met; empty when the number of steps was made.
-        midway: The step inside which it stopped, or None.
-        ended: Whether there is nothing more to perceive.
-    """
-
-    taken: int
-    steps: tuple[Step, ...] = ()
-    reasons: tuple[str, ...] = ()
-    midway: Midway | None = None
-    ended: bool = False
-
-    @property
-    def step(self) -> Step | None:
-        """The last step that was completed."""
-        return self.steps[-1] if self.steps else None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mark:
-    """A place to go back to, from `Stepper.snapshot`.
-
-    Attributes:
-        number: How many steps led there.
-        was: What the agent was.
-        course: The history that it belongs to.
-    """
-
-    number: int
-    was: Snapshot
-    course: History = field(repr=False)
-
-
-class Stepper:
+class Stepper(Course):
     """Steps an agent forth and back, stops where it is told to, and looks into its mind.
 
     Args:
@@ -93,10 +42,8 @@ class Stepper:
         latest: How many steps are kept whole.
 
     Attributes:
-        agent: The agent; its mind is that of the place.
         breakpoints: By their number.
         watches: By their number.
-        parent: The course that this one branched off, or None.
     """
 
     def __init__(
@@ -107,19 +54,14 @@ class Stepper:
         spacing: int = SPACING,
         latest: int = LATEST,
     ) -> None:
-        self._begin(History(agent, spacing=spacing, latest=latest), None)
-        self._feed: Feed = frames if isinstance(frames, Feed) else LiveFeed(frames)
+        feed = frames if isinstance(frames, Feed) else LiveFeed(frames)
+        self._take(History(agent, spacing=spacing, latest=latest), feed)
 
-    def _begin(self, history: History, parent: Stepper | None) -> None:
-        self.agent = history.agent
-        self.parent = parent
+    def _take(self, history: History, source: Feed | Course) -> None:
+        super().__init__(history, source)
         self.breakpoints: dict[int, Breakpoint] = {}
         self.watches: dict[int, Watch] = {}
-        self._history = history
-        self._frame: Frame | None = None
-        self._midway: Midway | None = None
-        self._rest: Iterator[tuple[Phase, Outcome]] = iter(())
-        self._last: Step | None = None
+        self._ahead = False
 
     @classmethod
     def of_run(cls, run: Path | Recording, **changed: Any) -> Stepper:
@@ -135,41 +77,6 @@ class Stepper:
         recording = run if isinstance(run, Recording) else Recording.open(run)
         return cls(reasoning_agent(settings_for(recording, **changed)), RecordedFeed(recording))
 
-    # Where it is
-
-    @property
-    def mind(self) -> Mind:
-        """What is believed here; half-made when stopped inside a step."""
-        thought = self._midway.thought if self._midway else None
-        return self.agent.mind if thought is None else thought.mind
-
-    @property
-    def at(self) -> int:
-        """How many steps led here."""
-        return self._history.at
-
-    @property
-    def made(self) -> int:
-        """How many steps were ever made."""
-        return self._history.made
-
-    @property
-    def begin(self) -> int:
-        """How many steps there were before this course: 0 but for branches."""
-        return self._history.begin
-
-    @property
-    def midway(self) -> Midway | None:
-        """The step inside which it is stopped, or None."""
-        return self._midway
-
-    @property
-    def last(self) -> Step | None:
-        """The last completed step, or None where the course begins."""
-        return self._last
-
-    # Forth
-
     def step(
         self, n: int | None = None, until: str | Phase | Predicate | Stop | None = None
     ) -> Stopped:
@@ -178,7 +85,7 @@ class Stepper:
         Args:
             n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
                 inside which it is stopped counts when it is completed.
-            until: See `visup.stepping.stops.stop_of`.
+            until: See `visup.stepping.stopping.stop_of`.
 
         Returns:
             Where and why it ended.
@@ -205,69 +112,6 @@ class Stepper:
                 return Stopped(taken, tuple(done), reasons)
         return Stopped(taken, tuple(done))
 
-    def _cycle(self, phases: frozenset[Phase]) -> Step | None:
-        """On to the end of a step, or None: stopped inside it, or nothing more is perceived."""
-        before = self.agent.mind
-        if self._midway is None:
-            seen = self._perceived()
-            if seen is None:
-                return None
-            self._midway, self._rest = Midway(Phase.PERCEIVE, seen), self._history.phases(seen)
-            if Phase.PERCEIVE in phases:
-                return None
-        midway = self._midway
-        for phase, thought in self._rest:
-            self._midway = midway = Midway(phase, midway.seen, thought)
-            if phase in phases:
-                return None
-        assert midway.thought is not None
-        step = self._history.conclude(midway.seen, midway.thought)
-        self._arrive(step)
-        frame, self._frame = self._frame, None
-        for observer in self.agent.observers if frame is not None else ():
-            assert frame is not None
-            observer(step, frame)
-        for watch in self.watches.values():
-            watch.look(before, step.mind)
-        return step
-
-    def _perceived(self) -> Observation | None:
-        """What the next step begins with: from the tape, or new."""
-        tape, at = self._history.tape, self._history.at
-        if at < len(tape) or self._extend():
-            return tape.seen(at)
-        return None
-
-    def _extend(self) -> bool:
-        """Perceive once more; whether there was anything."""
-        history = self._history
-        if self.parent is not None:
-            there = self.parent._look_ahead()
-            said = self.parent._history.answers.get(history.at)
-            history.answers |= {history.at: said} if there and said else {}
-            return there
-        given = self._feed.next(self.agent)
-        if given is None:
-            return False
-        history.tape.add(given.seen)
-        if given.answers is not None:
-            history.answers[len(history.tape) - 1] = given.answers
-        self._frame = given.frame
-        return True
-
-    def _look_ahead(self) -> bool:
-        """One more step at the end of this course, for a branch; the place stays."""
-        paused = self._midway, self._rest, self._last
-        made = self.made
-        with self._history.elsewhere():
-            self._drop()
-            self._last = self._history.go(made)
-            self.watches, watches = {}, self.watches
-            self._cycle(frozenset())
-            self.watches = watches
-        self._midway, self._rest, self._last = paused
-        return self.made > made
-
     def _reasons(self, goal: Sequence[Stop], before: Mind, step: Step) -> tuple[str, ...]:
         """Why to stop after a step; every condition is asked, for some remember."""
         found = [s.met(before, step) for s in goal]
@@ -278,91 +122,25 @@ class Stepper:
         found += [w.changed(before, step) for w in self.watches.values()]
         return tuple(filter(None, found))
 
+    def _after(self, before: Mind, step: Step) -> None:
+        for watch in () if self._ahead else tuple(self.watches.values()):
+            watch.look(before, step.mind)
+
+    def _look_ahead(self) -> bool:
+        self._ahead = True
+        try:
+            return super()._look_ahead()
+        finally:
+            self._ahead = False
+
     def _look_again(self) -> None:
-        """Watches show what is so here."""
         for watch in self.watches.values() if self.mind.frame_index >= 0 else ():
             watch.look(self.mind, self.mind)
-
-    def _arrive(self, step: Step | None) -> None:
-        self._drop()
-        self._last = step
-
-    def _drop(self) -> None:
-        """Forget the half-made step, if there is one; what was perceived stays on the tape."""
-        self._midway, self._rest = None, iter(())
-
-    # Back
-
-    def back(self, n: int = 1) -> Step | None:
-        """Go back by some steps; a step inside which it is stopped is left, and counts as one.
-
-        Returns:
-            The step after which it is now, or None where the course begins.
-        """
-        return self.go(self.at - n + (self._midway is not None))
-
-    def go(self, number: int) -> Step | None:
-        """Be after step `number`; later ones are made if need be, and breakpoints are not looked at.
-
-        Raises:
-            SettingsError: There is no such step.
-        """
-        if number < self.begin:
-            raise SettingsError(
-                f"there is no step {number}", expected=f"at least {self.begin}, where this began"
-            )
-        self._arrive(self._history.go(min(number, self.made)))
-        while self.at < number:
-            if self._cycle(frozenset()) is None:
-                raise SettingsError(f"there is no step {number}", expected=f"at most {self.made}")
-        self._look_again()
-        return self._last
-
-    def snapshot(self) -> Mark:
-        """This place, to come back to with `restore`; a few references, no copy."""
-        return Mark(self.at, self._history.here, self._history)
-
-    def restore(self, mark: Mark) -> None:
-        """Be again where a snapshot was taken.
-
-        Raises:
-            SettingsError: It is of another course.
-        """
-        if mark.course is not self._history:
-            raise SettingsError(
-                "this snapshot is of another course", expected="one of this stepper"
-            )
-        self._arrive(self._history.step(mark.number) if mark.number > self.begin else None)
-        self._history.jump(mark.number, mark.was)
-        self._look_again()
-
-    def at_step(self, number: int) -> Step | None:
-        """A step that was made, without going there; None where the course begins.
-
-        Raises:
-            SettingsError: It was not made.
-        """
-        if not self.begin <= number <= self.made:
-            raise SettingsError(
-                f"there is no step {number}", expected=f"one from {self.begin} to {self.made}"
-            )
-        if number == self.at and self._last is not None:
-            return self._last
-        return self._history.step(number)
-
-    def mind_at(self, number: int) -> Mind:
-        """The mind after a step that was made."""
-        self.at_step(number)
-        return self._history.snapshot(number).mind
-
-    def told(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
-        """Number of the step and event, for all that was told so far, also after this place."""
-        return self._history.told(first, last)
 
     # Where to stop, what to watch
 
     def break_at(self, what: str | Phase | Predicate | Stop) -> Breakpoint:
-        """Set a breakpoint; see `visup.stepping.stops.stop_of`."""
+        """Set a breakpoint; see `visup.stepping.stopping.stop_of`."""
         made = Breakpoint(max(self.breakpoints, default=0) + 1, stop_of(what, self.mind))
         self.breakpoints[made.id] = made
         return made
@@ -423,7 +201,7 @@ class Stepper:
         Raises:
             SettingsError: Later steps were made, or nobody knows such an object or name.
         """
-        recorded = self.parent is None and isinstance(self._feed, RecordedFeed)
+        recorded = isinstance(self._feed, RecordedFeed)
         if recorded or self.at < self.made:
             what = (
                 "the operator of a recorded run has spoken"
@@ -459,7 +237,7 @@ class Stepper:
             history.latest,
         )
         made = object.__new__(Stepper)
-        made._begin(course, self)
+        made._take(course, self)
         made._last = self._last
         return made
 
@@ -475,8 +253,6 @@ class Stepper:
         parent = self.parent
         if parent is None:
             raise SettingsError("this is no branch: there is nothing to compare it with")
-        while parent.made < self.at and parent._look_ahead():
-            pass
         first, last = self.begin + 1, self.at
         return told_difference(
             _told(parent.told(first, last), parent.mind_at(last)),
@@ -489,10 +265,6 @@ class Stepper:
         return difference(self.mind_at(first), there)
 
     # Why
-
-    def seen_at(self, number: int) -> Observation:
-        """What was perceived in a step; numbers begin at 1, with what was seen before any branch."""
-        return self._history.tape.seen(number - 1)
 
     def why(self, what: object) -> Why:
         """Why something is so here: a tree of reasons, down to percepts and their frames.
