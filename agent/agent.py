@@ -25,6 +25,7 @@ from visup.agent.records import (
     Severity,
 )
 from visup.agent.running import worded
+from visup.agent.shown import showing
 from visup.agent.slot import Slot
 from visup.agent.state import Keeps
 from visup.agent.thinking import joined
@@ -80,6 +81,8 @@ class Step:
         """What each behaviour did."""
         return self.observation.reports
 
+
+showing(Step)
 
 Observer = Callable[[Step, Frame], None]
 """Told of each step after it is over: journal, console, report. It cannot change the agent."""

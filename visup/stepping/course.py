@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator
 
 from visup.agent import Event, Frame, Mind, Observation, Outcome
@@ -166,6 +167,19 @@ class Course:
                 raise SettingsError(f"there is no step {number}", expected=f"at most {self.made}")
         self._look_again()
         return self._last
+
+    def go_to_time(self, seconds: float) -> Step | None:
+        """Be after the first step that is not before a time; later ones are made if need be.
+
+        Raises:
+            SettingsError: The source ends before.
+        """
+        made = range(self.begin + 1, self.made + 1)
+        place = bisect_left(made, seconds, key=lambda n: self.seen_at(n).time)
+        step = self.go(made[place] if place < len(made) else self.made)
+        while self.mind.time < seconds or self.at == self.begin:
+            step = self.go(self.at + 1)
+        return step
 
     def snapshot(self) -> Mark:
         """This place, to come back to with `restore`; a few references, no copy."""

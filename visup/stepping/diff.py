@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.agent import Mind, ObjectBelief, Truth
+from visup.agent.shown import showing
 
 Key = tuple[str, str]
 
@@ -164,3 +165,6 @@ def _call(name: str, objects: tuple[int, ...]) -> str:
 
 def _short(text: str, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+showing(Change, MindDiff)

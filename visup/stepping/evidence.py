@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.agent import Depth, Hypothesis, Observation, Percept, Region
+from visup.agent.shown import showing
 from visup.rules.explain import Explanation
 
 
@@ -101,3 +102,6 @@ def worded(value: object) -> str:
             return f"that region {value.region_id} as {value.name} is {far} away"
     text = str(value)
     return text if len(text) <= 70 else f"{text[:67]}..."
+
+
+showing(Why)

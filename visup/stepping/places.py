@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from visup.agent import Observation, Outcome
 from visup.agent.agent import Step
 from visup.agent.phases import Phase, Snapshot
+from visup.agent.shown import showing
 from visup.stepping.history import History
 
 
@@ -62,3 +63,6 @@ class Mark:
     number: int
     was: Snapshot
     course: History = field(repr=False)
+
+
+showing(Midway, Stopped)

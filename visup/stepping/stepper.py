@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -78,7 +78,10 @@ class Stepper(Course):
         return cls(reasoning_agent(settings_for(recording, **changed)), RecordedFeed(recording))
 
     def step(
-        self, n: int | None = None, until: str | Phase | Predicate | Stop | None = None
+        self,
+        n: int | None = None,
+        until: str | Phase | Predicate | Stop | None = None,
+        tell: Callable[[Step], None] | None = None,
     ) -> Stopped:
         """Go on by some steps, or until something is so; breakpoints end it, too.
 
@@ -86,6 +89,7 @@ class Stepper(Course):
             n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
                 inside which it is stopped counts when it is completed.
             until: See `visup.stepping.stopping.stop_of`.
+            tell: Told of each step as it is completed.
 
         Returns:
             Where and why it ended.
@@ -107,6 +111,8 @@ class Stepper(Course):
                 why = (f"after {halted.phase.value}",) if halted else ()
                 return Stopped(taken, tuple(done), why, halted, halted is None)
             taken += 1
+            if tell:
+                tell(step)
             done = [*done[1 - self._history.latest :], step]
             if reasons := self._reasons(goal, before, step):
                 return Stopped(taken, tuple(done), reasons)
@@ -195,19 +201,21 @@ class Stepper(Course):
 
     # Aside
 
+    @property
+    def may_answer(self) -> bool:
+        """Whether the operator of this course can still speak: it is neither past nor recorded."""
+        return self.at == self.made and not isinstance(self._feed, RecordedFeed)
+
     def answer(self, object_id: int, name: str) -> None:
         """Say what an object is, as the operator of this run; where steps follow, branch first.
 
         Raises:
             SettingsError: Later steps were made, or nobody knows such an object or name.
         """
-        recorded = isinstance(self._feed, RecordedFeed)
-        if recorded or self.at < self.made:
-            what = (
-                "the operator of a recorded run has spoken"
-                if recorded
-                else ("later steps were made without this answer")
-            )
+        if not self.may_answer:
+            recorded = isinstance(self._feed, RecordedFeed)
+            other = "later steps were made without this answer"
+            what = "the operator of a recorded run has spoken" if recorded else other
             raise SettingsError(what, hint="branch, and answer there")
         self.agent.answer(object_id, name)
 
@@ -253,6 +261,8 @@ class Stepper(Course):
         parent = self.parent
         if parent is None:
             raise SettingsError("this is no branch: there is nothing to compare it with")
+        while parent.made < self.at and parent._look_ahead():
+            continue  # it was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at
         return told_difference(
             _told(parent.told(first, last), parent.mind_at(last)),
