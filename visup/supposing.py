@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
@@ -33,7 +34,7 @@ def supposed(
     Raises:
         SettingsError: They tell none.
     """
-    said = [w.strip("(),") for w in words if w != "relation"]
+    said = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
     if not said:
         raise SettingsError("nothing is supposed", expected=_EXPECTED)
     if said[0] in ("object", "identity", "presence"):

@@ -105,8 +105,9 @@ class Course:
         if history.at < len(history.tape):
             return history.tape.seen(history.at)
         if self.parent is not None:
-            if not self.parent._look_ahead():
-                return None
+            while len(history.tape) <= history.at:
+                if not self.parent._look_ahead():
+                    return None
             if said := self.parent._history.answers.get(history.at):
                 history.answers[history.at] = said
             return history.tape.seen(history.at)

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from visup.agent import Event, Observation, Outcome
+from visup.agent import Alert, Event, Observation, Outcome
 from visup.agent.agent import Agent, Step
 from visup.agent.phases import Phase, Snapshot
 from visup.stepping.tape import Tape
@@ -47,7 +47,9 @@ class History:
     latest: int = LATEST
     _minds: dict[int, Snapshot] = field(default_factory=dict, init=False)
     _whole: OrderedDict[int, tuple[Step, Snapshot]] = field(default_factory=OrderedDict, init=False)
-    _events: list[tuple[Event, ...]] = field(default_factory=list, init=False)
+    _told: list[tuple[tuple[Event, ...], tuple[Alert, ...]]] = field(
+        default_factory=list, init=False
+    )
 
     def __post_init__(self) -> None:
         self.begin = self.made = self.at
@@ -70,7 +72,7 @@ class History:
         was = self.agent.snapshot()
         if self.at > self.made:
             self.made = self.at
-            self._events.append(step.events)
+            self._told.append((step.events, step.alerts))
             if (self.at - self.begin) % self.spacing == 0:
                 self._minds[self.at] = was
         self._whole[self.at] = step, was
@@ -79,9 +81,7 @@ class History:
         return step
 
     def forward(self) -> Step:
-        """One step on along the tape; the very same as ever if it was made before."""
-        if self.at + 1 in self._whole:
-            return self._take_up(self.at + 1)
+        """One step on along the tape."""
         seen = self.tape.seen(self.at)
         *_, (_, thought) = self.phases(seen)
         return self.conclude(seen, thought)
@@ -96,10 +96,7 @@ class History:
         step = None
         near = max(n for n in (*self._minds, *self._whole) if n <= number)
         if not near < self.at < number:
-            step = self._take_up(near) if near in self._whole else None
-            if step is None:
-                self.at = near
-                self.agent.restore(self._minds[near])
+            step = self._take_up(near)
         while self.at < number:
             step = self.forward()
         return step
@@ -135,7 +132,7 @@ class History:
         """Number of the step and event, for all that was told from step `first` to `last`."""
         end = self.made if last is None else min(last, self.made)
         for number in range(max(first, self.begin + 1), end + 1):
-            for event in self._events[number - self.begin - 1]:
+            for event in self._told[number - self.begin - 1][0]:
                 yield number, event
 
     def _note_answers(self) -> None:
@@ -143,9 +140,16 @@ class History:
         if self.at == self.made and (said := self.here.answers):
             self.answers[self.at] = {**self.answers.get(self.at, {}), **said}
 
-    def _take_up(self, number: int) -> Step:
-        step, was = self._whole[number]
-        self._whole.move_to_end(number)
+    def _take_up(self, number: int) -> Step | None:
+        """Be after a step that is kept, whole or as a mind."""
+        step, was = self._whole.get(number) or (None, self._minds[number])
         self.at = number
         self.agent.restore(was)
-        return step
+        if number == self.begin:
+            return None
+        if step is not None:
+            self._whole.move_to_end(number)
+            return step
+        events, alerts = self._told[number - self.begin - 1]
+        seen, mind = self.tape.seen(number - 1), was.mind
+        return Step(mind.frame_index, mind.time, seen, mind, events, alerts, was.directives)

@@ -32,7 +32,7 @@ class Stopped:
 
     Attributes:
         taken: How many steps were completed.
-        steps: The latest of them, at most `LATEST`.
+        steps: The latest of them: as many as the history keeps whole.
         reasons: Which conditions were met; empty when the number of steps was made.
         midway: The step inside which it stopped, or None.
         ended: Whether there is nothing more to perceive.
