@@ -49,6 +49,7 @@ def main() -> int:
             "recognition",
             "faults",
             "resume",
+            "pace",
             "soak",
         )
         if (given.only or "") in kind
