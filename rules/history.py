@@ -13,7 +13,6 @@ from visup.agent.changing import replace
 from visup.rules.geometry import FAN, Floats, hull_separation, reach
 from visup.rules.tracks import merged_pairs, tracks
 
-
 ROOM = 64
 """For how many further samples memory is made ready."""
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from visup.agent import Relation, StageBelief, Status, Truth
+from visup.agent.changing import replace
 from visup.tasks.actions import Meaning
 from visup.tasks.course import (
     Leaf,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import wraps
 
 from visup.tasks.conditions import Comparison, Fact, action_of, facts_of
 from visup.tasks.tree import Action, Actors, Course, Judged, Reference, Stage, Task, walk
 from visup.tasks.units import value
+
+Names = tuple[str, ...]
 
 
 def tasks_of(file: Task) -> tuple[Task, ...]:
@@ -21,6 +24,31 @@ def tasks_of(file: Task) -> tuple[Task, ...]:
     return tuple(found)
 
 
+MOST_KNOWN = 64
+"""Tasks of which it is remembered what follows from their trees."""
+
+
+def known_of_task(find: Callable[[Task], Names]) -> Callable[[Task], Names]:
+    """What follows from a task alone is found once for it, since every step asks for it.
+
+    Tasks are told apart as objects: to compare their trees would cost as much as to walk them.
+    """
+    known: dict[int, tuple[Task, Names]] = {}
+
+    @wraps(find)
+    def told(task: Task) -> Names:
+        of, names = known.get(id(task), (None, ()))
+        if of is not task:
+            if len(known) >= MOST_KNOWN:
+                known.clear()
+            names = find(task)
+            known[id(task)] = task, names
+        return names
+
+    return told
+
+
+@known_of_task
 def stage_names(task: Task) -> tuple[str, ...]:
     """The stages that ask for actions themselves, in the order in which the task comes to them."""
     root = task.stage(task.name)
@@ -43,6 +71,7 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(a for n in walk(rule.body) for a in _names(task, n)))
 
 
+@known_of_task
 def task_actors(task: Task) -> tuple[str, ...]:
     """All actors of a task, in the order in which its stages ask for them."""
     staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
