@@ -90,11 +90,19 @@ class Follower:
     actions: Mapping[str, Meaning]
     settings: TaskSettings
     looks: Mapping[str, Look] = field(default_factory=dict)
+    _started: list[tuple[Task | None, float, tuple[Reading, ...]]] = field(
+        default_factory=lambda: [(None, 0.0, ())], init=False, repr=False, compare=False
+    )
 
     def start(self, now: float) -> tuple[Reading, ...]:
         """The readings in which the task begins now."""
-        ways = enter(self.task, begin(self.task), entered(now), now)
-        return tuple(Reading(s) for s in ways if s is not None)
+        of, then, readings = self._started[0]
+        if of is not self.task or then != now:
+            # Asked for several times in each step while the task has not begun.
+            ways = enter(self.task, begin(self.task), entered(now), now)
+            readings = tuple(Reading(s) for s in ways if s is not None)
+            self._started[0] = self.task, now, readings
+        return readings
 
     def follow(
         self, readings: tuple[Reading, ...], see: See, now: float, dt: float
