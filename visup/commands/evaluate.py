@@ -10,6 +10,7 @@ import typer
 
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
+from visup.commands.eval_recognition import recognition
 from visup.commands.eval_tasks import tasks
 from visup.commands.faults import faults
 from visup.commands.lasting import pace, resume, soak
@@ -32,6 +33,7 @@ app.command("relations")(relations)
 app.command("rules")(rules)
 app.command("reasoning")(reasoning)
 app.command("tasks")(tasks)
+app.command("recognition")(recognition)
 app.command("resume")(resume)
 app.command("soak")(soak)
 app.command("pace")(pace)

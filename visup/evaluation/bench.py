@@ -46,6 +46,7 @@ def main() -> int:
             "relations",
             "rules",
             "tasks",
+            "recognition",
             "faults",
             "resume",
             "pace",
