@@ -12,7 +12,7 @@ from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
 from visup.commands.eval_tasks import tasks
 from visup.commands.faults import faults
-from visup.commands.lasting import resume, soak
+from visup.commands.lasting import resume, soak, stepping
 from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
@@ -34,6 +34,7 @@ app.command("reasoning")(reasoning)
 app.command("tasks")(tasks)
 app.command("resume")(resume)
 app.command("soak")(soak)
+app.command("stepping")(stepping)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]

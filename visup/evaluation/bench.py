@@ -49,6 +49,7 @@ def main() -> int:
             "faults",
             "resume",
             "soak",
+            "stepping",
         )
         if (given.only or "") in kind
     ]

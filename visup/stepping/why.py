@@ -117,7 +117,9 @@ class Reasons:
         stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
         if kind == "stage_failing":
             bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
-            stated += tuple(self.stage(s) for s in bad if s in event.text)
+            failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
+            if failing:  # which tell of their actors
+                return Why("because", (*stated, *failing))
         if kind == "behaviour_failed":
             stated += self._failed()
         return Why("because", (*stated, *self._objects(event.objects)))
