@@ -36,7 +36,7 @@ if __name__ == "__main__":
         branch = it.branch(IdentityIs(1, "spartan"))
         branch.step(10)
         changed = branch.compare()
-        for event in (*changed.gone, *changed.new):
-            mark = "-" if event in changed.gone else "+"
-            print(f"{mark} {event['time']:5.1f} s  {event['text']}")
+        real = it.mind_at(branch.at)
+        print("what if:", branch.mind.objects[1].name, "where it really was", real.objects[1].name)
+        print(len(changed.gone), "events are not told there,", len(changed.new), "are told besides")
         it.close()

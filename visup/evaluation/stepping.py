@@ -47,7 +47,7 @@ def evaluate_stepping(
     Returns:
         `items` for going 'back' (by `BACK` steps, from anywhere), for `step` number n told without
         going there ('look'), and for a 'branch' that is begun `BACK` steps ago: `median_ms` and
-        `most_ms` of wall time; `total` with `steps`, `kept_mb` (by how much the process has grown
+        `most_ms` of processor time; `total` with `steps`, `kept_mb` (by how much the process has grown
         over all steps, for 10,000 of them), `same` (the share of places at which the steps after
         going back were byte for byte those before), and `slower` (processor time of a step made by
         a stepper, by that of the agent alone).
@@ -166,9 +166,9 @@ def _print(step: Step) -> bytes:
 
 
 def _ms(work: Callable[[], object]) -> float:
-    begin = time.perf_counter()
+    begin = time.process_time()
     work()
-    return (time.perf_counter() - begin) * 1e3
+    return (time.process_time() - begin) * 1e3
 
 
 def _times(taken: list[float]) -> dict[str, float]:
