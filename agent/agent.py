@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
 from visup.agent.act import alert_events, faults, update_alerts
 from visup.agent.answers import understood, with_answers
 from visup.agent.behaviour import Behaviour, Outcome, Thinker
+from visup.agent.changing import replace
 from visup.agent.limits import Limits
 from visup.agent.mind import Mind, Zone
 from visup.agent.perceive import in_order, perceive
