@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from visup.agent import Observation, Region
+from visup.agent import Mind, Observation, Region
 from visup.agent.agent import Step
 from visup.agent.errors import SettingsError
 from visup.agent.state import frozen
 from visup.evaluation.soak import rss_mb, scripted
+from visup.rules.relations import RELATIONS
 from visup.settings import WatchSettings
 from visup.stepping import GivenFeed, Stepper
 from visup.supervisor import reasoning_agent
@@ -159,9 +160,17 @@ def _making() -> float:
     return float(np.percentile(taken, 25))
 
 
+def whole(mind: Mind) -> Mind:
+    """The same mind without where in memory its samples lie, which is no part of what is believed."""
+    kept = mind.memory.get(RELATIONS)
+    if kept is None:
+        return mind
+    return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
+
+
 def _print(step: Step) -> bytes:
     return hashlib.sha256(
-        frozen((step.mind.objects, step.mind.memory, step.events, step.alerts))
+        frozen((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
     ).digest()
 
 

@@ -183,10 +183,11 @@ class Reasons:
         pending: Any = self.mind.memory.get(COUPLING, {}).get((low, high))
         since = {
             "they last converged at": getattr(pending, "converged_at", None),
-            "at rest to each other since": getattr(pending, "rest_since", None),
             "apart since": getattr(pending, "apart_since", None),
         }
-        told = tuple(Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None)
+        told = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        if pending is not None:
+            told.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
         return (
             *told,
             *(
