@@ -9,7 +9,8 @@ from visup.evaluation.stepping import evaluate_stepping, missed
 
 
 def test_a_short_course_has_all_figures_and_misses_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("LEAST_STEPS", 150), ("BACK", 60), ("BLOCK", 10), ("BLOCKS", 2)):
+    small = {"LEAST_STEPS": 150, "BACK": 60, "BLOCK": 10, "BLOCKS": 2, "PLACES": 4}
+    for name, value in small.items():
         monkeypatch.setattr(f"visup.evaluation.stepping.{name}", value)
     figures = evaluate_stepping(200)
     assert set(figures["items"]) == {"back", "look", "branch"}

@@ -33,6 +33,7 @@ KEPT_STEPS = 10_000
 LEAST_STEPS = 1000
 BLOCK = 50  # steps made in turn with and without a stepper
 BLOCKS = 12
+PLACES = 30
 
 
 def evaluate_stepping(
@@ -75,7 +76,7 @@ def evaluate_stepping(
     gc.collect()
     kept = rss_mb() - before
     tell("going back")
-    places = np.random.default_rng(seed).integers(BACK + 1, steps, 30)
+    places = np.random.default_rng(seed).integers(BACK + 1, steps, PLACES)
     back, look, branch, same = [], [], [], []
     for place in map(int, places):
         it.go(place)
