@@ -46,6 +46,7 @@ from visup.agent.records import (
     Truth,
 )
 from visup.agent.relations import Column, Relation, RelationTable
+from visup.agent.shown import showing
 
 __all__ = [
     "Alert",
@@ -90,3 +91,20 @@ __all__ = [
     "VisupError",
     "Zone",
 ]
+
+showing(
+    *(Alert, Binding, Candidate, Concern, Coupling, Depth, Directive, Event, Expectation, Frame),
+    *(
+        Health,
+        Hypothesis,
+        Mind,
+        ObjectBelief,
+        Observation,
+        Outcome,
+        Percept,
+        Pose,
+        Question,
+        Region,
+    ),
+    *(Relation, RelationTable, Report, Spin, StageBelief, TaskBelief, Zone),
+)

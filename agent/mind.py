@@ -7,11 +7,12 @@ stands in it too (`memory`), so that a snapshot of a mind is a snapshot of every
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.changing import replace
 from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, empty
 from visup.agent.relations import Relation, RelationTable
 
@@ -355,6 +356,10 @@ class Mind:
     def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
         """A relation between all of some objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
         return self._table.truths(name, ids)
+
+    def truths_of(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
+        """Several relations between all of some objects: (k, n, n) codes as of `truths`."""
+        return self._table.truths_of(names, ids)
 
     @property
     def _table(self) -> RelationTable:

@@ -15,7 +15,7 @@ be apart in space: with the depth of one of the two unknown this is not told apa
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import (
@@ -30,6 +30,7 @@ from visup.agent import (
     Relation,
     Truth,
 )
+from visup.agent.changing import replace
 from visup.rules.joint import Joint, begun, follow, motion
 from visup.rules.measure import Measured, RelationSettings, scale
 from visup.rules.relations import measured

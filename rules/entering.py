@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from visup.agent import ObjectBelief
+from visup.agent.changing import replace
 from visup.rules.adoption import grow_into
 from visup.rules.fragments import in_place_of_hidden
 from visup.rules.tracks import at_border

@@ -22,12 +22,13 @@ a cheapest path again and is dropped, which is exact too. `most_paths` bounds wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Hypothesis
+from visup.agent.changing import replace
 from visup.agent.viewing import orientations, swing_and_roll
 from visup.rules.turns import Floats, nearest_rotations, turned
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from visup.agent.mind import UNKNOWN_OBJECT, Mind
 
 ORDINALS = ("an", "a second", "a third", "a fourth", "a fifth", "a sixth", "a seventh", "an eighth")
 _MENTION = re.compile(r"\{(\w+)\}")
+_DOUBLED = re.compile(r",(?=\s*[,.;:!?])")
 
 
 def believed_name(mind: Mind, object_id: int) -> str | None:
@@ -93,6 +95,7 @@ def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> s
     return tidy(_MENTION.sub(fill, template))
 
 
+@lru_cache(maxsize=256)
 def with_names(template: str, names: tuple[str, ...]) -> str:
     """The same template with its named objects numbered: '{a}' becomes '{0}' for names ('a', ...)."""
 
@@ -110,7 +113,7 @@ def mentions(template: str) -> tuple[str, ...]:
 
 def tidy(text: str) -> str:
     """Close the commas round 'believed to be', and begin with a capital."""
-    text = re.sub(r",(?=\s*[,.;:!?])", "", text)
+    text = _DOUBLED.sub("", text)
     return text[:1].upper() + text[1:]
 
 

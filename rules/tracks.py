@@ -7,13 +7,14 @@ both serve to tell an object that left from one that something else hides.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
 
 import numpy as np
 
 from visup.agent import Mind, Region
+from visup.agent.changing import replace
 from visup.rules.geometry import Box, box_overlap, grow, shared_pixels, shift
 
 TRACKS = "rules.presence"

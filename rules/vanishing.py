@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from visup.agent import ObjectBelief, Presence
+from visup.agent.changing import replace
 from visup.rules.geometry import grow, pixels_in, shared_pixels
 from visup.rules.tracks import Track, at_border, expected_box, expected_outside, heading_out
 from visup.rules.work import Work

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Region
+from visup.agent.changing import replace
 from visup.rules.fragments import Doubt
 from visup.rules.geometry import box_gap, outline_gap
 from visup.rules.sentences import sentence

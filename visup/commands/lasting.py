@@ -1,9 +1,10 @@
-"""`visup eval resume` and `visup eval soak`: runs that are killed, and runs of hours."""
+"""`visup eval resume`, `soak` and `pace`: runs that are killed, runs of hours, the time of a step."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -66,3 +67,21 @@ def soak(
         console.print(f"{name}: {value:.6g}")
     if json_file:
         write_record(json_file, figures, {"frames": frames})
+
+
+def pace(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures to this file too.")
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Length of each script.")] = 2000,
+    kept: Annotated[int, typer.Option(min=100, help="Minds that are kept in a row.")] = 10_000,
+) -> None:
+    """The time of a step without perception, of replay and observers, and what a kept mind takes."""
+    from visup.commands.databases import run_and_show
+    from visup.evaluation.pace import evaluate_pace
+
+    def run(tell: Callable[[str], None]) -> dict[str, Any]:
+        return evaluate_pace(steps, kept=kept, progress=tell)
+
+    keys = ("ms", "ms_low", "think_ms", "alerts", "sinks", "replay_fps", "mind_kb")
+    run_and_show("pace", run, keys, json_file, {"steps": steps, "kept": kept})

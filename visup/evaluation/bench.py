@@ -46,8 +46,10 @@ def main() -> int:
             "relations",
             "rules",
             "tasks",
+            "recognition",
             "faults",
             "resume",
+            "pace",
             "soak",
         )
         if (given.only or "") in kind
