@@ -284,6 +284,7 @@ class TaskBelief:
         prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
             end of the task.
         success: Probability that the task still ends well, or None while nothing is followed.
+        active: How likely it is that the task is going on at all; 1 when it is the only one given.
     """
 
     task: str
@@ -297,6 +298,7 @@ class TaskBelief:
     evidence: str = ""
     prospects: tuple[Prospect, ...] = ()
     success: float | None = None
+    active: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

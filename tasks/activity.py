@@ -7,7 +7,8 @@ is stays a rival until one has been believed; after that a task that goes badly 
 one that never was, unless a rival explains better what is seen.
 
 The approximation: evidence is taken along the likeliest reading of each task, not summed over all of
-them, and rivals that share no object are taken to be independent.
+them, and that a reading passed over a step is not held against its task; tasks that share no object are
+taken to be independent. So a task whose end alone is seen may be taken to be going on.
 """
 
 from __future__ import annotations
@@ -22,11 +23,17 @@ FADES_S = 20.0
 MOST = 12.0
 """Evidence for or against a task is never stronger than this, natural logarithm."""
 
+IDLE = 3.0
+"""How much likelier it is beforehand that none of some rivals is going on than that one of them is."""
+
 SURE = 0.9
 """Once some task is so likely to be going on, that none is is out of the question."""
 
 AUDIBLE = 0.3
 """A task less likely than this to be going on is not told about."""
+
+EXCLUDED = 0.05
+"""What a task less likely than this asks for is not expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +44,38 @@ class Activity:
         evidence: Logarithm of how much likelier what was seen is if it is.
         chance: How likely it is going on, 0 to 1.
         begun: Whether it or a rival was once believed to be.
+        ended: Whether it was, and is over.
     """
 
     evidence: float = 0.0
     chance: float = 0.0
     begun: bool = False
+    ended: bool = False
 
     @property
     def audible(self) -> bool:
         """Whether it is likely enough to be told about."""
         return self.chance >= AUDIBLE
 
+    @property
+    def excluded(self) -> bool:
+        """Whether it is so unlikely that what it asks for is not expected of anybody."""
+        return self.chance < EXCLUDED
+
 
 ALONE = Activity(MOST, 1.0, True)
 """A task that is the only one given is taken to be going on."""
 
+ENDED = Activity(MOST, 1.0, True, True)
+"""A task that was going on, and is over."""
+
 
 def weighed(
-    before: Sequence[Activity], gains: Sequence[float], cast: Sequence[frozenset[int]], dt: float
+    before: Sequence[Activity],
+    gains: Sequence[float],
+    cast: Sequence[frozenset[int]],
+    dt: float,
+    over: Sequence[bool] | None = None,
 ) -> tuple[Activity, ...]:
     """How likely each of several tasks is going on.
 
@@ -63,32 +84,54 @@ def weighed(
         gains: The evidence of the last `dt` seconds for each.
         cast: The objects that play the actors of each.
         dt: Seconds.
+        over: Which of them have ended, well or badly; none by default. What was seen is explained by
+            them, so that their rivals begin anew.
 
     Returns:
         One for each, in order.
     """
     if len(before) == 1:
         return (ALONE,)
-    fade = math.exp(-dt / FADES_S)
-    evidence = [
-        max(-MOST, min(MOST, fade * a.evidence + gain))
-        for a, gain in zip(before, gains, strict=True)
-    ]
+    ended = over or [False] * len(before)
     found: dict[int, Activity] = {}
     for group in rivals(cast):
-        begun = any(before[k].begun for k in group)
-        chances = shares([evidence[k] for k in group], none=not begun)
-        begun = begun or sum(chances) >= SURE
-        found |= {k: Activity(evidence[k], p, begun) for k, p in zip(group, chances, strict=True)}
+        open_ones = [k for k in group if not ended[k]]
+        anew = any(ended[k] and not before[k].ended for k in group)
+        old = [Activity() if anew else before[k] for k in open_ones]
+        new = _rivalling(old, [gains[k] for k in open_ones], dt)
+        found |= dict(zip(open_ones, new, strict=True))
+        found |= {k: ENDED for k in group if ended[k]}
     return tuple(found[k] for k in range(len(before)))
+
+
+def _rivalling(before: Sequence[Activity], gains: Sequence[float], dt: float) -> Iterator[Activity]:
+    """The same for rivals of which none has ended."""
+    if not before:
+        return
+    begun = any(a.begun for a in before)
+    fade = math.exp(-dt / FADES_S)
+    counted = zip(before, _counted(gains, begun), strict=True)
+    evidence = [fade * a.evidence + gain for a, gain in counted]
+    most = max(0.0, max(evidence) - MOST)  # what is beyond tells rivals apart all the same
+    evidence = [max(-MOST, e - most) for e in evidence]
+    chances = shares(evidence, none=not begun)
+    begun = begun or sum(chances) >= SURE
+    for e, chance in zip(evidence, chances, strict=True):
+        yield Activity(e, chance, begun)
+
+
+def _counted(gains: Sequence[float], begun: bool) -> Sequence[float]:
+    """Losses count against a task that was believed only while a rival gains."""
+    if not begun or max(gains) > 0.0:
+        return gains
+    return [0.0] * len(gains)
 
 
 def shares(evidence: Sequence[float], none: bool) -> list[float]:
     """The probability of each of some rivals; with `none` they may sum to less than 1."""
     top = max(*evidence, 0.0) if none else max(evidence)
     masses = [math.exp(e - top) for e in evidence]
-    # All rivals together are as likely beforehand as that none is going on.
-    idle = len(masses) * math.exp(-top) if none else 0.0
+    idle = IDLE * len(masses) * math.exp(-top) if none else 0.0
     whole = sum(masses) + idle
     return [m / whole for m in masses]
 

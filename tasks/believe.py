@@ -15,6 +15,8 @@ from visup.agent import (
     Truth,
     Verdict,
 )
+from visup.agent.changing import replace
+from visup.tasks.activity import Activity
 from visup.tasks.conditions import Condition
 from visup.tasks.course import Leaf, Step, leaves
 from visup.tasks.observe import NEVER, Relations, Sighting, observe
@@ -153,6 +155,24 @@ def _prospects(follower: Follower, readings: tuple[Reading, ...]) -> tuple[Prosp
     found = follower.next_stages(readings).items()
     likely = sorted((s for s in found if s[1] >= NEAR), key=lambda s: -s[1])
     return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
+
+
+def hushed(belief: TaskBelief, activity: Activity) -> TaskBelief:
+    """What is believed of a task that is probably not going on.
+
+    Who could play its actors is still looked at, and while it is not excluded, what it asks for is
+    still expected.
+    """
+    return replace(
+        belief,
+        verdict=Verdict.UNKNOWN,
+        stages=tuple(StageBelief(s.stage, Status.PENDING, 0.0) for s in belief.stages),
+        current=None,
+        expected=() if activity.excluded else belief.expected,
+        prospects=(),
+        success=None,
+        evidence=f"it is probably not going on ({activity.chance:.0%})".replace("%", " %"),
+    )
 
 
 def _stages(

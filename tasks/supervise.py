@@ -8,7 +8,6 @@ should be seen next and what the verdict is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from visup.agent import (
     Binding,
@@ -23,58 +22,29 @@ from visup.agent import (
     Status,
     TaskBelief,
     Thinker,
-    Truth,
     Verdict,
 )
 from visup.agent.changing import replace
 from visup.tasks.actions import Meaning, known_actions
-from visup.tasks.believe import Scene, believe
-from visup.tasks.conditions import facts_of
+from visup.tasks.activity import ALONE, Activity, weighed
+from visup.tasks.believe import Scene, believe, hushed
 from visup.tasks.course import leaves
+from visup.tasks.invariants import broken_since, invariant_concerns, invariant_events, patience
 from visup.tasks.matching import match, strength, unexplained
+from visup.tasks.memory import TaskMemory
 from visup.tasks.readings import Follower, Reading
 from visup.tasks.settings import DEFAULT_SETTINGS, TaskSettings
-from visup.tasks.structure import keyed, stage_names
-from visup.tasks.tell import revision_events, stage_concerns, stage_events
+from visup.tasks.structure import stage_names
+from visup.tasks.tell import activity_events, revision_events, stage_concerns, stage_events
 from visup.tasks.trail import Revision, revised
-from visup.tasks.tree import Invariant, Task
-from visup.tasks.units import value
+from visup.tasks.tree import Task
 from visup.tasks.verify import BAD
 from visup.tasks.vocabulary import vocabulary
 
 MEMORY = "tasks"
+OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
 LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
-
-
-@dataclass(frozen=True, slots=True)
-class TaskMemory:
-    """What is remembered of one task from step to step.
-
-    Attributes:
-        time: Seconds of the last step.
-        readings: The courses followed; empty until its first actors are found.
-        belief: What was last believed.
-        interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
-            unexpected object that turns out to be one of the actors.
-        strangers: The objects that interrupted the task by being unexpected.
-        strange_since: Since when objects have been unexplained, by id.
-        broken_since: Since when each invariant has been broken, or None.
-        rival: A matching that would change who plays whom, by actor; empty when there is none.
-        rival_since: Since when it has been the better one.
-        lasting: Since when what is no plain relation of the mind has been true, by key.
-    """
-
-    time: float
-    readings: tuple[Reading, ...]
-    belief: TaskBelief
-    interrupted: str = ""
-    strangers: tuple[int, ...] = ()
-    strange_since: tuple[tuple[int, float], ...] = ()
-    broken_since: tuple[float | None, ...] = ()
-    rival: tuple[int | None, ...] = ()
-    rival_since: float = 0.0
-    lasting: tuple[tuple[str, float], ...] = ()
 
 
 def task_thinker(
@@ -85,7 +55,8 @@ def task_thinker(
     """The thinker that supervises some tasks.
 
     Args:
-        tasks: The active tasks, checked (see `parse_task`).
+        tasks: Tasks, checked (see `parse_task`). One is taken to be going on; of several it is
+            inferred which are (see `activity.py`), and the others are not told about.
         settings: Patience and thresholds.
         actions: Meanings of actions; None for all that are known, with those of plug-ins.
 
@@ -93,18 +64,19 @@ def task_thinker(
         A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
         in order, keeps its memory in `Mind.memory['tasks']`, and gives events 'stage_started',
         'stage_progressing', 'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
-        'stage_unknown', 'stage_revised', 'invariant_broken' and 'verdict', and concerns 'stage_failing' and
-        'invariant_broken'.
+        'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
+        'verdict', and concerns 'stage_failing' and 'invariant_broken'.
     """
     followers = tuple(_follower(t, actions or known_actions(), settings) for t in tasks)
 
     def think(mind: Mind, observation: Observation) -> Outcome:
-        memories = _recall(mind, followers)
-        steps = [_step(f, m, mind) for f, m in zip(followers, memories, strict=True)]
-        new = tuple(s.memory for s in steps)
+        before = _recall(mind, followers)
+        seen = tuple(_follow(f, m, mind) for f, m in zip(followers, before, strict=True))
+        new = _inferred(before, seen)
         believed = replace(mind, tasks=tuple(m.belief for m in new)).remember(MEMORY, new)
-        events = tuple(e for s in steps for e in s.events)
-        return Outcome(believed, events, tuple(c for s in steps for c in s.concerns))
+        steps = list(zip(followers, before, new, strict=True))
+        events = tuple(e for step in steps for e in _events(*step, mind))
+        return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))
 
     return think
 
@@ -131,36 +103,75 @@ def _follower(task: Task, actions: Mapping[str, Meaning], settings: TaskSettings
     return follower
 
 
-@dataclass(frozen=True, slots=True)
-class _Step:
-    memory: TaskMemory
-    events: tuple[Event, ...]
-    concerns: tuple[Concern, ...]
-
-
 def _recall(mind: Mind, followers: tuple[Follower, ...]) -> tuple[TaskMemory, ...]:
     kept = mind.memory.get(MEMORY, ())
     if [m.belief.task for m in kept] == [f.task.name for f in followers]:
         return tuple(kept)
-    return tuple(_blank(f, mind.time) for f in followers)
+    activity = ALONE if len(followers) == 1 else Activity()
+    return tuple(_blank(f, mind.time, activity) for f in followers)
 
 
-def _blank(follower: Follower, now: float) -> TaskMemory:
+def _blank(follower: Follower, now: float, activity: Activity) -> TaskMemory:
     stages = tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task))
-    belief = TaskBelief(follower.task.name, Verdict.UNKNOWN, stages)
-    return TaskMemory(now, (), belief, broken_since=(None,) * len(follower.task.invariants))
+    belief = TaskBelief(follower.task.name, Verdict.UNKNOWN, stages, active=activity.chance)
+    broken = (None,) * len(follower.task.invariants)
+    return TaskMemory(now, (), belief, broken_since=broken, activity=activity)
 
 
-def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
-    """One step of one task: bind its actors, follow its readings, judge, tell."""
+def _inferred(
+    before: tuple[TaskMemory, ...], seen: tuple[TaskMemory, ...]
+) -> tuple[TaskMemory, ...]:
+    """What is remembered of tasks once it is inferred which of them are going on."""
+    if len(seen) == 1:
+        return seen
+    cast = [
+        frozenset(b.object_id for b in m.belief.bindings if b.object_id is not None) for m in seen
+    ]
+    activities = weighed(
+        [m.activity for m in before],
+        [m.gain for m in seen],
+        cast,
+        seen[0].time - before[0].time,
+        [a.belief.verdict in OVER or _ends(a, b) for a, b in zip(before, seen, strict=True)],
+    )
+    each = zip(before, seen, activities, strict=True)
+    return tuple(_heard(old.belief, new, activity) for old, new, activity in each)
+
+
+def _ends(before: TaskMemory, now: TaskMemory) -> bool:
+    """Whether a task that was told about has just ended."""
+    return before.activity.audible and now.belief.verdict in OVER
+
+
+def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity) -> TaskMemory:
+    """A memory with its activity; of a task that is not going on nothing is believed but that.
+
+    What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
+    what interrupts it, which is no matter of the task.
+    """
+    belief = replace(memory.belief, active=activity.chance)
+    over = told.verdict in OVER or any(s.status in BAD for s in told.stages)
+    if activity.audible or over or memory.interrupted:
+        return replace(memory, activity=activity, belief=belief)
+    readings = memory.readings
+    if memory.activity.begun and not activity.begun:
+        readings = ()  # a rival has ended; what follows is another matter
+    if any(x.watch.status in BAD for r in readings[:1] for x in leaves(r.state)):
+        readings = ()  # if it begins yet, it begins from its beginning
+    return replace(memory, activity=activity, belief=hushed(belief, activity), readings=readings)
+
+
+def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:
+    """One step of one task: bind its actors, follow its readings, judge."""
     settings, now = follower.settings, mind.time
     bindings, rival, rival_since = _bind(follower, memory, mind)
     scene = Scene(mind, bindings, follower, dict(memory.lasting))
-    readings = memory.readings or _start(follower, scene)
+    readings, gain = memory.readings or _start(follower, scene), 0.0
     if readings:
         dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.readings else 0.0
         readings = follower.follow(readings, scene.see, now, dt)
-    broken = _broken(follower, scene, memory)
+        gain = follower.gain(readings[0], scene.see, dt)
+    broken = broken_since(follower, scene, memory)
     strange = _strange(follower, scene, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
     if {b.object_id for b in bindings} & set(strangers):
@@ -170,7 +181,7 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
     belief = believe(follower, scene, readings, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     belief = replace(belief, unexplained=lasting)
-    new = TaskMemory(
+    return TaskMemory(
         now,
         readings,
         belief,
@@ -181,20 +192,31 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
         rival,
         rival_since,
         scene.since,
+        memory.activity,
+        gain,
     )
-    events = (
-        *stage_events(memory.belief, belief, mind, follower.task),
-        *revision_events(memory.belief, belief, _revised(memory, readings, now), mind),
-        *_invariant_events(follower, memory, new, mind),
-    )
-    return _Step(new, events, (*stage_concerns(belief), *_invariant_concerns(follower, new, scene)))
 
 
-def _revised(memory: TaskMemory, readings: tuple[Reading, ...], now: float) -> tuple[Revision, ...]:
+def _events(follower: Follower, memory: TaskMemory, new: TaskMemory, mind: Mind) -> Iterator[Event]:
+    """What is told of one task after a step."""
+    yield from activity_events(memory.activity, new.activity, new.belief, mind)
+    if not new.activity.audible and memory.activity.audible:
+        return  # that it is not going on says all
+    yield from stage_events(memory.belief, new.belief, mind, follower.task)
+    yield from revision_events(memory.belief, new.belief, _revised(memory, new), mind)
+    yield from invariant_events(follower, memory, new, mind)
+
+
+def _concerns(follower: Follower, memory: TaskMemory) -> Iterator[Concern]:
+    yield from stage_concerns(memory.belief)
+    yield from invariant_concerns(follower, memory)
+
+
+def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
     """Steps that lay behind by the reading told before and do not by the one told now."""
-    if not memory.readings or not readings:
+    if not memory.readings or not new.readings:
         return ()
-    return tuple(revised(memory.readings[0].trail, readings[0].trail, now))
+    return tuple(revised(memory.readings[0].trail, new.readings[0].trail, new.time))
 
 
 def _bind(
@@ -252,76 +274,16 @@ def _interrupted(
 
     A task that is over is not interrupted.
     """
-    if memory.belief.verdict in (Verdict.SUCCEEDED, Verdict.FAILED):
+    if memory.belief.verdict in OVER:
         return "", ()
     for alert in scene.mind.alerts:
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
     for invariant, since in zip(follower.task.invariants, broken, strict=True):
-        if since is not None and scene.mind.time - since >= _patience(follower, invariant):
+        if since is not None and scene.mind.time - since >= patience(follower, invariant):
             return f"`{invariant}` does not hold", ()
     return "", ()
-
-
-def _broken(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[float | None, ...]:
-    """Since when each invariant has been broken, or None; what is not seen is not broken."""
-    before = memory.broken_since
-    return tuple(
-        (since if since is not None else scene.mind.time) if _breaks(i, scene, memory) else None
-        for i, since in zip(follower.task.invariants, before, strict=True)
-    )
-
-
-def _breaks(invariant: Invariant, scene: Scene, memory: TaskMemory) -> bool:
-    holds = scene.holds(invariant.condition, None)
-    if invariant.during and not {r.stage for r in invariant.during} & _under_way(memory):
-        return False
-    return holds is (Truth.TRUE if invariant.when == "never" else Truth.FALSE)
-
-
-def _under_way(memory: TaskMemory) -> frozenset[str]:
-    """The stages under way by the best reading, with those in which they stand."""
-    if not memory.readings or memory.readings[0].finished is not None:
-        return frozenset()
-    steps = [x.step for x in leaves(memory.readings[0].state)]
-    return frozenset().union(*(s.inside for s in steps))
-
-
-def _patience(follower: Follower, invariant: Invariant) -> float:
-    """For how long an invariant must be broken to count, seconds."""
-    if invariant.lasting is None:
-        return follower.settings.contrary_s
-    return value(follower.task.amount(invariant.lasting.duration))
-
-
-def _invariant_concerns(follower: Follower, memory: TaskMemory, scene: Scene) -> Iterator[Concern]:
-    for invariant, since in zip(follower.task.invariants, memory.broken_since, strict=True):
-        if since is not None and memory.time - since >= _patience(follower, invariant):
-            facts = facts_of(invariant.condition)
-            actors = (a for f in facts for a in keyed(follower.task, f)[1])
-            objects = scene.objects(tuple(dict.fromkeys(actors)))
-            cause = f"`{invariant}` has not held since {since:.1f} s."
-            key = f"{follower.task.name}: {invariant}"
-            yield Concern("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
-
-
-def _invariant_events(
-    follower: Follower, memory: TaskMemory, new: TaskMemory, mind: Mind
-) -> Iterator[Event]:
-    for i, invariant in enumerate(follower.task.invariants):
-        patience = _patience(follower, invariant)
-        since = new.broken_since[i]
-        if since is not None and memory.time - since < patience <= new.time - since:
-            text = f"Task `{follower.task.name}`: `{invariant}` has not held since {since:.1f} s."
-            yield Event(
-                "invariant_broken",
-                mind.time,
-                mind.frame_index,
-                text,
-                severity=Severity.CRITICAL,
-                data={"task": follower.task.name, "invariant": str(invariant)},
-            )
 
 
 def _current_actors(memory: TaskMemory) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from visup.agent import (
 )
 from visup.agent.changing import replace
 from visup.rules.sentences import describe
+from visup.tasks.activity import Activity
 from visup.tasks.sentences import stage_sentence, verdict_sentence
 from visup.tasks.structure import stages_inside
 from visup.tasks.trail import Revision
@@ -57,6 +58,33 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
             yield event
     if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
         yield _verdict_event(now, mind)
+
+
+def activity_events(
+    before: Activity, now: Activity, belief: TaskBelief, mind: Mind
+) -> Iterator[Event]:
+    """Events of a task that is inferred to be going on, or not to be after all."""
+    if before.audible == now.audible:
+        return
+    kind = "task_active" if now.audible else "task_inactive"
+    said = "appears to be going on" if now.audible else "is not what is going on, as it now appears"
+    chance = f"{now.chance:.0%}".replace("%", " %")
+    yield Event(
+        kind,
+        mind.time,
+        mind.frame_index,
+        f"Task `{belief.task}` {said} ({chance}).",
+        _objects(belief),
+        now.chance if now.audible else 1.0 - now.chance,
+        data={"task": belief.task},
+    )
+
+
+def played(belief: TaskBelief, actors: Sequence[str]) -> tuple[int, ...]:
+    """Ids of the objects that play some actors; those not found are left out."""
+    who = {b.actor: b.object_id for b in belief.bindings}
+    ids = (who.get(a) for a in actors)
+    return tuple(i for i in ids if i is not None)
 
 
 def revision_events(

@@ -103,10 +103,13 @@ def reasoning_agent(settings: WatchSettings) -> Agent:
 def final_verdict(mind: Mind) -> Verdict:
     """The verdict of a run that is over.
 
-    With tasks it is the gravest of theirs; without, a warning that is still open interrupts.
+    With tasks it is the gravest of those that were seen to go on, unknown when none was; without, a
+    warning that is still open interrupts.
     """
     if mind.tasks:
-        return max((finish(t) for t in mind.tasks), key=_GRAVITY.index)
+        verdicts = [finish(t) for t in mind.tasks]
+        seen = [v for v in verdicts if v is not Verdict.UNKNOWN]
+        return max(seen or verdicts, key=_GRAVITY.index)
     grave = any(a.severity >= Severity.WARNING for a in mind.alerts)
     return Verdict.INTERRUPTED if grave else Verdict.SUCCEEDED
 

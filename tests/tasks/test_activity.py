@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.tasks.activity import ALONE, MOST, SURE, Activity, rivals, shares, weighed
+from visup.tasks.activity import ALONE, IDLE, MOST, SURE, Activity, rivals, shares, weighed
 
 evidences = st.lists(st.floats(-MOST, MOST), min_size=1, max_size=5)
 casts = st.lists(st.frozensets(st.integers(1, 5), max_size=3), min_size=1, max_size=6)
@@ -18,7 +18,7 @@ ONE = frozenset({1})
 @given(evidences, st.booleans())
 def test_shares_are_the_posterior(evidence: list[float], none: bool) -> None:
     found = shares(evidence, none)
-    idle = len(evidence) if none else 0.0  # as likely beforehand as all tasks together
+    idle = IDLE * len(evidence) if none else 0.0
     whole = sum(math.exp(e) for e in evidence) + idle
     assert found == pytest.approx([math.exp(e) / whole for e in evidence])
 
@@ -78,11 +78,28 @@ def test_a_rival_that_explains_what_is_seen_takes_over() -> None:
     assert [a.audible for a in now] == [False, True]
 
 
+def test_what_no_rival_explains_is_a_failure_and_not_another_task() -> None:
+    now: tuple[Activity, ...] = (Activity(MOST, 0.5, True), Activity(MOST, 0.5, True))
+    for _ in range(50):
+        now = weighed(now, [-0.5, -0.1], [ONE, ONE], 0.1)
+    assert [a.chance for a in now] == pytest.approx([0.5, 0.5])
+
+
 def test_tasks_without_a_common_object_do_not_compete() -> None:
     now: tuple[Activity, ...] = (Activity(), Activity())
     for _ in range(20):
         now = weighed(now, [0.5, 0.5], [ONE, frozenset({2})], 0.2)
     assert all(a.chance > SURE for a in now)
+
+
+def test_rivals_of_a_task_that_ended_begin_anew() -> None:
+    now: tuple[Activity, ...] = (Activity(MOST, 0.5, True), Activity(MOST, 0.5, True))
+    now = weighed(now, [0.0, -0.1], [ONE, ONE], 0.1, [True, False])
+    assert now[0].ended
+    assert now[0].chance == 1.0
+    assert not now[1].begun
+    assert not now[1].audible
+    assert weighed(now, [0.0, 0.0], [ONE, ONE], 0.1, [True, False])[1] == now[1]
 
 
 def test_evidence_fades() -> None:
