@@ -111,5 +111,5 @@ def pace(
     def run(tell: Callable[[str], None]) -> dict[str, Any]:
         return evaluate_pace(steps, kept=kept, progress=tell)
 
-    keys = ("ms", "ms_low", "think_ms", "alerts", "sinks", "replay_fps", "mind_kb")
+    keys = ("ms", "ms_low", "think_ms", "alerts", "observers", "replay_fps", "mind_kb")
     run_and_show("pace", run, keys, json_file, {"steps": steps, "kept": kept})
