@@ -236,6 +236,19 @@ class Expectation:
 
 
 @dataclass(frozen=True, slots=True)
+class Prospect:
+    """A stage that may begin next.
+
+    Attributes:
+        stage: Its name.
+        probability: 0 to 1.
+    """
+
+    stage: str
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
 class StageBelief:
     """How one stage of a task stands.
 
@@ -268,6 +281,9 @@ class TaskBelief:
         unexplained: Ids of objects that no actor of the task explains.
         confidence: 0 to 1.
         evidence: One sentence: why the verdict is what it is.
+        prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
+            end of the task.
+        success: Probability that the task still ends well, or None while nothing is followed.
     """
 
     task: str
@@ -279,6 +295,8 @@ class TaskBelief:
     unexplained: tuple[int, ...] = ()
     confidence: float = 1.0
     evidence: str = ""
+    prospects: tuple[Prospect, ...] = ()
+    success: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,6 +26,7 @@ from visup.tasks.course import (
 )
 from visup.tasks.tree import Task
 
+V = TypeVar("V")
 W = TypeVar("W")
 END = -1
 """In place of a node: the course is over."""
@@ -84,7 +85,7 @@ class Automaton:
 
     def node(self, state: State[W]) -> int:
         """The number of a state, whatever is kept about its steps."""
-        return self._number(with_leaves(state, (Leaf(x.step, NEW) for x in leaves(state))))
+        return self._number(kept(state, [Leaf(x.step, NEW) for x in leaves(state)]))
 
     def state(self, node: int) -> State[int]:
         """The state of a node; about each step its position is kept."""
@@ -117,6 +118,12 @@ class Automaton:
     def _way(self, move: Move[int]) -> Way:
         carried = () if move.state is None else tuple(x.watch for x in leaves(move.state))
         return Way(self._number(move.state), tuple(x.watch for x in move.left), carried, 1.0)
+
+
+def kept(state: State[W], new: list[Leaf[V]]) -> State[V]:
+    """A state with other things kept about its steps."""
+    # The tree is rebuilt from its leaves, so that nothing of the old kind remains in it.
+    return with_leaves(state, iter(new))  # type: ignore[arg-type]
 
 
 def _numbered(state: State[int]) -> State[int]:

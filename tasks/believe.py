@@ -8,6 +8,7 @@ from visup.agent import (
     Binding,
     Expectation,
     Mind,
+    Prospect,
     StageBelief,
     Status,
     TaskBelief,
@@ -25,6 +26,8 @@ from visup.tasks.tree import Hold
 from visup.tasks.verify import BAD, Watch
 
 NEAR = 0.01  # readings that are so likely against the best have a say in what is expected
+
+LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # there is no way back from these
 
 # Of several steps of one stage the first of these speaks for the stage.
 WORST_FIRST = (
@@ -140,7 +143,16 @@ def believe(
         _expected(follower, scene, near),
         confidence=sure,
         evidence=why,
+        prospects=_prospects(follower, near),
+        success=0.0 if verdict in LOST else follower.success(near),
     )
+
+
+def _prospects(follower: Follower, readings: tuple[Reading, ...]) -> tuple[Prospect, ...]:
+    """The stages that may begin next; those that are hardly possible are left out."""
+    found = follower.next_stages(readings).items()
+    likely = sorted((s for s in found if s[1] >= NEAR), key=lambda s: -s[1])
+    return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
 
 
 def _stages(

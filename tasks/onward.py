@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from visup.tasks.automaton import END, NEW, Automaton
-from visup.tasks.course import Leaf, State, Step, begin, enter, leaves, moves, with_leaves
+from visup.tasks.automaton import END, NEW, Automaton, kept
+from visup.tasks.course import Leaf, State, Step, begin, enter, leaves, moves
 from visup.tasks.tree import Actors, Deadline, Task, Timed, walk
 from visup.tasks.verify import Watch, entered
 
@@ -94,11 +94,11 @@ class Paths:
         assert way.state is not None
         here = leaves(state)
         new = (Leaf(x.step, fresh) if x.watch == NEW else here[x.watch] for x in leaves(way.state))
-        return _with(way.state, list(new)), way.node
+        return kept(way.state, list(new)), way.node
 
     def _worked_out(self, state: State[Watch], now: float) -> list[_Way]:
         places = iter(range(len(leaves(state))))
-        numbered = _with(state, [Leaf(x.step, next(places)) for x in leaves(state)])
+        numbered = kept(state, [Leaf(x.step, next(places)) for x in leaves(state)])
         found = []
         for move in moves(self._task, numbered, NEW, now):
             after = leaves(move.state) if move.state is not None else ()
@@ -111,12 +111,6 @@ class Paths:
         return [
             _Way(w.left, w.entered, 1.0 / alike[w.left], w.state, w.node, w.fresh) for w in found
         ]
-
-
-def _with(
-    state: State[int] | State[Watch], new: list[Leaf[Watch]] | list[Leaf[int]]
-) -> State[Watch]:
-    return with_leaves(state, iter(new))  # type: ignore[arg-type,return-value]
 
 
 def _within(task: Task) -> list[Deadline]:

@@ -212,5 +212,5 @@ def within(
 
 DEFAULT_PROCESS = Process()
 
-SUPERVISED = Process(begin=0.1, missing=0.37, spurious=0.075)
+SUPERVISED = Process(begin=0.1, fail=0.02, recover=0.05, lose=0.125, missing=0.37, spurious=0.075)
 """Of relations in the mind, which are true for a while, then neither for a while, and then again."""

@@ -26,6 +26,7 @@ from visup.tasks.onward import Onward, Paths
 from visup.tasks.process import SUPERVISED, WAITING, Process, Seen
 from visup.tasks.sentences import outcome
 from visup.tasks.settings import TaskSettings
+from visup.tasks.trail import Trail, longer
 from visup.tasks.transitions import Place
 from visup.tasks.tree import Task
 from visup.tasks.verify import BAD, Watch, entered, over, update
@@ -54,6 +55,7 @@ class Reading:
         finished: When the task was done by it, or None.
         met: Steps that may come next and whose entry was seen, with the time when it last was.
         weighed: Ways on that were not taken, by their steps, and how strongly they were spoken for.
+        trail: The steps that lie behind it, and when each was left.
         gone_on: Whether it has left a step.
     """
 
@@ -65,6 +67,7 @@ class Reading:
     finished: float | None = None
     met: tuple[tuple[tuple[Step, ...], float], ...] = ()
     weighed: tuple[tuple[tuple[Step, ...], int], ...] = ()
+    trail: Trail | None = None
     gone_on: bool = False
 
     @property
@@ -138,6 +141,24 @@ class Follower:
         kept = settled(found, self.settings.most_courses, LEAST).kept.values()
         ranked = sorted(kept, key=lambda w: -w.mass)
         return tuple(replace(w.what, mass=w.mass, best=w.best) for w in ranked)
+
+    def next_stages(self, readings: tuple[Reading, ...]) -> dict[str, float]:
+        """For each stage the probability that it is the next to begin; the rest is for the end."""
+        found: dict[str, float] = {}
+        for reading in readings:
+            if reading.finished is None:
+                for stage, chance in self.foresight.next_stages(reading.node).items():
+                    found[stage] = found.get(stage, 0.0) + reading.mass * chance
+        return found
+
+    def success(self, readings: tuple[Reading, ...]) -> float:
+        """Probability that the course as followed reaches its end, with no stage failed for good."""
+        hopes = (
+            r.mass * self.foresight.success(self.place(r))
+            for r in readings
+            if all(p.status is not Status.FAILED for p in r.past)
+        )
+        return min(1.0, sum(hopes))
 
     def place(self, reading: Reading) -> Place:
         """Where a reading is by the model: its phases are read off what is kept of its steps."""
@@ -305,9 +326,9 @@ class Follower:
                 told[ending.stage] = ending
         now_at = with_leaves(state, iter(fresh))
         past = tuple(told.values())
-        return Reading(
-            now_at, node, reading.mass * chance, reading.best * chance, past, gone_on=True
-        )
+        trail = longer(reading.trail, tuple(x.step for x in way.left), now)
+        mass, best = reading.mass * chance, reading.best * chance
+        return Reading(now_at, node, mass, best, past, trail=trail, gone_on=True)
 
     def _ending(self, leaf: Leaf[Watch], now: float) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 from visup.agent import Status
 from visup.tasks.automaton import END, Automaton
-from visup.tasks.course import Step
 from visup.tasks.foresight import Foresight
 from visup.tasks.forward import Weighed, merged, settled
 from visup.tasks.process import DEFAULT_PROCESS, Kind, Process, Seen
+from visup.tasks.trail import Revision, Trail, longer, revised
 from visup.tasks.transitions import Place, Transitions
 from visup.tasks.tree import Task
 
@@ -38,37 +38,6 @@ class Evidence(NamedTuple):
 
     seen: Seen
     confidence: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Trail:
-    """A step that lies behind, with those before it: the best way to a place."""
-
-    step: Step
-    left: float
-    before: Trail | None
-    length: int
-
-
-@dataclass(frozen=True, slots=True)
-class Revision:
-    """A step that was told to be over and is now believed not to have been.
-
-    Attributes:
-        step: The step.
-        told: When it was believed to have ended, seconds.
-        revised: When that was taken back, seconds.
-    """
-
-    step: Step
-    told: float
-    revised: float
-
-    def __str__(self) -> str:
-        return (
-            f"`{self.step.stage}`, told done at {self.told:.1f} s, "
-            f"is now believed not to have happened"
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +63,11 @@ class Belief:
     def best(self) -> Place:
         """The most likely place."""
         return max(self.places.items(), key=lambda item: item[1].mass)[0]
+
+    @property
+    def trail(self) -> Trail | None:
+        """The best way to the most likely place."""
+        return self.places[self.best].what
 
 
 class Recogniser:
@@ -143,7 +117,8 @@ class Recogniser:
         lost = 1.0 - (1.0 - belief.lost) * (1.0 - new.dropped)
         evidence = belief.evidence + log(new.evidence)
         after = Belief(now, new.kept, lost, evidence)
-        return Belief(now, new.kept, lost, evidence, tuple(_revised(belief, after)))
+        taken_back = revised(belief.trail, after.trail, now)
+        return Belief(now, new.kept, lost, evidence, tuple(taken_back))
 
     def stages(self, belief: Belief) -> dict[tuple[str, Status], float]:
         """For each stage and status the probability that a step of it is under way and stands so.
@@ -200,7 +175,7 @@ class Recogniser:
                 continue
             trail, mass, best = weighed.what, weighed.mass, weighed.best
             for passage in self._transitions.passages(place, dt):
-                new = _longer(trail, passage.left, now) if passage.left else trail
+                new = longer(trail, passage.left, now) if passage.left else trail
                 yield passage.to, new, mass * passage.chance, best * passage.chance
 
     def _weighed(
@@ -211,32 +186,3 @@ class Recogniser:
             if key in seen:
                 factor *= self.process.likelihood(kind, *seen[key])
         return Weighed(weighed.what, weighed.mass * factor, weighed.best * factor)
-
-
-def _longer(trail: Trail | None, left: tuple[Step, ...], now: float) -> Trail | None:
-    for step in left:
-        trail = Trail(step, now, trail, trail.length + 1 if trail else 1)
-    return trail
-
-
-def _revised(before: Belief, now: Belief) -> Iterator[Revision]:
-    """Steps that lay behind by the best way before, and do not by the best way now."""
-    old, new = before.places[before.best].what, now.places[now.best].what
-    while old is not None and old is not new:
-        while new is not None and new.length > old.length:
-            new = new.before
-        if new is not None and new.length == old.length:
-            if _same(old, new):
-                return
-            new = new.before
-        yield Revision(old.step, old.left, now.time)
-        old = old.before
-
-
-def _same(one: Trail | None, other: Trail | None) -> bool:
-    """Whether two trails pass through the same steps."""
-    while one is not None and other is not None and one is not other:
-        if one.step != other.step:
-            return False
-        one, other = one.before, other.before
-    return one is other

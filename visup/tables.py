@@ -20,6 +20,7 @@ from visup.agent import (
     Report,
     TaskBelief,
 )
+from visup.tasks.sentences import prospects_text
 
 
 def table(*headings: str, title: str | None = None) -> Table:
@@ -94,6 +95,7 @@ def task_tree(task: TaskBelief) -> Tree:
     for b in task.bindings:
         who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
         tree.add(Text(f"  {b.actor} is played by {who}"))
+    tree.add(Text(f"  {prospects_text(task)}"))
     return tree
 
 

@@ -126,7 +126,9 @@ class Played:
     seen: tuple[Mapping[Key, Evidence], ...]
 
 
-def play(task: Task, rng: random.Random, mean_s: float, wrong: float = WRONG) -> Played:
+def play(
+    task: Task, rng: random.Random, mean_s: float, wrong: float = WRONG, most: int = 10**6
+) -> Played:
     """Let a task run its course: stages in a legal order, each as long as chance has it.
 
     Args:
@@ -134,6 +136,7 @@ def play(task: Task, rng: random.Random, mean_s: float, wrong: float = WRONG) ->
         rng: The chance.
         mean_s: How long stages take on average, seconds; each from half to one and a half of it.
         wrong: Share of verdicts that are wrong: each of the two others alike.
+        most: No more than so many steps, whether or not the task is over.
     """
     automaton = Recogniser(task).automaton
     keys = sorted(
@@ -142,7 +145,7 @@ def play(task: Task, rng: random.Random, mean_s: float, wrong: float = WRONG) ->
     stages: list[str] = []
     seen: list[Mapping[Key, Evidence]] = []
     node = rng.choice(automaton.start)[0]
-    while node != END:
+    while node != END and len(stages) < most:
         (step,) = automaton.steps(node)
         for _ in range(round(mean_s * rng.uniform(0.5, 1.5) / FRAME_S)):
             stages.append(step.stage)
@@ -151,10 +154,16 @@ def play(task: Task, rng: random.Random, mean_s: float, wrong: float = WRONG) ->
     return Played(tuple(stages), tuple(seen))
 
 
+SURE = {s: Evidence(s) for s in Seen}
+WRONGLY = {
+    Seen.HOLDS: (SURE[Seen.NEITHER], SURE[Seen.CONTRARY]),
+    Seen.NEITHER: (SURE[Seen.HOLDS], SURE[Seen.CONTRARY]),
+}
+
+
 def _verdict(going: bool, rng: random.Random, wrong: float) -> Evidence:
     true = Seen.HOLDS if going else Seen.NEITHER
-    others = [s for s in (Seen.HOLDS, Seen.NEITHER, Seen.CONTRARY) if s is not true]
-    return Evidence(rng.choice(others) if rng.random() < wrong else true)
+    return rng.choice(WRONGLY[true]) if rng.random() < wrong else SURE[true]
 
 
 @dataclass(frozen=True)
@@ -214,8 +223,7 @@ def speed(stages: int, seed: int = 0, steps: int = 2_000) -> float:
     """
     rng = random.Random(seed)
     task = read(large_task(stages, rng))
-    played = play(task, rng, max(1.0, steps * FRAME_S / stages))
-    seen = played.seen[:steps]
+    seen = play(task, rng, 4.0, most=steps).seen[:steps]
     recogniser = Recogniser(task)
     begin = time.process_time()
     belief = recogniser.start()
