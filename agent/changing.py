@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import cache
 from operator import attrgetter
 from typing import Any, TypeVar
 
@@ -31,17 +30,20 @@ def replace(record: Record, **changes: Any) -> Record:
         'bay'
     """
     kind = type(record)
-    read, place = _layout(kind)
+    read, place = _LAYOUTS.get(kind) or _layout(kind)
     values = list(read(record))
     for name, value in changes.items():
         values[place[name]] = value
     return kind(*values)
 
 
-@cache
-def _layout(kind: type) -> tuple[Callable[[Any], tuple[Any, ...]], Mapping[str, int]]:
-    """What reads all fields of a kind of record, and the place of each."""
+Layout = tuple[Callable[[Any], tuple[Any, ...]], Mapping[str, int]]
+_LAYOUTS: dict[type, Layout] = {}
+
+
+def _layout(kind: Any) -> Layout:
+    """What reads all fields of a kind of record, and the place of each; found once for each kind."""
     names = [f.name for f in fields(kind)]
     one = attrgetter(names[0])
     read = attrgetter(*names) if len(names) > 1 else lambda record: (one(record),)
-    return read, {name: i for i, name in enumerate(names)}
+    return _LAYOUTS.setdefault(kind, (read, {name: i for i, name in enumerate(names)}))

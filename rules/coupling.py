@@ -38,6 +38,10 @@ from visup.rules.sentences import sentence
 from visup.rules.tracks import merged_pairs
 
 COUPLING = "rules.coupling"
+
+CONFIDENCE = 0.9
+"""How sure couplings are: outlines at rest to each other may still be apart in depth."""
+
 Pair = tuple[int, int]
 Held = Mapping[tuple[str, tuple[int, ...]], Truth]
 
@@ -113,12 +117,12 @@ class Couple:
             if pair not in coupled and self._joined(p, pair, mind):
                 coupled[pair] = Coupling(pair, mind.time)
                 events.append(
-                    _event("coupled", "{0} and {1} are coupled.", pair, mind, observation)
+                    _event("coupled", "{0} and {1} {are} coupled.", pair, mind, observation)
                 )
                 p = replace(p, apart_since=None)
             elif pair in coupled and _lasts(p.apart_since, self.settings.part_s, mind.time):
                 del coupled[pair]
-                text = "{0} and {1} are no longer coupled."
+                text = "{0} and {1} {are} no longer coupled."
                 events.append(_event("decoupled", text, pair, mind, observation))
                 p = Pending()
             kept[pair] = p
@@ -248,5 +252,5 @@ def _lasts(since: float | None, least: float, now: float) -> bool:
 
 
 def _event(kind: str, template: str, pair: Pair, mind: Mind, observation: Observation) -> Event:
-    text = sentence(mind, template, *pair)
-    return Event(kind, observation.time, observation.frame_index, text, pair, 0.9)
+    text = sentence(mind, template, *pair, confidence=CONFIDENCE)
+    return Event(kind, observation.time, observation.frame_index, text, pair, CONFIDENCE)

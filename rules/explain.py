@@ -138,7 +138,7 @@ class _Reader:
                 for i, n in enumerate(value.shape[1:])
             ]
         )
-        low, high = value[(slice(None), *at)].tolist()
+        low, high = (float(bound[at]) for bound in value)
         whole = deep and not isinstance(node, Predicate | Measure | Number)
         return Explanation(
             self._text(node),

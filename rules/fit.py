@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
@@ -29,8 +30,8 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     """
     valid = np.isfinite(values)
     if len(times) >= 4 and valid.all():
-        lever = np.sqrt(((times - times.mean()) ** 2).sum())
-        return _line(times, values, len(times), np.full(values.shape[1], lever))
+        off = times - times.sum() / len(times)
+        return _line(times, values, len(times), sqrt((off * off).sum()))
     count = valid.sum(axis=0)
     enough = count >= 4
     slope = np.full(values.shape[1], np.nan)
@@ -45,16 +46,17 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _line(
-    times: Floats, values: Floats, count: int | NDArray[np.intp], lever: Floats
+    times: Floats, values: Floats, count: int | NDArray[np.intp], lever: float | Floats
 ) -> tuple[Floats, Floats]:
     first, second = pairs(len(times))
-    rises = values[second]
-    rises -= values[first]
-    rises /= (times[second] - times[first])[:, None]
-    slope = nanmedian(rises)
-    residual = values - slope * times[:, None]
-    residual -= nanmedian(residual)
-    spread = 1.4826 * nanmedian(np.abs(residual)) * np.sqrt(count / (count - 2))
+    rows = np.ascontiguousarray(values.T)
+    rises = rows.take(second, axis=1)
+    rises -= rows.take(first, axis=1)
+    rises /= times[second] - times[first]
+    slope = _medians(rises)
+    rows -= slope[:, None] * times
+    rows -= _medians(rows)[:, None]
+    spread = 1.4826 * _medians(np.abs(rows)) * np.sqrt(count / (count - 2))
     # Medians need pi/2 times as many samples as means for the same variance of their result.
     return slope, np.sqrt(np.pi / 2) * spread / np.maximum(lever, 1e-9)
 
@@ -90,9 +92,7 @@ def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     size = -(-len(times) // bins)
     if size <= 1:
         return times, values
-    edges = np.arange(len(times) % size if len(times) % size else size, len(times), size)
-    edges = np.concatenate([[0], edges])
-    sizes = np.diff(np.append(edges, len(times)))
+    edges, sizes = _bins(len(times), size)
     known = np.isfinite(values)
     if known.all():
         means = np.add.reduceat(values, edges, axis=0) / sizes[:, None]
@@ -101,6 +101,14 @@ def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     total = np.add.reduceat(np.where(known, values, 0.0), edges, axis=0)
     means = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
     return np.add.reduceat(times, edges) / sizes, means
+
+
+@lru_cache(maxsize=256)
+def _bins(count: int, size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First sample and size of each bin; the oldest may not be full."""
+    edges = np.arange(count % size if count % size else size, count, size)
+    edges = np.concatenate([[0], edges])
+    return edges, np.diff(np.append(edges, count))
 
 
 def nanmedian(values: Floats) -> Floats:
@@ -112,16 +120,22 @@ def nanmedian(values: Floats) -> Floats:
     Returns:
         (N,) float; NaN for columns without a value.
     """
-    ordered = np.sort(values, axis=0)  # NaN goes last
-    last = ordered[-1] if len(values) else ordered
-    if len(values) and not (last != last).any():  # NaN is not equal to itself
-        middle: Floats = ordered[(len(values) - 1) // 2] + ordered[len(values) // 2]
+    return _medians(np.ascontiguousarray(values.T))
+
+
+def _medians(rows: Floats) -> Floats:
+    """Median of each row of (N, T), in memory row by row, since those are sorted soonest."""
+    ordered = np.sort(rows, axis=1)  # NaN goes last
+    most = rows.shape[1]
+    last = ordered[:, -1] if most else ordered
+    if most and not (last != last).any():  # NaN is not equal to itself
+        middle: Floats = ordered[:, (most - 1) // 2] + ordered[:, most // 2]
         middle *= 0.5
         return middle
-    count = np.isfinite(ordered).sum(axis=0)
-    column = np.arange(values.shape[1])
-    low = ordered[np.maximum((count - 1) // 2, 0), column]
-    high = ordered[np.minimum(count // 2, len(values) - 1), column]
+    count = np.isfinite(ordered).sum(axis=1)
+    row = np.arange(len(rows))
+    low = ordered[row, np.maximum((count - 1) // 2, 0)]
+    high = ordered[row, np.minimum(count // 2, most - 1)]
     return np.where(count > 0, 0.5 * (low + high), np.nan)
 
 

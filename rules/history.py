@@ -134,14 +134,15 @@ def without(history: History, old: int) -> History:
     """A history without its `old` oldest samples."""
     if not old:
         return history
-    return History(history.ids, *(a[old:] for a in history.arrays), history.start + old)
+    times, support, free, separation, depth = (a[old:] for a in history.arrays)
+    return History(history.ids, times, support, free, separation, depth, history.start + old)
 
 
 def extended(history: History, row: tuple[Any, ...]) -> History:
     """A history with one more sample: time, support, free, separation, depth."""
     count = len(history.times)
     end = history.start + count
-    memory = [a.base for a in history.arrays]
+    memory: list[Any] = [a.base for a in history.arrays]
     # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
     if any(m is None or len(m) <= end for m in memory) or not np.isnan(memory[0][end]):
         history = _with_room(history, max(ROOM, count))
@@ -150,7 +151,8 @@ def extended(history: History, row: tuple[Any, ...]) -> History:
     for values, new in zip(memory, row, strict=True):
         values[end] = new
     start = history.start
-    return History(history.ids, *(m[start : end + 1] for m in memory), start)
+    times, support, free, separation, depth = (m[start : end + 1] for m in memory)
+    return History(history.ids, times, support, free, separation, depth, start)
 
 
 def _with_room(history: History, more: int) -> History:
@@ -163,4 +165,5 @@ def _with_room(history: History, more: int) -> History:
         wide[:count] = values
         return wide[:count]
 
-    return History(history.ids, *map(roomy, history.arrays))
+    times, support, free, separation, depth = map(roomy, history.arrays)
+    return History(history.ids, times, support, free, separation, depth)

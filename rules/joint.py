@@ -245,11 +245,13 @@ def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
     Returns:
         The motion up to now; None while too little is known.
     """
-    path = np.array(joint.path).reshape(-1, 6)
+    if len(joint.path) <= LEAST_PLACES:
+        return None
+    path = np.array(joint.path)
     inside = int(np.count_nonzero(path[:, 0] > now - window_s - 1e-6))
     recent = path[-max(inside, LEAST_PLACES) :]
     span = float(recent[-1, 0] - recent[0, 0])
-    if len(path) < LEAST_PLACES + 1 or span < 0.6 * window_s:
+    if span < 0.6 * window_s:
         return None
     # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
     # longer, and is believed to be as large.

@@ -234,13 +234,15 @@ class Measuring:
         slope, sigma = theil_sen(*binned(times, distance, s.bins))
         noise = np.sqrt(2.0) * s.judge.noise_px
         sigma = np.maximum(sigma, slope_noise(times, noise))
-        recent = times > times[-1] - s.quick_window_s
-        quick, spread = theil_sen(*binned(times[recent], distance[recent], s.bins))
-        spread = np.maximum(spread, slope_noise(times[recent], noise))
+        recent = int(times.searchsorted(times[-1] - s.quick_window_s, side="right"))
+        times, distance = times[recent:], distance[recent:]
+        quick, spread = theil_sen(*binned(times, distance, s.bins))
+        spread = np.maximum(spread, slope_noise(times, noise))
         least = 2.0 * s.rate_enter * scale(mind.frame_size)
-        with np.errstate(invalid="ignore"):
-            turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
-            turned &= np.sign(quick) != np.sign(slope)
+        turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
+        if not turned.any():
+            return slope, sigma
+        turned &= np.sign(quick) != np.sign(slope)
         return np.where(turned, quick, slope), np.where(turned, spread, sigma)
 
     def _parting(
@@ -265,8 +267,8 @@ class Measuring:
         return np.where(sure, speed, slope), np.where(sure, spread, sigma)
 
     def _velocity_noise(self, h: History, mind: Mind) -> float:
-        recent = h.times > mind.time - self.settings.motion_window_s
-        return slope_noise(h.times[recent], self.settings.judge.noise_px)
+        recent = _recent(h, mind, self.settings.motion_window_s)
+        return slope_noise(h.times[recent:], self.settings.judge.noise_px)
 
     def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
         """Over the window of motion, and over its two halves."""
@@ -274,8 +276,8 @@ class Measuring:
         unknown = np.full((m, 2), np.nan)
         if m == 0 or not covered(h, self.settings.window_s):
             return unknown, unknown, unknown
-        recent = h.times > mind.time - self.settings.motion_window_s
-        times, support, free = h.times[recent], h.support[recent], h.free[recent]
+        recent = _recent(h, mind, self.settings.motion_window_s)
+        times, support, free = h.times[recent:], h.support[recent:], h.free[recent:]
         half = len(times) // 2
         spans = (slice(None), slice(None, half), slice(half, None))
         found = common_motion(*slopes_of_spans(times, support, free, spans), misfit)
@@ -298,6 +300,11 @@ class Measuring:
         for k in np.flatnonzero((longest > 0.0) & (longest <= self.settings.hold_s)):
             found[k] = before.pair("gap", objects[i[k]].id, objects[j[k]].id)
         return square(found, m)
+
+
+def _recent(h: History, mind: Mind, window_s: float) -> int:
+    """Number of the first sample of a window that ends now."""
+    return int(h.times.searchsorted(mind.time - window_s, side="right"))
 
 
 def at_rest(now: Measured, settings: RelationSettings, *diagonals: float) -> NDArray[np.bool_]:

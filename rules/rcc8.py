@@ -66,7 +66,8 @@ def from_signs(signs: Codes) -> Codes:
         (P,) codes into `RCC8`: what a is to b.
     """
     nested, overlap = signs[:4], signs[4:].min(axis=0)
-    return _RELATIONS[overlap, nested.min(axis=0), nested.max(axis=0)]
+    codes: Codes = _RELATIONS[overlap, nested.min(axis=0), nested.max(axis=0)]
+    return codes
 
 
 def _relations() -> Codes:

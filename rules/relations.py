@@ -312,7 +312,7 @@ class Relations:
         moves = np.minimum(now.speed[i], now.speed[j]) > least
         rest = at_rest(now, s, diagonal, diagonal * s.together_exit)
         rest = rest[0][i, j] | (held & rest[1][i, j])
-        wanted = (rest & moves).astype(np.int8)
+        wanted: Codes = (rest & moves).astype(np.int8)
         wanted[np.isnan(now.relative_speed[i, j])] = UNKNOWN
         return wanted
 

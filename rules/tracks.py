@@ -15,7 +15,7 @@ import numpy as np
 
 from visup.agent import Mind, Region
 from visup.agent.changing import replace
-from visup.rules.geometry import Box, box_overlap, grow, shift
+from visup.rules.geometry import Box, box_overlap, grow, shared_pixels, shift
 
 TRACKS = "rules.presence"
 LEAVES_S = 6.0
@@ -215,6 +215,10 @@ def at_border(region: Region, frame_size: tuple[int, int], margin: int = 3) -> b
 def _coherent(before: Region, after: Region) -> bool:
     near = box_overlap(grow(before.bbox, 4), after.bbox) > 0
     ratio = after.area / max(before.area, 1.0)
+    if before.cut and after.cut and ratio >= 2.5:
+        # What comes over the border shows in pieces that grow together: it goes on while it still
+        # is where it was.
+        return near and shared_pixels(before, after) > 0.6 * before.area
     return near and 0.4 < ratio < 2.5
 
 

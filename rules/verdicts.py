@@ -81,8 +81,11 @@ class Ruled:
         """Where the value of a part of these rules is found."""
         key = (id(node), scope)
         if key not in self._placed:
-            make = self.compiler.term if isinstance(node, Term) else self.compiler.formula
-            self._placed[key] = make(node, scope)  # type: ignore[operator]
+            self._placed[key] = (
+                self.compiler.term(node, scope)
+                if isinstance(node, Term)
+                else self.compiler.formula(node, scope)
+            )
         return self._placed[key]
 
     def related(self, rule: Rule) -> tuple[Predicate, ...]:

@@ -156,7 +156,7 @@ def first_contact(facts: Facts) -> Codes:
     times = facts.contact[1].copy()
     known = times == times  # NaN is not equal to itself
     np.fill_diagonal(known, False)
-    codes = known.astype(np.int8)
+    codes: Codes = known.astype(np.int8)
     if not codes.any():
         return codes  # MAYBE
     np.negative(codes, out=codes)  # what is known is NO until it is first

@@ -8,7 +8,7 @@ should be seen next and what the verdict is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from visup.agent import (
     Binding,
@@ -26,6 +26,7 @@ from visup.agent import (
     Truth,
     Verdict,
 )
+from visup.agent.changing import replace
 from visup.tasks.actions import Meaning, known_actions
 from visup.tasks.believe import Scene, believe
 from visup.tasks.conditions import facts_of

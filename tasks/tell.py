@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from visup.agent import (
     Concern,
@@ -15,6 +14,7 @@ from visup.agent import (
     TaskBelief,
     Verdict,
 )
+from visup.agent.changing import replace
 from visup.rules.sentences import describe
 from visup.tasks.sentences import stage_sentence, verdict_sentence
 from visup.tasks.structure import stages_inside

@@ -17,6 +17,7 @@ from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.video import Source, open_source
 from visup.plugins import plug_ins
+from visup.rules.attention import Attend
 from visup.rules.language import load_rules
 from visup.rules.thinkers import default_thinkers
 from visup.settings import WatchSettings
@@ -139,7 +140,9 @@ def _behaviours(
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     rules = tuple(rule for path in settings.rules for rule in load_rules(path))
     interpreting = default_thinkers(rules=rules or None)
-    match = (*((task_thinker(tasks),) if tasks else ()), tell_troubles)
+    following = (task_thinker(tasks),) if tasks else ()
+    attending = (Attend(),) if settings.attention else ()
+    match = (*following, *attending, tell_troubles)
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 

@@ -9,6 +9,7 @@ from visup.agent import Directive, Mind, Observation, Outcome
 from visup.agent.agent import Agent, Step, Thinkers
 from visup.agent.state import frozen
 from visup.evaluation.soak import scripted
+from visup.evaluation.stepping import whole
 from visup.settings import WatchSettings
 from visup.stepping import GivenFeed, Stepper
 from visup.supervisor import reasoning_agent
@@ -46,7 +47,7 @@ def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> 
 def told(step: Step | None) -> bytes:
     """All that a step came to, as bytes."""
     assert step is not None
-    return frozen((step.mind, step.events, step.alerts, step.directives))
+    return frozen((whole(step.mind), step.events, step.alerts, step.directives))
 
 
 @cache

@@ -13,7 +13,7 @@ from visup.commands.databases import robustness, scale
 from visup.commands.eval_recognition import recognition
 from visup.commands.eval_tasks import tasks
 from visup.commands.faults import faults
-from visup.commands.lasting import pace, resume, soak
+from visup.commands.lasting import pace, resume, soak, stepping
 from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
@@ -36,6 +36,7 @@ app.command("tasks")(tasks)
 app.command("recognition")(recognition)
 app.command("resume")(resume)
 app.command("soak")(soak)
+app.command("stepping")(stepping)
 app.command("pace")(pace)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]

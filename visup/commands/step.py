@@ -10,6 +10,7 @@ import typer
 
 from visup.commands.watch import (
     Actors,
+    Attention,
     Behaviours,
     Every,
     Fov,
@@ -48,6 +49,7 @@ def step(
     setting: Set = None,
     settings_file: SettingsFile = None,
     isolate: Isolate = None,
+    attention: Attention = False,
 ) -> None:
     """Step through a video or a recorded run, forth and back, and look into the agent's mind.
 
@@ -92,7 +94,7 @@ def _recorded(given: dict[str, Any]) -> tuple[Agent, Feed]:
     from visup.stepping import RecordedFeed
     from visup.supervisor import reasoning_agent
 
-    beyond = [k for k, v in given.items() if k not in _AGAIN and v not in (None, [], 1)]
+    beyond = [k for k, v in given.items() if k not in _AGAIN and v not in (None, [], 1, False)]
     if beyond:
         raise SettingsError(
             f"a recorded run is not seen again: {', '.join(beyond)} cannot be changed",

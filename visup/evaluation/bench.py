@@ -51,6 +51,7 @@ def main() -> int:
             "resume",
             "pace",
             "soak",
+            "stepping",
         )
         if (given.only or "") in kind
     ]

@@ -11,22 +11,23 @@ import gc
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from visup.agent import Mind, Observation
+from visup.agent import Frame, Mind, Observation
 from visup.agent.agent import Agent
 from visup.agent.encode import plain
 from visup.agent.errors import SettingsError
 from visup.agent.journal import Journal
 from visup.agent.recording import JOURNAL, Recording
-from visup.evaluation.endurance import resident_mb, script
-from visup.evaluation.soak import sinks_ratio
+from visup.evaluation.endurance import SIZE, resident_mb, script
 from visup.replay import replay, settings_for
 from visup.settings import WatchSettings
+from visup.sinks import Sinks
 from visup.supervisor import reasoning_agent
 
 COUNTS = (3, 10)
@@ -93,9 +94,9 @@ def evaluate_pace(
     Returns:
         `items` for '3 objects' and '10 objects' with `ms` and `ms_low` (median and lowest decile of
         the processor time of a step with its journal), `think_ms` (median without the journal) and
-        `alerts` (open on average); `total` with `sinks` (time of a step with observers, by that
-        without), `replay_fps` (frames per second of processor time) and `mind_kb` (resident memory
-        of a kept mind, with the regions that it holds).
+        `alerts` (open on average); `total` with `observers` (share by which a file and a webhook that
+        answers nobody lengthen a step), `replay_fps` (frames per second of processor time) and
+        `mind_kb` (resident memory of a kept mind, with the regions that it holds).
 
     Raises:
         SettingsError: Too few steps to say anything.
@@ -114,9 +115,9 @@ def evaluate_pace(
         tell("replay")
         fps = _replay_fps(Path(scratch) / str(COUNTS[0]))
         tell("observers")
-        ratio = sinks_ratio(Path(scratch), steps)
+        share = _observers(settings, Path(scratch) / "alerts.jsonl")
     tell(f"{kept} minds")
-    total = {"sinks": ratio, "replay_fps": fps, "mind_kb": _mind_kb(kept)}
+    total = {"observers": share, "replay_fps": fps, "mind_kb": _mind_kb(kept)}
     return {"items": items, "total": total}
 
 
@@ -124,7 +125,7 @@ def _settings(place: Path) -> WatchSettings:
     rules = place / "twenty.rules"
     shipped = files("visup.rules").joinpath("safety.rules").read_text(encoding="utf-8")
     rules.write_text(shipped + RULES, encoding="utf-8")
-    return WatchSettings("scripted", tasks=TASKS, rules=(str(rules),))
+    return WatchSettings("scripted", tasks=TASKS, rules=(rules,))
 
 
 def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> dict[str, float]:
@@ -154,11 +155,27 @@ def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> 
 def _replay_fps(folder: Path) -> float:
     """Replay with one task and the rules that ship, as of a recorded mission."""
     recording = Recording.open(folder)
-    shipped = str(files("visup.rules").joinpath("safety.rules"))
-    settings = settings_for(recording, tasks=TASKS[:1], rules=(shipped,))
+    settings = replace(settings_for(recording, tasks=TASKS[:1]), rules=())
     begin = time.process_time()
     told = replay(recording, settings)
     return told.steps / (time.process_time() - begin)
+
+
+def _observers(settings: WatchSettings, place: Path) -> float:
+    """Time of the cycle's own thread in observers, as a share of that of thinking."""
+    sinks = Sinks([f"file:{place}", "webhook:http://127.0.0.1:9/"], "scripted")
+    blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    agent = reasoning_agent(settings)
+    thought, told = [], []
+    for one in script(COUNTS[0], LEAST_STEPS, 2):
+        begin = time.thread_time()
+        step = agent.rethink(one)
+        middle = time.thread_time()
+        sinks(step, blank)
+        thought.append(middle - begin)
+        told.append(time.thread_time() - middle)
+    sinks.close()
+    return float(np.sum(told[WARM:]) / np.sum(thought[WARM:]))
 
 
 def _mind_kb(count: int) -> float:

@@ -18,7 +18,7 @@ from visup.agent.agent import Agent, Step
 from visup.agent.phases import Phase, Snapshot
 from visup.stepping.tape import Tape
 
-SPACING = 20
+SPACING = 12
 LATEST = 100
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -304,8 +303,7 @@ class Stepper(Course):
 
     def close(self) -> None:
         """Let go of what the agent's behaviours have started."""
-        with suppress(AttributeError):
-            self.agent.close()
+        self.agent.close()
 
 
 def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Told:

@@ -15,6 +15,7 @@ from visup.agent import (
     Candidate,
     Column,
     Coupling,
+    Event,
     Mind,
     Observation,
     Outcome,
@@ -114,7 +115,16 @@ class Insisting:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """See `Thinker`."""
         outcome = self.thinker(mind, observation)
-        return replace(outcome, mind=insisted(outcome.mind, self.beliefs))
+        told = tuple(e for e in outcome.events if not any(_denied(b, e) for b in self.beliefs))
+        return replace(outcome, mind=insisted(outcome.mind, self.beliefs), events=told)
+
+
+def _denied(belief: Belief, event: Event) -> bool:
+    """Whether an event tells of what is insisted not to happen."""
+    if not isinstance(belief, RelationIs) or belief.name != "coupled":
+        return False
+    other = "decoupled" if belief.truth is Truth.TRUE else "coupled"
+    return event.kind == other and set(event.objects) == set(belief.objects)
 
 
 def insisted(mind: Mind, beliefs: Iterable[Belief]) -> Mind:

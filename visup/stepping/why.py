@@ -117,7 +117,9 @@ class Reasons:
         stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
         if kind == "stage_failing":
             bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
-            stated += tuple(self.stage(s) for s in bad if s in event.text)
+            failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
+            if failing:  # which tell of their actors
+                return Why("because", (*stated, *failing))
         if kind == "behaviour_failed":
             stated += self._failed()
         return Why("because", (*stated, *self._objects(event.objects)))
@@ -181,10 +183,11 @@ class Reasons:
         pending: Any = self.mind.memory.get(COUPLING, {}).get((low, high))
         since = {
             "they last converged at": getattr(pending, "converged_at", None),
-            "at rest to each other since": getattr(pending, "rest_since", None),
             "apart since": getattr(pending, "apart_since", None),
         }
-        told = tuple(Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None)
+        told = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        if pending is not None:
+            told.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
         return (
             *told,
             *(

@@ -190,9 +190,8 @@ def coupling_unmet(mind: Mind, a: int, b: int, thinkers: Sequence[Thinker]) -> W
     touching = mind.relation("touching", low, high)
     if touching is None or touching.truth is not Truth.TRUE:
         parts.append(Why(f"touching is {touching.truth.value if touching else 'not judged'}"))
-    rest = getattr(pending, "rest_since", None)
-    at_rest = 0.0 if rest is None else mind.time - rest
-    parts.append(_short_of("touching and at rest to each other for", at_rest, s.rest_s, " s"))
+    odds = getattr(pending, "rest_odds", 0.0)
+    parts.append(_short_of("log odds that they touch and are at rest", odds, s.odds, ""))
     met = getattr(pending, "converged_at", None)
     together = mind.relation("moving_together", low, high)
     if together is None or together.truth is not Truth.TRUE:
