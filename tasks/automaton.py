@@ -30,6 +30,7 @@ V = TypeVar("V")
 W = TypeVar("W")
 END = -1
 """In place of a node: the course is over."""
+WAYS_A_NODE = 10
 NEW = -1
 """In place of a step that is carried over: it begins by the way."""
 
@@ -92,9 +93,17 @@ class Automaton:
         return self._states[node]
 
     def explored(self, most: int) -> list[int]:
-        """The first nodes, breadth first from the start."""
+        """The first nodes, breadth first from the start.
+
+        It ends early where ways grow without bound, as they do with stages that come back to
+        themselves inside others: so many ways as ten for each node are looked at.
+        """
         found = {n: None for n, _ in self.start if n != END}
-        for node in _growing(found):
+        seen = 0
+        for done, node in enumerate(_growing(found)):
+            if seen > WAYS_A_NODE * most:
+                return list(found)[:done]  # the ways of the others are better not worked out
+            seen += len(self.ways(node))
             for way in self.ways(node):
                 if way.target != END and len(found) < most:
                     found.setdefault(way.target)

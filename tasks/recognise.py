@@ -185,4 +185,6 @@ class Recogniser:
         for key, kind in self._transitions.asked(place):
             if key in seen:
                 factor *= self.process.likelihood(kind, *seen[key])
+        if factor == 1.0:
+            return weighed
         return Weighed(weighed.what, weighed.mass * factor, weighed.best * factor)

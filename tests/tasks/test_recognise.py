@@ -193,6 +193,13 @@ def test_a_retry_is_followed_however_often_it_comes() -> None:
     assert len(recogniser.automaton) < 20  # a retry at the end of its task needs no stack
 
 
+def test_a_task_that_holds_itself_within_itself_is_looked_into_no_further_than_is_bounded() -> None:
+    task = read("<t> ::= any order (<u>, e(x)?) | b(x) <t>\n<u> ::= d(x)? | c(x) <t>")
+    recogniser = Recogniser(task)
+    assert 0.5 < recogniser.success(recogniser.start()) < 1.0
+    assert len(recogniser.automaton) < 3_000
+
+
 def test_places_are_bounded_and_what_is_dropped_is_accounted_for() -> None:
     task = read("<t> ::= any order (a(x), b(x), c(x), d(x), e(x))")
     few, all_of_them = Recogniser(task, most=40), Recogniser(task, most=10**6, least=0.0)
