@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from visup.agent import Directive, Region
 from visup.percepts.motion.contour import MARGIN, Outline, outline
+from visup.percepts.motion.dense import CLIP
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.scene import Scene, least_area
 from visup.percepts.motion.settings import MotionSettings
-from visup.percepts.motion.tracking import Track
+from visup.percepts.motion.telling import Evidence
+from visup.percepts.motion.tracking import Indices, Track
 
 
 def obey(directives: Sequence[Directive], scene: Scene, likelihood: Floats) -> Floats:
@@ -52,6 +54,26 @@ def sought(
     centres = np.array([t.centre for t in tracks]).reshape(-1, 2) / scene.image.scale
     inside = [_inside(centres, box) for box in boxes]
     return tuple(np.any(inside, axis=0).tolist()) if boxes else (False,) * len(tracks)
+
+
+def evidence_of(
+    scene: Scene, winner: Indices, likelihood: Floats, has: NDArray[np.bool_]
+) -> Evidence:
+    """Which points tell of the motion of a track, and how surely.
+
+    Args:
+        scene: The frame.
+        winner: (count,) label of each superpixel; label k is track k - 1.
+        likelihood: (N, K) float32 log likelihood of labels at the points.
+        has: (N,) bool, which points say what is seen there.
+
+    Returns:
+        Those in tracks, in frame pixels.
+    """
+    at = winner[scene.at]
+    use = np.flatnonzero(has & (at > 0) & (at < likelihood.shape[1] - 1))
+    gain = likelihood[use, at[use]] - likelihood[use, 0]
+    return Evidence(scene.points.xy[use] / scene.image.scale, np.clip(gain, -CLIP, CLIP))
 
 
 Box = tuple[float, float, float, float]
