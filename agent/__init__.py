@@ -18,6 +18,7 @@ from visup.agent.mind import (
     ObjectBelief,
     Pose,
     Presence,
+    Prospect,
     Question,
     Spin,
     StageBelief,
@@ -46,6 +47,7 @@ from visup.agent.records import (
     Truth,
 )
 from visup.agent.relations import Column, Relation, RelationTable
+from visup.agent.shown import showing
 
 __all__ = [
     "Alert",
@@ -73,6 +75,7 @@ __all__ = [
     "Percept",
     "Pose",
     "Presence",
+    "Prospect",
     "Question",
     "Region",
     "Relation",
@@ -90,3 +93,20 @@ __all__ = [
     "VisupError",
     "Zone",
 ]
+
+showing(
+    *(Alert, Binding, Candidate, Concern, Coupling, Depth, Directive, Event, Expectation, Frame),
+    *(
+        Health,
+        Hypothesis,
+        Mind,
+        ObjectBelief,
+        Observation,
+        Outcome,
+        Percept,
+        Pose,
+        Question,
+        Region,
+    ),
+    *(Relation, RelationTable, Report, Spin, StageBelief, TaskBelief, Zone),
+)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
+from visup.agent.changing import replace
 from visup.agent.records import BROKEN, Alert, Concern, Event, Observation, ReportState, Severity
 
 GRACE_S = 1.0

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
 from visup.agent.act import alert_events, faults, update_alerts
 from visup.agent.answers import understood, with_answers
 from visup.agent.behaviour import Behaviour, Outcome, Thinker
+from visup.agent.changing import replace
 from visup.agent.limits import Limits
 from visup.agent.mind import Mind, Zone
 from visup.agent.perceive import in_order, perceive
+from visup.agent.phases import Phase, Snapshot
 from visup.agent.records import (
     Alert,
     Concern,
@@ -24,6 +26,7 @@ from visup.agent.records import (
     Severity,
 )
 from visup.agent.running import worded
+from visup.agent.shown import showing
 from visup.agent.slot import Slot
 from visup.agent.state import Keeps
 from visup.agent.thinking import joined
@@ -42,6 +45,14 @@ class Thinkers:
     update: tuple[Thinker, ...] = ()
     cogitate: tuple[Thinker, ...] = ()
     match: tuple[Thinker, ...] = ()
+
+    def by_phase(self) -> tuple[tuple[Phase, tuple[Thinker, ...]], ...]:
+        """The phases that reason, in order, each with its thinkers."""
+        return (
+            (Phase.UPDATE, self.update),
+            (Phase.COGITATE, self.cogitate),
+            (Phase.MATCH, self.match),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +82,8 @@ class Step:
         """What each behaviour did."""
         return self.observation.reports
 
+
+showing(Step)
 
 Observer = Callable[[Step, Frame], None]
 """Told of each step after it is over: journal, console, report. It cannot change the agent."""
@@ -140,11 +153,66 @@ class Agent:
         Returns:
             The whole record of the step; `mind` has become `Step.mind`.
         """
-        if answers is not None:
-            self._answers = dict(answers)
-        step = self._act(seen, self._reason(seen))
+        *_, (_, thought) = self.phases(seen, answers)
+        return self.act(seen, thought)
+
+    def phases(
+        self, seen: Observation, answers: Mapping[int, str] | None = None
+    ) -> Iterator[tuple[Phase, Outcome]]:
+        """Update, cogitate, match: one after the other, to look in between; the mind stays as it is.
+
+        Args:
+            seen: What was perceived of the next frame.
+            answers: As of `rethink`.
+
+        Yields:
+            Each phase that is over, with all that was concluded up to there; the last one is for `act`.
+        """
+        begin = replace(
+            self.mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+        )
+        begin, told = with_answers(begin, self._answers if answers is None else answers)
+        self._answers = {}
+        outcome = Outcome(begin, told)
+        for phase, thinkers in self.thinkers.by_phase():
+            for thinker in thinkers:
+                try:
+                    outcome = joined(outcome, thinker(outcome.mind, seen), seen)
+                except (Exception, SystemExit) as fault:
+                    # The half-made mind is dropped: beliefs stay as they were and count as unknown.
+                    yield phase, replace(_fault(begin, seen, thinker, fault), events=told)
+                    return
+            yield phase, outcome
+
+    def act(self, seen: Observation, thought: Outcome) -> Step:
+        """The last phase: alerts and directives; what was thought becomes the mind."""
+        concerns = (*thought.concerns, *faults(seen))
+        alerts, opened, closed = update_alerts(
+            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1, thought.mind.unknown
+        )
+        self._alerts_opened += len(opened)
+        events = (*thought.events, *alert_events(opened, closed, seen.time, seen.frame_index))
+        step = Step(
+            frame_index=seen.frame_index,
+            time=seen.time,
+            observation=seen,
+            mind=replace(thought.mind, alerts=alerts),
+            events=events,
+            alerts=(*opened, *closed),
+            directives=thought.directives,
+        )
         self.mind, self.directives = step.mind, step.directives
         return step
+
+    def snapshot(self) -> Snapshot:
+        """What it believes now, to go back to with `restore`; a few references, no copy."""
+        answers = MappingProxyType(dict(self._answers))
+        return Snapshot(self.mind, self.directives, self._alerts_opened, answers)
+
+    def restore(self, was: Snapshot) -> None:
+        """Believe again what it, or another agent, believed then; behaviours stay as they are."""
+        self.mind, self.directives = was.mind, was.directives
+        self._alerts_opened, self._answers = was.alerts_opened, dict(was.answers)
 
     def close(self) -> None:
         """Let go of threads and processes of behaviours; they would also go with the agent itself."""
@@ -212,40 +280,6 @@ class Agent:
             slot.behaviour.load(behaviours[name])  # type: ignore[attr-defined]  # it gave its state
             slot.take_up(state["slots"][name])
         return behaviours is not None
-
-    def _reason(self, seen: Observation) -> Outcome:
-        """Update, cogitate, match: all or nothing."""
-        phases = (*self.thinkers.update, *self.thinkers.cogitate, *self.thinkers.match)
-        begin = replace(
-            self.mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
-        )
-        begin, told = with_answers(begin, self._answers)
-        self._answers = {}
-        outcome = Outcome(begin, told)
-        for thinker in phases:
-            try:
-                outcome = joined(outcome, thinker(outcome.mind, seen), seen)
-            except (Exception, SystemExit) as fault:
-                # The half-made mind is dropped: beliefs stay as they were and count as unknown.
-                return replace(_fault(begin, seen, thinker, fault), events=told)
-        return outcome
-
-    def _act(self, seen: Observation, thought: Outcome) -> Step:
-        concerns = (*thought.concerns, *faults(seen))
-        alerts, opened, closed = update_alerts(
-            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1, thought.mind.unknown
-        )
-        self._alerts_opened += len(opened)
-        events = (*thought.events, *alert_events(opened, closed, seen.time, seen.frame_index))
-        return Step(
-            frame_index=seen.frame_index,
-            time=seen.time,
-            observation=seen,
-            mind=replace(thought.mind, alerts=alerts),
-            events=events,
-            alerts=(*opened, *closed),
-            directives=thought.directives,
-        )
 
 
 def _saved(behaviour: Behaviour) -> Mapping[str, Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum, IntEnum
+from functools import cache
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,13 @@ def plain(value: Any) -> Any:
     Args:
         value: A record, or what records are made of.
     """
+    kind: Any = type(value)
+    if kind is str or kind is int or value is None or kind is bool:
+        return value
+    if kind is float:
+        return _number(value)
+    if kind is tuple or kind is list:
+        return [plain(v) for v in value]
     if isinstance(value, IntEnum):
         return value.name.lower()
     if isinstance(value, Enum):
@@ -42,11 +51,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple | list | RelationTable):
         return [plain(v) for v in value]
     if is_dataclass(value) and not isinstance(value, type):
-        hidden = _HIDDEN.get(type(value), frozenset())
-        return {
-            f.name: plain(getattr(value, f.name)) for f in fields(value) if f.name not in hidden
-        }
+        return {name: plain(getattr(value, name)) for name in _shown(kind)}
     return str(value)
+
+
+@cache
+def _shown(kind: Any) -> tuple[str, ...]:
+    """The fields of a kind of record that are told."""
+    hidden = _HIDDEN.get(kind, frozenset())
+    return tuple(f.name for f in fields(kind) if f.name not in hidden)
 
 
 _HIDDEN: Mapping[type, frozenset[str]] = {
@@ -57,7 +70,7 @@ _HIDDEN: Mapping[type, frozenset[str]] = {
 
 def _number(x: float) -> float | str:
     """JSON knows no infinity and no NaN; they are told in words."""
-    return round(x, 6) if np.isfinite(x) else str(x)
+    return round(x, 6) if isfinite(x) else str(x)
 
 
 def event_line(event: Event) -> dict[str, Any]:

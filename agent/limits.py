@@ -3,7 +3,8 @@
 The policy, in one place:
 
 - *By default no decision hangs on how fast the machine is.* A run may take as long as it likes up to
-  `hang_s`, which is so long that only a hang reaches it; the same frames give the same steps.
+  `hang_s`, which is so long that only a hang reaches it, even where others keep the machine or its disk
+  busy; the same frames give the same steps.
 - *Budgets are asked for* (`budgets=True`), when frames come in real time: then a run that takes
   longer than its contract's `cost_ms` is given up, and what it gives is unknown in that step.
 - *Within the process* a run goes to a thread that serves this behaviour alone. The step waits for it
@@ -39,7 +40,7 @@ class Limits:
         clock: Seconds, by which the time of a run is measured.
     """
 
-    hang_s: float | None = 10.0
+    hang_s: float | None = 60.0
     start_s: float = 60.0
     budgets: bool = False
     budget_ms: float = 1000.0

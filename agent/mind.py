@@ -7,11 +7,12 @@ stands in it too (`memory`), so that a snapshot of a mind is a snapshot of every
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.changing import replace
 from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, empty
 from visup.agent.relations import Relation, RelationTable
 
@@ -235,6 +236,19 @@ class Expectation:
 
 
 @dataclass(frozen=True, slots=True)
+class Prospect:
+    """A stage that may begin next.
+
+    Attributes:
+        stage: Its name.
+        probability: 0 to 1.
+    """
+
+    stage: str
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
 class StageBelief:
     """How one stage of a task stands.
 
@@ -267,6 +281,9 @@ class TaskBelief:
         unexplained: Ids of objects that no actor of the task explains.
         confidence: 0 to 1.
         evidence: One sentence: why the verdict is what it is.
+        prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
+            end of the task.
+        success: Probability that the task still ends well, or None while nothing is followed.
     """
 
     task: str
@@ -278,6 +295,8 @@ class TaskBelief:
     unexplained: tuple[int, ...] = ()
     confidence: float = 1.0
     evidence: str = ""
+    prospects: tuple[Prospect, ...] = ()
+    success: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -355,6 +374,10 @@ class Mind:
     def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
         """A relation between all of some objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
         return self._table.truths(name, ids)
+
+    def truths_of(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
+        """Several relations between all of some objects: (k, n, n) codes as of `truths`."""
+        return self._table.truths_of(names, ids)
 
     @property
     def _table(self) -> RelationTable:

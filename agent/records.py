@@ -384,7 +384,7 @@ class Directive:
     Attributes:
         kind: 'expect_regions' (data: count), 'look_at' (data: bbox), 'ignore' (data: bbox),
             'try_first' (data: names), 'restrict' (data: names), 'wake' (data: behaviour),
-            'ask' (data: question).
+            'ask' (data: question), 'rest' (data: behaviour, region, every_s).
         reason: One sentence.
         data: As the kind says.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, overload
 
 from visup.agent.records import Truth
@@ -126,22 +126,25 @@ class RelationTable(Sequence[Relation]):
         """
         at = self._named.get(name)
         if at is not None and len(objects) == 2:
-            column, code = at
             k, row = self.pair(*objects)
             if k >= 0:
-                return column.relation(code, (objects[0], objects[1]), row, k)
-        return self._given.get((name, frozenset(objects)))
+                column, code = at
+                return self.columns[column].relation(code, (objects[0], objects[1]), row, k)
+        return self._given.get((name, frozenset(objects))) if self.extra else None
 
     def true(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""
         found = [r for r in self.extra if r.name in names and r.truth is Truth.TRUE]
         for name in names:
-            if name in self._named:
-                column, code = self._named[name]
-                pairs = list(self._pairs) if (column.state == code).any() else []
-                for row, k in zip(*(column.state == code).nonzero(), strict=True):
-                    pair = pairs[k] if row == 0 else pairs[k][::-1]
-                    found.append(column.relation(code, pair, int(row), int(k)))
+            if name not in self._named:
+                continue
+            number, code = self._named[name]
+            column = self.columns[number]
+            rows, places = (column.state == code).nonzero()
+            pairs = list(self._pairs) if len(places) else []
+            for row, k in zip(rows.tolist(), places.tolist(), strict=True):
+                pair = pairs[k] if row == 0 else pairs[k][::-1]
+                found.append(column.relation(code, pair, row, k))
         return tuple(sorted(found, key=lambda r: r.objects))
 
     def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
@@ -154,24 +157,38 @@ class RelationTable(Sequence[Relation]):
         Returns:
             (n, n) int8, a the row and b the column: 1 true, -1 false, 0 unknown or not judged.
         """
+        table: NDArray[np.int8] = self.truths_of((name,), ids)[0]
+        return table
+
+    def truths_of(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
+        """Several relations between all of some objects, in one pass.
+
+        Args:
+            names: Any relations, listed or not.
+            ids: Objects, in any order.
+
+        Returns:
+            (k, n, n) int8, one table as of `truths` for each name.
+        """
         import numpy as np
 
-        codes = np.zeros((len(ids), len(ids)), dtype=np.int8)
-        row = {object_id: i for i, object_id in enumerate(ids)}
-        at = self._named.get(name)
-        if at is not None:
-            column, code = at
-            first, second = np.triu_indices(len(self.ids), 1)
-            where = np.array([row.get(i, -1) for i in self.ids], dtype=np.intp)
-            a, b = where[first], where[second]
-            here = (a >= 0) & (b >= 0)
-            told = np.where(column.state == code, 1, np.where(column.state == UNKNOWN_CODE, 0, -1))
-            codes[a[here], b[here]] = told[0, here]
-            codes[b[here], a[here]] = told[-1, here]
+        codes = np.zeros((len(names), len(ids), len(ids)), dtype=np.int8)
+        which, code, rows, turned = _rows_of(self._names, self._heights, names)
+        if len(which):
+            state = np.concatenate([c.state for c in self.columns])
+            first, second = _pairs_of(len(self.ids))
+            if tuple(ids) != self.ids:
+                place = {object_id: i for i, object_id in enumerate(ids)}
+                where = np.array([place.get(i, -1) for i in self.ids], dtype=np.intp)
+                here = (where[first] >= 0) & (where[second] >= 0)
+                first, second, state = where[first[here]], where[second[here]], state[:, here]
+            codes[which, first, second] = _truth(state[rows], code)
+            codes[which, second, first] = _truth(state[turned], code)
         for r in self.extra:
-            if r.name == name and len(r.objects) == 2 and set(r.objects) <= row.keys():
-                i, j = (row[o] for o in r.objects)
-                codes[i, j] = codes[j, i] = _CODES[r.truth]
+            if r.name in names and len(r.objects) == 2 and set(r.objects) <= set(ids):
+                i, j = (list(ids).index(o) for o in r.objects)
+                k = names.index(r.name)
+                codes[k, i, j] = codes[k, j, i] = _CODES[r.truth]
         return codes
 
     def all(self) -> Iterator[Relation]:
@@ -235,8 +252,16 @@ class RelationTable(Sequence[Relation]):
         return {object_id: i for i, object_id in enumerate(self.ids)}
 
     @cached_property
-    def _named(self) -> Mapping[str, tuple[Column, int]]:
-        return {n: (c, code) for c in self.columns for code, n in enumerate(c.names) if n}
+    def _named(self) -> Mapping[str, tuple[int, int]]:
+        return _codes_of(self._names)
+
+    @property
+    def _names(self) -> tuple[tuple[str, ...], ...]:
+        return tuple([c.names for c in self.columns])
+
+    @property
+    def _heights(self) -> tuple[int, ...]:
+        return tuple([len(c.state) for c in self.columns])
 
     @cached_property
     def _given(self) -> Mapping[tuple[str, frozenset[int]], Relation]:
@@ -248,3 +273,44 @@ def _number(table: Any, row: int, k: int) -> float | None:
         return None
     value = float(table[row, k])
     return value if value == value else None  # NaN is not equal to itself
+
+
+@lru_cache(maxsize=16)
+def _codes_of(names: tuple[tuple[str, ...], ...]) -> Mapping[str, tuple[int, int]]:
+    """Relation -> number of its column and its code there; tables of all steps have the same ones."""
+    return {n: (c, code) for c, told in enumerate(names) for code, n in enumerate(told) if n}
+
+
+@lru_cache(maxsize=16)
+def _rows_of(
+    names: tuple[tuple[str, ...], ...], heights: tuple[int, ...], wanted: tuple[str, ...]
+) -> tuple[NDArray[np.intp], NDArray[np.int8], NDArray[np.intp], NDArray[np.intp]]:
+    """Where some relations are found when the states of all columns stand upon each other.
+
+    Returns:
+        Of those that are there: (W, 1) which of the wanted it is and its code, (W,) its row, and
+        its row for pairs turned round.
+    """
+    import numpy as np
+
+    named, begin = _codes_of(names), [sum(heights[:k]) for k in range(len(heights))]
+    there = [(k, *named[n]) for k, n in enumerate(wanted) if n in named]
+    which = np.array([[k] for k, _, _ in there], dtype=np.intp)
+    code = np.array([[code] for _, _, code in there], dtype=np.int8)
+    rows = np.array([begin[c] for _, c, _ in there], dtype=np.intp)
+    turned = np.array([begin[c] + heights[c] - 1 for _, c, _ in there], dtype=np.intp)
+    return which, code, rows, turned
+
+
+@lru_cache(maxsize=128)
+def _pairs_of(m: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and second index of every pair of m objects."""
+    import numpy as np
+
+    return np.triu_indices(m, 1)
+
+
+def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
+    """1 where a state has the code, 0 where it is unknown, else -1."""
+    held = (state == code).astype("int8")
+    return held + held - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]

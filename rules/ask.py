@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from itertools import product
 
-from visup.agent import Mind
+from visup.agent import Mind, Truth
 from visup.agent.errors import RuleError
 from visup.rules.explain import Explanation, explained
 from visup.rules.facts import Facts
 from visup.rules.formula import Rule
+from visup.rules.intervals import Box, Interval
+from visup.rules.monitor import verdict
 from visup.rules.safety import kept
 from visup.rules.verdicts import Values, ruled
 
@@ -69,6 +71,29 @@ def choices(values: Values, rule: Rule) -> Iterator[tuple[int, ...]]:
         once = [i for i, v in zip(ids, rule.variables, strict=True) if v not in rule.may_repeat]
         if len(set(once)) == len(once):
             yield ids
+
+
+def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
+    """What a rule says of every choice of objects; false where it is suspended.
+
+    Raises:
+        RuleError: No rules have judged the mind, or none of that name.
+    """
+    values = values_of(mind)
+    rule = rule_named(values, name)
+    places = values.prepared.places[values.prepared.rules.index(rule)]
+    found = {}
+    for ids in choices(values, rule):
+        rows = [values.facts.row[i] for i in ids]
+        when, *unless = (verdict(_interval(values.at(p), rows)) for p in places)
+        found[ids] = Truth.FALSE if Truth.TRUE in unless else when
+    return found
+
+
+def _interval(box: Box, rows: Sequence[int]) -> Interval:
+    """The interval of a formula for one choice of objects, by their rows."""
+    at = tuple(rows[i] if i < len(rows) and n > 1 else 0 for i, n in enumerate(box.shape[1:]))
+    return float(box[0][at]), float(box[1][at])
 
 
 def _choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:

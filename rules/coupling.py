@@ -5,16 +5,17 @@ Two bodies are believed coupled when, for a while, they are at rest to each othe
 - they touch and move together; or
 - the number of regions fell, and the region that is left is like the union of the two.
 
-Rest is judged by how far both outlines have moved relative to each other (`joint.py`), over a short
-window and over both halves of it, so that a body that bounces off (whose mean relative velocity is
-zero for a moment) is not taken for one that was caught. Outlines that touch in the image may still
+Rest is judged by how both outlines move relative to each other (`joint.py`), in a sequential test: each
+velocity tells odds of rest against motion, and these add up until they suffice (Wald 1945) or
+are lost. A body that bounces off, whose relative velocity is zero for a moment, is so not taken for
+one that was caught, and one that clearly rests is not waited for. Outlines that touch in the image may still
 be apart in space: with the depth of one of the two unknown this is not told apart from contact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import (
@@ -29,13 +30,18 @@ from visup.agent import (
     Relation,
     Truth,
 )
-from visup.rules.joint import Joint, begun, follow, motions
+from visup.agent.changing import replace
+from visup.rules.joint import Joint, begun, follow, motion
 from visup.rules.measure import Measured, RelationSettings, scale
 from visup.rules.relations import measured
 from visup.rules.sentences import sentence
 from visup.rules.tracks import merged_pairs
 
 COUPLING = "rules.coupling"
+
+CONFIDENCE = 0.9
+"""How sure couplings are: outlines at rest to each other may still be apart in depth."""
+
 Pair = tuple[int, int]
 Held = Mapping[tuple[str, tuple[int, ...]], Truth]
 
@@ -47,10 +53,11 @@ class CouplingSettings:
     Attributes:
         relations: Thresholds; those of the relations.
         near: Gap from which on two bodies are followed, image diagonals.
-        window_s: Over how long their relative speed is judged.
-        rest_s: How long rest must last.
-        strange: Squared distance from rest, in deviations, up to which a motion is rest.
-        unseen_s: Out of sight for longer than this, bodies are not known to have rested.
+        window_s: Over how long a relative velocity is taken, or longer after a gap; those of one window
+            count as one.
+        path_s: How far back their relative path is kept.
+        moving: Usual relative speed of bodies that are not at rest, image diagonals per second.
+        odds: Logarithm of the odds of rest from which on it is believed.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
@@ -58,10 +65,10 @@ class CouplingSettings:
 
     relations: RelationSettings = field(default_factory=RelationSettings)
     near: float = 0.012
-    window_s: float = 0.6
-    rest_s: float = 0.2
-    strange: float = 3.0
-    unseen_s: float = 0.15
+    window_s: float = 0.3
+    path_s: float = 1.2
+    moving: float = 0.0125
+    odds: float = 5.0
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.5
@@ -73,13 +80,13 @@ class Pending:
 
     Attributes:
         converged_at: When they last were converging, not touching yet.
-        rest_since: Since when they touch and are at rest.
+        rest_odds: Logarithm of the odds, from 0 on, that they touch and are at rest.
         apart_since: Since when they are apart.
         joint: How they have moved relative to each other since they are near.
     """
 
     converged_at: float | None = None
-    rest_since: float | None = None
+    rest_odds: float = 0.0
     apart_since: float | None = None
     joint: Joint | None = None
 
@@ -110,12 +117,12 @@ class Couple:
             if pair not in coupled and self._joined(p, pair, mind):
                 coupled[pair] = Coupling(pair, mind.time)
                 events.append(
-                    _event("coupled", "{0} and {1} are coupled.", pair, mind, observation)
+                    _event("coupled", "{0} and {1} {are} coupled.", pair, mind, observation)
                 )
                 p = replace(p, apart_since=None)
             elif pair in coupled and _lasts(p.apart_since, self.settings.part_s, mind.time):
                 del coupled[pair]
-                text = "{0} and {1} are no longer coupled."
+                text = "{0} and {1} {are} no longer coupled."
                 events.append(_event("decoupled", text, pair, mind, observation))
                 p = Pending()
             kept[pair] = p
@@ -132,26 +139,20 @@ class Couple:
         now: Measured,
         mind: Mind,
     ) -> Pending:
-        s = self.settings
         touching = held.get(("touching", pair), Truth.UNKNOWN)
         converging = held.get(("converging", pair)) is Truth.TRUE
         converging = converging and touching is not Truth.TRUE
         apart = touching is Truth.FALSE and held.get(("diverging", pair)) is Truth.TRUE
         apart = apart or (touching is Truth.FALSE and self._well_apart(now, pair, mind))
         joint = self._follow(before.joint, pair, now, mind)
-        rest_since = before.rest_since
-        if joint is None or touching is Truth.FALSE:
-            rest_since = None
+        odds = before.rest_odds
+        if joint is None or touching is not Truth.TRUE:
+            odds = 0.0
         elif joint is not before.joint:
-            last = before.joint.path_end if before.joint else mind.time
-            if mind.time - last > s.unseen_s:
-                # What was not watched is not known to have been at rest.
-                rest_since = None
-            slow = self._slow(joint, mind)
-            rest_since = _since(rest_since, slow and touching is Truth.TRUE, mind.time)
+            odds = self._rest(odds, before.joint, joint, mind)
         return Pending(
             mind.time if converging else before.converged_at,
-            rest_since,
+            odds,
             _since(before.apart_since, apart, mind.time),
             joint,
         )
@@ -161,7 +162,7 @@ class Couple:
         s = self.settings
         regions = _regions(pair, mind)
         if regions is None:
-            old = before is None or mind.time - before.path_end > s.window_s
+            old = before is None or mind.time - before.path_end > s.path_s / 2
             return None if old else before
         gap = now.pair("gap", *pair)
         if regions[0] is not regions[1] and not gap <= s.near * scale(mind.frame_size):
@@ -170,17 +171,20 @@ class Couple:
             # Not seen side by side before: one is followed as it was last seen, the other with it.
             return begun(_apart(pair, mind), mind.time, mind.frame_size)
         return follow(
-            before, regions, mind.time, mind.frame_size, lasts_s=2 * s.window_s, anew_s=s.anew_s
+            before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
         )
 
-    def _slow(self, joint: Joint, mind: Mind) -> bool:
-        """Whether two bodies are at rest to each other."""
-        s = self.settings
-        found = motions(joint, mind.time, s.window_s)
+    def _rest(self, odds: float, before: Joint | None, joint: Joint, mind: Mind) -> float:
+        """The odds of rest after another sight of both."""
+        s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
+        found = motion(joint, mind.time, s.window_s)
         if found is None:
-            return False
-        still = s.relations.still_speed * scale(mind.frame_size)
-        return all(m.strangeness(still) < s.strange for m in found)
+            return 0.0
+        diagonal = scale(mind.frame_size)
+        told = found.rest_odds(s.relations.still_speed * diagonal, s.moving * diagonal)
+        told *= min(1.0, waited / found.span)
+        # Odds beyond the bound would only delay that the opposite is believed.
+        return min(max(0.0, odds + told), 2 * s.odds)
 
     def _well_apart(self, now: Measured, pair: Pair, mind: Mind) -> bool:
         return now.pair("gap", *pair) > 0.02 * scale(mind.frame_size)
@@ -188,7 +192,7 @@ class Couple:
     def _joined(self, p: Pending, pair: Pair, mind: Mind) -> bool:
         s = self.settings
         watched = p.joint is not None and p.joint.path_end == mind.time
-        if not watched or not _lasts(p.rest_since, s.rest_s, mind.time):
+        if not watched or p.rest_odds < s.odds:
             return False
         if _host(pair, mind) is not None:
             return True
@@ -248,5 +252,5 @@ def _lasts(since: float | None, least: float, now: float) -> bool:
 
 
 def _event(kind: str, template: str, pair: Pair, mind: Mind, observation: Observation) -> Event:
-    text = sentence(mind, template, *pair)
-    return Event(kind, observation.time, observation.frame_index, text, pair, 0.9)
+    text = sentence(mind, template, *pair, confidence=CONFIDENCE)
+    return Event(kind, observation.time, observation.frame_index, text, pair, CONFIDENCE)

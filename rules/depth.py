@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
 
 from visup.agent import Depth, Mind, ObjectBelief, Observation, Outcome
+from visup.agent.changing import replace
 from visup.rules.objects import owners
 from visup.rules.tracks import visible_share
 

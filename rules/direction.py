@@ -56,5 +56,6 @@ def directions(
     code = np.where(directed & (off <= 0.5 * cone + slack_now), before, code)
     near, far = place
     limit = np.where(before == AT_PLACE, far, np.where(directed, near, 0.5 * (near + far)))
-    code = np.where(length <= limit, AT_PLACE, code)
-    return np.where(np.isnan(length), UNKNOWN, code).astype(np.int8)
+    code[length <= limit] = AT_PLACE
+    code[length != length] = UNKNOWN  # NaN is not equal to itself
+    return code.astype(np.int8)

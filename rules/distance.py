@@ -15,6 +15,7 @@ from visup.rules.pairs import pairs
 CLASS_NAMES = ("very_close_to", "close_to", "apart_from", "far_from")
 LIMITS = (0.25, 1.0, 3.0)
 """Gap over size at which one class ends and the next begins."""
+_LIMITS, _NUMBERS = np.array(LIMITS)[:, None], np.arange(len(LIMITS))[:, None]
 
 
 def signed_gap(differences: Floats) -> Floats:
@@ -30,7 +31,8 @@ def signed_gap(differences: Floats) -> Floats:
     along = -np.minimum(differences[4:6], differences[6:8])
     dx, dy = np.maximum(along, 0.0)
     most = along.max(axis=0)
-    gap: Floats = np.where(most > 0.0, np.sqrt(dx * dx + dy * dy), most)
+    gap: Floats = np.sqrt(dx * dx + dy * dy)
+    np.copyto(gap, most, where=most <= 0.0)
     return gap
 
 
@@ -55,12 +57,11 @@ def classes(gap: Floats, size: Floats, before: Codes, slack: float, noise: float
     Returns:
         (P,) codes into `CLASS_NAMES`.
     """
-    code = np.zeros(len(gap), dtype=np.int8)
-    for number, share in enumerate(LIMITS):
-        limit = share * size
-        band = np.where(before == UNKNOWN, 0.0, np.maximum(slack * limit, 4.0 * noise))
-        # The band lies towards the other class: what is below is held up to limit + band.
-        beyond = gap > np.where(before > number, limit - band, limit + band)
-        code += beyond
-    code[np.isnan(gap)] = UNKNOWN
+    limit = _LIMITS * size
+    band = np.maximum(slack * limit, 4.0 * noise)
+    band *= before != UNKNOWN
+    # The band lies towards the other class: what is below is held up to limit + band.
+    beyond = gap > limit + np.where(before > _NUMBERS, -band, band)
+    code: Codes = beyond.sum(axis=0, dtype=np.int8)
+    code[gap != gap] = UNKNOWN  # NaN is not equal to itself
     return code

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from visup.agent import ObjectBelief
+from visup.agent.changing import replace
 from visup.rules.adoption import grow_into
 from visup.rules.fragments import in_place_of_hidden
 from visup.rules.tracks import at_border
@@ -41,12 +40,14 @@ def _arrival(belief: ObjectBelief, start: float, *, early: bool) -> tuple[str, s
     """Kind and sentence of the event: what rested in view before it moved does not enter."""
     since = belief.region.visible_since
     if early:
-        return "entry", "{0} is in view."
+        return "entry", "{0} {is} in view."
     if since is None or belief.first_seen - since < RESTED_S:
-        return "entry", "{0} enters the field of view."
+        return "entry", "{0} {enters} the field of view."
     if since - start < RESTED_S:
-        return "noticed", "{0}, in view from the start, begins to move."
-    return "noticed", f"{{0}}, in view since {since:.1f} s, begins to move."
+        return "noticed", "{0}, in view from the start, {begins} to move."
+    return "noticed", "{0}, in view since SINCE, {begins} to move.".replace(
+        "SINCE", f"{since:.1f} s"
+    )
 
 
 def _negligible(work: Work, belief: ObjectBelief) -> bool:

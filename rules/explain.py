@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from visup.agent import Truth
+from visup.agent.changing import replace
 from visup.rules.formula import (
-    And,
     Comparison,
     Formula,
     Node,
-    Or,
     Predicate,
     Quantified,
     Rule,
-    Since,
-    Until,
     children,
+    mark,
 )
 from visup.rules.intervals import UNKNOWN, Interval
 from visup.rules.monitor import verdict
 from visup.rules.program import Scope
 from visup.rules.sentences import short
-from visup.rules.terms import Arithmetic, Combined, Measure, Term
+from visup.rules.terms import Measure, Term
 from visup.rules.units import TICKS, Number
 from visup.rules.verdicts import Values, scope_of
 from visup.rules.vocabulary import RULES
@@ -113,7 +110,7 @@ class _Reader:
     def facts(self, formula: Formula) -> Iterator[Explanation]:
         """Its facts and comparisons; those under a quantifier are told by the quantifier."""
         if isinstance(formula, Predicate | Quantified):
-            yield replace(self.node(formula), parts=())
+            yield self.node(formula, deep=False)
         elif isinstance(formula, Comparison):
             yield self._told(formula)
         else:
@@ -124,35 +121,40 @@ class _Reader:
     def _told(self, formula: Comparison) -> Explanation:
         """A comparison with its quantities in its text: `gap(the arm, the probe) = 3 px < 20 px`."""
         sides = [
-            str(s) if isinstance(s, Number) else self.node(s).line()
+            str(s) if isinstance(s, Number) else self.node(s, deep=False).line()
             for s in (formula.left, formula.right)
         ]
         text = f"{sides[0]} {formula.operator} {sides[1]}"
-        return replace(self.node(formula), text=text, parts=(), interval=(-np.inf, np.inf))
+        whole = self.node(formula, deep=False)
+        return replace(whole, text=text, interval=(-np.inf, np.inf))
 
-    def node(self, node: Node) -> Explanation:
-        compiler = self.values.prepared.compiler
-        if isinstance(node, Term):
-            term, place = True, compiler.term(node, self.scope)
-        else:
-            term, place = False, compiler.formula(node, self.scope)
+    def node(self, node: Node, *, deep: bool = True) -> Explanation:
+        """What a node came to; with what it is made of, if `deep`."""
+        place, term = self.values.prepared.place(node, self.scope), isinstance(node, Term)
         value = self.values.at(place)
-        low, high = (
-            float(bound[tuple(r if n > 1 else 0 for r, n in self._indices(bound.shape))])
-            for bound in value
+        at = tuple(
+            [
+                self.rows[i] if n > 1 and i < len(self.rows) else 0
+                for i, n in enumerate(value.shape[1:])
+            ]
         )
-        parts = () if isinstance(node, Predicate | Measure | Number) else self._parts(node)
+        low, high = (float(bound[at]) for bound in value)
+        whole = deep and not isinstance(node, Predicate | Measure | Number)
         return Explanation(
-            str(named(node, self.names)),
+            self._text(node),
             (low, high),
             None if term else verdict((low, high)),
-            parts,
+            self._parts(node) if whole else (),
             place.delay / TICKS,
             _unit(node) if term else "",
         )
 
-    def _indices(self, shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
-        return ((self.rows[i] if i < len(self.rows) else 0, n) for i, n in enumerate(shape))
+    def _text(self, node: Node) -> str:
+        """Its source, with objects by name."""
+        text = self.values.prepared.text(node, tuple(self.names))
+        for variable, name in self.names.items():
+            text = text.replace(mark(variable), name)
+        return text
 
     def _parts(self, node: Node) -> tuple[Explanation, ...]:
         if isinstance(node, Quantified):
@@ -176,22 +178,6 @@ class _Reader:
             return ()
         pick = max if node.kind == "exists" else min
         return (pick(found, key=lambda e: e.interval),)
-
-
-def named(node: Node, names: Mapping[str, str]) -> Node:
-    """The same tree with variables replaced by the names of objects."""
-    if isinstance(node, Predicate | Measure):
-        return replace(node, words=tuple(names.get(w, w) for w in node.words))
-    if isinstance(node, Number):
-        return node
-    changes: dict[str, Any] = {}
-    if isinstance(node, And | Or | Combined):
-        changes["parts"] = tuple(named(p, names) for p in node.parts)
-    elif isinstance(node, Since | Until | Comparison | Arithmetic):
-        changes = {"left": named(node.left, names), "right": named(node.right, names)}
-    else:
-        changes["part"] = named(node.part, names)
-    return replace(node, **changes)
 
 
 def _unit(node: Node) -> str:

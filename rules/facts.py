@@ -60,14 +60,19 @@ class Facts:
     def related(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
         if name not in self._codes:
-            self._codes[name] = self._coupled() if name == "coupled" else self._table(name)
+            self.relate((name,))
         return self._codes[name]
 
-    def _table(self, name: str) -> Codes:
-        codes = self.mind.truths(name, self.ids)
+    def relate(self, names: tuple[str, ...]) -> None:
+        """Look several relations up in one pass, before they are asked for."""
+        tables = self.mind.truths_of(names, self.ids)
         # An object is equal to itself, and nothing else.
-        np.fill_diagonal(codes, YES if name in ITSELF else NO)
-        return codes
+        each = np.arange(len(self.ids))
+        itself = [[YES if name in ITSELF else NO] for name in names]
+        tables[:, each, each] = np.array(itself, dtype=np.int8).reshape(-1, 1)
+        self._codes.update(zip(names, tables, strict=True))
+        if "coupled" in names:
+            self._codes["coupled"] = self._coupled()
 
     def _coupled(self) -> Codes:
         codes, row = self.pairs(NO), self.row
@@ -111,8 +116,9 @@ class Facts:
     @cached_property
     def closing(self) -> Floats:
         """(3, n, n) how fast distances shrink, px/s: the least, the most likely, the most."""
-        rate, sigma = -self.pair("rate"), SIGMAS * np.nan_to_num(self.pair("rate_sigma"))
-        return np.stack((rate - sigma, rate, rate + sigma))
+        rate, sigma = -self.pair("rate"), self.pair("rate_sigma")
+        sigma = np.where(sigma == sigma, SIGMAS * sigma, 0.0)
+        return np.array((rate - sigma, rate, rate + sigma))
 
     @cached_property
     def contact(self) -> Floats:
@@ -120,8 +126,9 @@ class Facts:
         gap, closing = self.pair("gap"), self.closing[::-1]
         with np.errstate(invalid="ignore", divide="ignore"):
             times = np.where(closing > 0, gap / closing, np.inf)
-        times[:, np.isnan(gap) | np.isnan(closing[1])] = np.nan
-        times[:, (gap == 0.0) & ~np.isnan(closing[1])] = 0.0
+        known = closing[1] == closing[1]
+        times[:, (gap == 0.0) & known] = 0.0
+        times[:, ~known | (gap != gap)] = np.nan
         return times
 
 
@@ -132,12 +139,15 @@ def code(value: bool) -> int:
 
 def exactly(values: Floats) -> Floats:
     """(2, ...) intervals of known values; NaN becomes unknown."""
-    unknown = np.isnan(values)
-    if not unknown.any():
-        return np.stack((values, values))
-    return np.stack((np.where(unknown, -np.inf, values), np.where(unknown, np.inf, values)))
+    both = np.array((values, values))
+    unknown = values != values
+    if unknown.any():
+        both[0, unknown], both[1, unknown] = -np.inf, np.inf
+    return both
 
 
 def between(low: Floats, high: Floats) -> Floats:
     """(2, ...) intervals; NaN becomes unknown."""
-    return np.stack((np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)))
+    both = np.array((low, high))
+    both[0, low != low], both[1, high != high] = -np.inf, np.inf
+    return both

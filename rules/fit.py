@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from math import sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,8 +30,8 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     """
     valid = np.isfinite(values)
     if len(times) >= 4 and valid.all():
-        lever = np.sqrt(((times - times.mean()) ** 2).sum())
-        return _line(times, values, len(times), np.full(values.shape[1], lever))
+        off = times - times.sum() / len(times)
+        return _line(times, values, len(times), sqrt((off * off).sum()))
     count = valid.sum(axis=0)
     enough = count >= 4
     slope = np.full(values.shape[1], np.nan)
@@ -43,16 +46,17 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _line(
-    times: Floats, values: Floats, count: int | NDArray[np.intp], lever: Floats
+    times: Floats, values: Floats, count: int | NDArray[np.intp], lever: float | Floats
 ) -> tuple[Floats, Floats]:
     first, second = pairs(len(times))
-    rises = values[second]
-    rises -= values[first]
-    rises /= (times[second] - times[first])[:, None]
-    slope = nanmedian(rises)
-    residual = values - slope * times[:, None]
-    residual -= nanmedian(residual)
-    spread = 1.4826 * nanmedian(np.abs(residual)) * np.sqrt(count / (count - 2))
+    rows = np.ascontiguousarray(values.T)
+    rises = rows.take(second, axis=1)
+    rises -= rows.take(first, axis=1)
+    rises /= times[second] - times[first]
+    slope = _medians(rises)
+    rows -= slope[:, None] * times
+    rows -= _medians(rows)[:, None]
+    spread = 1.4826 * _medians(np.abs(rows)) * np.sqrt(count / (count - 2))
     # Medians need pi/2 times as many samples as means for the same variance of their result.
     return slope, np.sqrt(np.pi / 2) * spread / np.maximum(lever, 1e-9)
 
@@ -69,8 +73,8 @@ def slope_noise(times: Floats, noise: float) -> float:
     """
     if len(times) < 2:
         return float("nan")
-    lever = times - times.mean()
-    return float(noise / np.sqrt((lever * lever).sum()))
+    lever = times - times.sum() / len(times)
+    return noise / sqrt((lever * lever).sum())
 
 
 def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
@@ -88,9 +92,7 @@ def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     size = -(-len(times) // bins)
     if size <= 1:
         return times, values
-    edges = np.arange(len(times) % size if len(times) % size else size, len(times), size)
-    edges = np.concatenate([[0], edges])
-    sizes = np.diff(np.append(edges, len(times)))
+    edges, sizes = _bins(len(times), size)
     known = np.isfinite(values)
     if known.all():
         means = np.add.reduceat(values, edges, axis=0) / sizes[:, None]
@@ -99,6 +101,14 @@ def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     total = np.add.reduceat(np.where(known, values, 0.0), edges, axis=0)
     means = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
     return np.add.reduceat(times, edges) / sizes, means
+
+
+@lru_cache(maxsize=256)
+def _bins(count: int, size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First sample and size of each bin; the oldest may not be full."""
+    edges = np.arange(count % size if count % size else size, count, size)
+    edges = np.concatenate([[0], edges])
+    return edges, np.diff(np.append(edges, count))
 
 
 def nanmedian(values: Floats) -> Floats:
@@ -110,15 +120,22 @@ def nanmedian(values: Floats) -> Floats:
     Returns:
         (N,) float; NaN for columns without a value.
     """
-    ordered = np.sort(values, axis=0)  # NaN goes last
-    if len(values) and not np.isnan(ordered[-1]).any():
-        middle: Floats = ordered[(len(values) - 1) // 2] + ordered[len(values) // 2]
+    return _medians(np.ascontiguousarray(values.T))
+
+
+def _medians(rows: Floats) -> Floats:
+    """Median of each row of (N, T), in memory row by row, since those are sorted soonest."""
+    ordered = np.sort(rows, axis=1)  # NaN goes last
+    most = rows.shape[1]
+    last = ordered[:, -1] if most else ordered
+    if most and not (last != last).any():  # NaN is not equal to itself
+        middle: Floats = ordered[:, (most - 1) // 2] + ordered[:, most // 2]
         middle *= 0.5
         return middle
-    count = np.isfinite(ordered).sum(axis=0)
-    column = np.arange(values.shape[1])
-    low = ordered[np.maximum((count - 1) // 2, 0), column]
-    high = ordered[np.minimum(count // 2, len(values) - 1), column]
+    count = np.isfinite(ordered).sum(axis=1)
+    row = np.arange(len(rows))
+    low = ordered[row, np.maximum((count - 1) // 2, 0)]
+    high = ordered[row, np.minimum(count // 2, most - 1)]
     return np.where(count > 0, 0.5 * (low + high), np.nan)
 
 
@@ -157,24 +174,53 @@ def reach_slopes(
         support: (T, M, 16) pixels, NaN where a body is not seen.
         free: (T, M, 16) bool, clear of the border.
     """
+    return slopes_of_spans(times, support, free, (slice(None),))
+
+
+def slopes_of_spans(
+    times: Floats, support: Floats, free: NDArray[np.bool_], spans: tuple[slice, ...]
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """The same as `reach_slopes` of several spans of samples, one after another: (K M, 16) each."""
     good = np.isfinite(support) & free
-    if good.all() and len(times) >= 4:
-        centred = times - times.mean()
-        weights = centred / max(float((centred**2).sum()), 1e-12)
-        slopes = np.tensordot(weights, support, axes=1)
-        return slopes, np.ones(slopes.shape, dtype=bool)
+    moments = times[:, None, None]
+    if good.all():
+        fits = [_full_slopes(times[p], support[p]) for p in spans]
+    else:
+        values, t = np.where(good, support, 0.0), good * moments
+        fits = [_slopes(moments[p], t[p], values[p], good[p]) for p in spans]
+    if len(fits) == 1:
+        return fits[0]
+    return np.concatenate([s for s, _ in fits]), np.concatenate([u for _, u in fits])
+
+
+def _full_slopes(times: Floats, support: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Of samples none of which is missing."""
+    shape = support.shape[1:]
+    if len(times) < 4:
+        return np.zeros(shape), np.zeros(shape, dtype=bool)
+    centred = times - times.mean()
+    weights = centred / max(float((centred**2).sum()), 1e-12)
+    slopes = weights @ support.reshape(len(times), -1)
+    return slopes.reshape(shape), np.ones(shape, dtype=bool)
+
+
+def _slopes(
+    moments: Floats, t: Floats, values: Floats, good: NDArray[np.bool_]
+) -> tuple[Floats, NDArray[np.bool_]]:
     count = good.sum(axis=0)
-    usable = (count >= 4) & (count >= 0.5 * len(times))
-    values = np.where(good, support, 0.0)
-    n = np.maximum(count, 1)
-    t = np.where(good, times[:, None, None], 0.0)
-    offset = np.where(good, times[:, None, None] - t.sum(axis=0) / n, 0.0)
-    slopes = (offset * values).sum(axis=0) / np.maximum((offset**2).sum(axis=0), 1e-12)
+    usable = count >= max(4.0, 0.5 * len(moments))
+    offset = moments - t.sum(axis=0) / np.maximum(count, 1)
+    offset *= good
+    slopes = (offset * values).sum(axis=0)
+    offset *= offset
+    slopes /= np.maximum(offset.sum(axis=0), 1e-12)
     return slopes, usable
 
 
 _X, _Y = DIRECTIONS.T
 _SQUARES = np.stack([_X * _X, _X * _Y, _Y * _Y], axis=1)
+_RIDGE = np.array([1e-9, 0.0, 1e-9])
+_ACROSS = np.ascontiguousarray(DIRECTIONS.T)
 
 
 def common_motion(slopes: Floats, usable: NDArray[np.bool_], misfit: float = np.inf) -> Floats:
@@ -188,17 +234,19 @@ def common_motion(slopes: Floats, usable: NDArray[np.bool_], misfit: float = np.
     Returns:
         (M, 2) pixels per second; NaN where nothing explains it.
     """
-    weight = usable.astype(float)
+    used = usable.astype(float)
+    weight = used
     count = usable.sum(axis=1)
-    found = np.zeros((len(slopes), 2))
+    found = np.empty((len(slopes), 2))
     for _ in range(5):
         # Normal equations of two unknowns, solved by hand for all bodies at once.
-        xx, xy, yy = (weight @ _SQUARES).T + np.array([[1e-9], [0.0], [1e-9]])
+        xx, xy, yy = (weight @ _SQUARES + _RIDGE).T
         bx, by = ((weight * slopes) @ DIRECTIONS).T
         determinant = xx * yy - xy * xy
-        found = np.stack([yy * bx - xy * by, xx * by - xy * bx], axis=1) / determinant[:, None]
-        off = np.abs(slopes - found @ DIRECTIONS.T)
-        weight = usable / np.maximum(off, 0.3)
-    mean_off = (off * usable).sum(axis=1) / np.maximum(count, 1)
-    as_one = mean_off <= np.maximum(misfit, np.hypot(*found.T) / 3.0)
+        found[:, 0] = (yy * bx - xy * by) / determinant
+        found[:, 1] = (xx * by - xy * bx) / determinant
+        off = np.abs(slopes - found @ _ACROSS)
+        weight = used / np.maximum(off, 0.3)
+    mean_off = (off * used).sum(axis=1) / np.maximum(count, 1)
+    as_one = mean_off <= np.maximum(misfit, np.hypot(found[:, 0], found[:, 1]) / 3.0)
     return np.where(((count >= 3) & as_one)[:, None], found, np.nan)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from visup.agent import Severity
 from visup.rules.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
@@ -286,6 +287,27 @@ def walk(node: Node | None) -> Iterator[Node]:
 def calls(node: Node | None) -> tuple[Predicate | Measure, ...]:
     """All relations, facts and quantities that a formula names, in the order of the text."""
     return tuple(n for n in walk(node) if isinstance(n, Predicate | Measure))
+
+
+def named(node: Node, names: Mapping[str, str]) -> Node:
+    """The same tree with variables replaced by the names of objects."""
+    if isinstance(node, Predicate | Measure):
+        return replace(node, words=tuple(names.get(w, w) for w in node.words))
+    if isinstance(node, Number):
+        return node
+    changes: dict[str, Any] = {}
+    if isinstance(node, And | Or | Combined):
+        changes["parts"] = tuple(named(p, names) for p in node.parts)
+    elif isinstance(node, Since | Until | Comparison | Arithmetic):
+        changes = {"left": named(node.left, names), "right": named(node.right, names)}
+    else:
+        changes["part"] = named(node.part, names)
+    return replace(node, **changes)
+
+
+def mark(variable: str) -> str:
+    """What stands for a variable in a text until it is known which object it is."""
+    return f"\0{variable}\0"
 
 
 _LOOSER = (And, Or, Since, Until)

@@ -16,9 +16,10 @@ neither is a part of the other.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from visup.agent import Mind, ObjectBelief, Presence, Region
+from visup.agent.changing import replace
 from visup.rules.geometry import (
     DIRECTIONS,
     box_overlap,

@@ -25,6 +25,9 @@ _ANGLES = 2.0 * np.pi * np.arange(FAN) / FAN
 DIRECTIONS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 """(16, 2) unit vectors, evenly round the circle; the opposite of row k is row k + 8 modulo 16."""
 
+OPPOSITE = (np.arange(FAN) + FAN // 2) % FAN
+"""Row of the opposite of each of `DIRECTIONS`."""
+
 RCC8 = (
     "disconnected",
     "externally_connected",
@@ -99,9 +102,8 @@ def hull_separation(support: Floats) -> Floats:
     Returns:
         (M, M) float, pixels; positive apart, negative the depth of penetration.
     """
-    opposite = np.roll(support, -FAN // 2, axis=1)
-    apart: Floats = -(support[:, None, :] + opposite[None, :, :])
-    return np.asarray(apart.max(axis=2))
+    least: Floats = (support[:, None, :] + support[:, OPPOSITE]).min(axis=2)
+    return -least
 
 
 def outline_gap(a: Region, b: Region, near: float) -> float | None:

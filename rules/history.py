@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Presence
+from visup.agent.changing import replace
 from visup.rules.geometry import FAN, Floats, hull_separation, reach
 from visup.rules.tracks import merged_pairs, tracks
+
+ROOM = 64
+"""For how many further samples memory is made ready."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class History:
     """The last samples of all objects that relations are judged of.
+
+    Those of one moment are rows of the same memory as those of the moments before and after, which
+    is written to only where no history reaches yet: many minds are kept for little more than one.
 
     Attributes:
         ids: (M,) object ids, increasing.
@@ -23,6 +31,7 @@ class History:
         free: (T, M, 16) bool.
         separation: (T, M, M) signed hull distances, pixels.
         depth: (T, M) in the objects' units; NaN where unknown.
+        start: Row of their memory in which the arrays begin.
     """
 
     ids: tuple[int, ...] = ()
@@ -31,6 +40,12 @@ class History:
     free: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0, FAN), dtype=bool))
     separation: Floats = field(default_factory=lambda: np.zeros((0, 0, 0)))
     depth: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    start: int = 0
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """Times, and what was sampled at these."""
+        return self.times, self.support, self.free, self.separation, self.depth
 
 
 def sample(
@@ -56,32 +71,26 @@ def sample(
     """
     ids = tuple(b.id for b in objects)
     history = reindexed(history, ids)
-    kept = history.times > mind.time - window_s - 1e-6
+    old = int(history.times.searchsorted(mind.time - window_s - 1e-6, side="right"))
     least = window_s / most
     due = len(history.times) == 0 or mind.time - history.times[-1] >= least - 1e-6
     if not (due and observation.observed("region")):
-        return only(history, kept)
+        return without(history, old)
     joint = {i for pair in merged_pairs(mind) for i in pair}
     seen = [
         b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint
         for b in objects
     ]
-    reaches = [reach(b.region, mind.frame_size) for b in objects]
     support = np.full((len(ids), FAN), np.nan)
     free = np.zeros((len(ids), FAN), dtype=bool)
-    for i, (r, s) in enumerate(zip(reaches, seen, strict=True)):
+    for i, (b, s) in enumerate(zip(objects, seen, strict=True)):
         if s:
-            support[i], free[i] = r.support, r.free
+            now = reach(b.region, mind.frame_size)
+            support[i], free[i] = now.support, now.free
     depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
-    history = comparable(only(history, kept), mind)
-    return History(
-        ids,
-        np.append(history.times, mind.time),
-        np.concatenate([history.support, support[None]]),
-        np.concatenate([history.free, free[None]]),
-        np.concatenate([history.separation, hull_separation(support)[None]]),
-        np.concatenate([history.depth, np.where(seen, depth, np.nan)[None]]),
-    )
+    history = comparable(without(history, old), mind)
+    depth[[not s for s in seen]] = np.nan
+    return extended(history, (mind.time, support, free, hull_separation(support), depth))
 
 
 def covered(history: History, window_s: float) -> bool:
@@ -110,7 +119,8 @@ def comparable(history: History, mind: Mind) -> History:
     of = tracks(mind).of
     changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
     old = history.times[:, None] < changed[None, :] - 1e-9
-    if not old.any():
+    # Samples that are rid of them already stay the arrays that they are.
+    if not (old[:, :, None] & (history.support == history.support)).any():
         return history
     either = old[:, :, None] | old[:, None, :]
     return replace(
@@ -120,15 +130,40 @@ def comparable(history: History, mind: Mind) -> History:
     )
 
 
-def only(history: History, kept: NDArray[np.bool_]) -> History:
-    """The samples of a history for which `kept` is true."""
-    if kept.all():
+def without(history: History, old: int) -> History:
+    """A history without its `old` oldest samples."""
+    if not old:
         return history
-    return History(
-        history.ids,
-        history.times[kept],
-        history.support[kept],
-        history.free[kept],
-        history.separation[kept],
-        history.depth[kept],
-    )
+    times, support, free, separation, depth = (a[old:] for a in history.arrays)
+    return History(history.ids, times, support, free, separation, depth, history.start + old)
+
+
+def extended(history: History, row: tuple[Any, ...]) -> History:
+    """A history with one more sample: time, support, free, separation, depth."""
+    count = len(history.times)
+    end = history.start + count
+    memory: list[Any] = [a.base for a in history.arrays]
+    # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
+    if any(m is None or len(m) <= end for m in memory) or not np.isnan(memory[0][end]):
+        history = _with_room(history, max(ROOM, count))
+        end = count
+        memory = [a.base for a in history.arrays]
+    for values, new in zip(memory, row, strict=True):
+        values[end] = new
+    start = history.start
+    times, support, free, separation, depth = (m[start : end + 1] for m in memory)
+    return History(history.ids, times, support, free, separation, depth, start)
+
+
+def _with_room(history: History, more: int) -> History:
+    """The same history in memory of its own, with room for more samples."""
+    count = len(history.times)
+
+    def roomy(values: NDArray[Any]) -> NDArray[Any]:
+        blank = False if values.dtype == np.bool_ else np.nan
+        wide = np.full((count + more, *values.shape[1:]), blank, dtype=values.dtype)
+        wide[:count] = values
+        return wide[:count]
+
+    times, support, free, separation, depth = map(roomy, history.arrays)
+    return History(history.ids, times, support, free, separation, depth)

@@ -22,12 +22,13 @@ a cheapest path again and is dropped, which is exact too. `most_paths` bounds wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Hypothesis
+from visup.agent.changing import replace
 from visup.agent.viewing import orientations, swing_and_roll
 from visup.rules.turns import Floats, nearest_rotations, turned
 
@@ -50,7 +51,9 @@ class TreeSettings:
         independent_s: Looks that follow each other faster than this count in proportion.
         interpolate_deg: Hypotheses within this angle of each other are of one orientation, and
             tell together what lies between their views.
-        interpolate_similarity: How fast the weight of such a neighbour falls with its similarity.
+        interpolate_similarity: How fast the weight of such a neighbour falls with its similarity when
+            it is 20 degrees away. Similarity falls with the square of the angle, so that where views
+            stand wider apart a greater difference tells as much.
         most_hypotheses: Of one model and level, the most similar.
         most_paths: Of one model; the cheapest.
         lag: Levels for which paths are remembered.
@@ -190,7 +193,12 @@ def _between(orientation: Floats, similarity: Floats, settings: TreeSettings) ->
         return orientation
     swing, roll = swing_and_roll(orientation[:, None], orientation[None])
     near = np.hypot(swing, roll) < np.radians(settings.interpolate_deg)
-    weight = near * np.exp((similarity - similarity.max()) / settings.interpolate_similarity)
+    others = np.maximum(near.sum(axis=1) - 1, 1)
+    apart = np.maximum((near * swing).sum(axis=1) / others, 1e-3) / np.radians(20.0)
+    width = settings.interpolate_similarity * apart**2
+    best = np.where(near, similarity, -np.inf).max(axis=1)
+    less = np.minimum(similarity - best[:, None], 0.0)
+    weight = near * np.exp(less / width[:, None])
     return nearest_rotations(np.tensordot(weight, orientation, axes=1))
 
 

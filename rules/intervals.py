@@ -162,7 +162,7 @@ class Arrays:
 
     def held(self, v: Box) -> Box:
         """See `Algebra`."""
-        return np.stack((v[0] > 0, v[1] >= 0)).astype(np.float64)
+        return np.array((v[0] > 0, v[1] >= 0), dtype=np.float64)
 
     def added(self, v: Box, w: Box) -> Box:
         """See `Algebra`."""
@@ -173,7 +173,7 @@ class Arrays:
     def absolute(self, v: Box) -> Box:
         """See `Scalars`."""
         low, high = v
-        return np.stack((np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)))
+        return np.array((np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)))
 
     def times(self, v: Box, w: Box) -> Box:
         """See `Scalars`."""
@@ -192,7 +192,8 @@ class Arrays:
 
 def _widened(v: Box) -> Box:
     """What is no number becomes unknown."""
-    if np.isnan(v).any():
-        v[0][np.isnan(v[0])] = -inf
-        v[1][np.isnan(v[1])] = inf
+    unknown = v != v  # NaN is not equal to itself
+    if unknown.any():
+        v[0][unknown[0]] = -inf
+        v[1][unknown[1]] = inf
     return v

@@ -39,6 +39,7 @@ LASTS_S = 0.2
 """Errors of velocities are alike for so long, seconds."""
 
 LEAST_POINTS = 12
+LEAST_PLACES = 5
 _WILD = 1.5  # pixels beyond which a point counts less
 
 
@@ -203,48 +204,60 @@ def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Relative velocity over some time: (2,) pixels per second, and its covariance (2, 2)."""
+    """A relative velocity.
+
+    Attributes:
+        velocity: (2,) pixels per second.
+        covariance: (2, 2) of it.
+        span: Seconds over which it was taken.
+    """
 
     velocity: Floats
     covariance: Floats
+    span: float
 
-    @property
-    def speed(self) -> float:
-        """Pixels per second."""
-        return float(np.hypot(*self.velocity))
-
-    def strangeness(self, slow: float) -> float:
-        """How ill the motion suits bodies at rest, as a squared distance; 2 is usual for those.
+    def rest_odds(self, still: float, moving: float) -> float:
+        """Logarithm of the odds of rest against motion that this velocity tells.
 
         Args:
-            slow: Speed that still is rest, pixels per second. What is hardly known in a direction,
-                as the motion of a long arm along itself, weighs little.
+            still: Relative speed that still is rest, pixels per second.
+            moving: Usual relative speed of bodies that are not at rest. In a direction in which
+                velocity is hardly known, as that of a long arm along itself, nothing is told.
+
+        Returns:
+            At most what the ratio of both speeds allows; no bound below.
         """
-        allowed = self.covariance + slow**2 * np.eye(2)
-        return float(self.velocity @ np.linalg.solve(allowed, self.velocity))
+        rest = self.covariance + 0.5 * still**2 * np.eye(2)
+        free = self.covariance + moving**2 * np.eye(2)
+        v = self.velocity
+        near = v @ np.linalg.solve(rest, v) - v @ np.linalg.solve(free, v)
+        return float(0.5 * (np.log(np.linalg.det(free) / np.linalg.det(rest)) - near))
 
 
-def motions(joint: Joint, now: float, window_s: float) -> tuple[Motion, Motion, Motion] | None:
+def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
     """How two bodies move relative to each other.
 
     Args:
         joint: What is known of them.
         now: Seconds.
-        window_s: Over how long.
+        window_s: Over how long; longer where gaps leave too few places within.
 
     Returns:
-        Motion over the window and over its two halves; None while too little is known.
+        The motion up to now; None while too little is known.
     """
-    recent = np.array([p for p in joint.path if p[0] > now - window_s - 1e-6])
-    if len(recent) < 6 or recent[-1, 0] - recent[0, 0] < 0.7 * window_s:
+    if len(joint.path) <= LEAST_PLACES:
+        return None
+    path = np.array(joint.path)
+    inside = int(np.count_nonzero(path[:, 0] > now - window_s - 1e-6))
+    recent = path[-max(inside, LEAST_PLACES) :]
+    span = float(recent[-1, 0] - recent[0, 0])
+    if span < 0.6 * window_s:
         return None
     # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
     # longer, and is believed to be as large.
-    steps = np.diff(recent[:, 1:3], axis=0)
+    steps = np.diff(path[:, 1:3], axis=0)
     noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
-    middle = len(recent) // 2
-    first, second = recent[: middle + 1], recent[middle:]
-    return _motion(recent, noise), _motion(first, noise), _motion(second, noise)
+    return _motion(recent, noise)
 
 
 def _motion(path: Floats, noise: Floats) -> Motion:
@@ -252,11 +265,11 @@ def _motion(path: Floats, noise: Floats) -> Motion:
     t = path[:, 0] - path[:, 0].mean()
     lever = max(float(t @ t), 1e-9)
     slope, spread = t @ path[:, 1:3] / lever, noise / lever
-    flow = path[np.isfinite(path[:, 5]), 3:]
+    flow, span = path[np.isfinite(path[:, 5]), 3:], float(path[-1, 0] - path[0, 0])
     if not len(flow):
-        return Motion(slope, spread)
-    independent = max(1.0, (path[-1, 0] - path[0, 0]) / LASTS_S)
+        return Motion(slope, spread, span)
+    independent = max(1.0, span / LASTS_S)
     precision = np.linalg.inv(spread)
     certain = independent / flow[:, 2].mean() * np.eye(2)
     spread = np.linalg.inv(precision + certain)
-    return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread)
+    return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread, span)

@@ -81,7 +81,7 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> 
     Returns:
         The states after; `since` is when the believed state began to show.
     """
-    if np.array_equal(wanted, latch.pending) and np.array_equal(wanted, latch.state):
+    if _alike(wanted, latch.pending) and _alike(wanted, latch.state):
         return latch  # Nothing wants to change, as nearly always.
     same = wanted == latch.pending
     pending_since = np.where(same, latch.pending_since, now)
@@ -93,6 +93,10 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> 
         wanted.astype(np.int8),
         pending_since,
     )
+
+
+def _alike(a: Codes, b: Codes) -> bool:
+    return a.shape == b.shape and a.tobytes() == b.tobytes()
 
 
 def hold_sign(values: Floats, before: Codes, enter: float | Floats, leave: float | Floats) -> Codes:
@@ -111,12 +115,14 @@ def hold_sign(values: Floats, before: Codes, enter: float | Floats, leave: float
     Returns:
         Signs of the same shape; `UNKNOWN` for NaN.
     """
-    sign = (values > 0.0).astype(np.int8) * np.int8(2)
+    sign = (values > 0.0).view(np.int8) * np.int8(2)
     size = np.abs(values)
     held = np.where(before == UNKNOWN, size > 0.5 * (enter + leave), before == sign)
-    apart = (size > enter) | (held & ~(size <= leave))
+    held &= size > leave
+    held |= size > enter
     # What is in the band but was on the other side of zero has crossed it: no sign.
-    code = np.where(apart, sign, np.int8(WITHIN))
-    if np.isnan(size).any():
-        code = np.where(np.isnan(size), np.int8(UNKNOWN), code)
+    code = np.where(held, sign, np.int8(WITHIN))
+    unknown = values != values  # NaN is not equal to itself
+    if unknown.any():
+        code[unknown] = UNKNOWN
     return code

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief
 from visup.rules.distance import signed_gap
-from visup.rules.fit import binned, common_motion, reach_slopes, slope_noise, theil_sen
+from visup.rules.fit import binned, common_motion, slope_noise, slopes_of_spans, theil_sen
 from visup.rules.geometry import Floats, outline_gap
 from visup.rules.history import History, covered
 from visup.rules.judge import JudgeSettings
@@ -163,15 +164,16 @@ class Measured:
 
 def contact_time(gap: Floats, rate: Floats) -> Floats:
     """Seconds until gaps are closed at these rates; see `Measured.time_to_contact`."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        closing = np.where(rate < 0.0, gap / -rate, np.inf)
-    closing = np.where(gap <= 0.0, 0.0, closing)
-    return np.where(np.isnan(gap) | np.isnan(rate), np.nan, closing)
+    closing = np.full(gap.shape, np.inf)
+    np.divide(gap, -rate, out=closing, where=rate < 0.0)
+    closing[gap <= 0.0] = 0.0
+    closing[(gap != gap) | (rate != rate)] = np.nan  # NaN is not equal to itself
+    return closing
 
 
 def scale(frame_size: tuple[int, int]) -> float:
     """Image diagonal, pixels; what thresholds are relative to."""
-    return float(np.hypot(*frame_size))
+    return hypot(*frame_size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,11 +206,11 @@ class Measuring:
         if len(i):
             slope, sigma = self._parting(slope, sigma, gaps, objects, h, mind)
         stale = np.array([mind.time - b.last_seen > 0.5 * self.settings.window_s for b in objects])
-        if m:
+        if stale.any():
             slope[stale, :] = slope[:, stale] = np.nan
         whole, early, late = self._velocities(h, mind)
         spread = self._velocity_noise(h, mind)
-        apart = np.linalg.norm(whole[:, None] - whole[None], axis=2)
+        apart = distances(whole)
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
         return Measured(
             h.ids,
@@ -216,7 +218,7 @@ class Measuring:
             slope,
             sigma,
             apart,
-            np.linalg.norm(whole, axis=1),
+            np.sqrt(whole[:, 0] * whole[:, 0] + whole[:, 1] * whole[:, 1]),
             early,
             late,
             depth,
@@ -232,13 +234,15 @@ class Measuring:
         slope, sigma = theil_sen(*binned(times, distance, s.bins))
         noise = np.sqrt(2.0) * s.judge.noise_px
         sigma = np.maximum(sigma, slope_noise(times, noise))
-        recent = times > times[-1] - s.quick_window_s
-        quick, spread = theil_sen(*binned(times[recent], distance[recent], s.bins))
-        spread = np.maximum(spread, slope_noise(times[recent], noise))
+        recent = int(times.searchsorted(times[-1] - s.quick_window_s, side="right"))
+        times, distance = times[recent:], distance[recent:]
+        quick, spread = theil_sen(*binned(times, distance, s.bins))
+        spread = np.maximum(spread, slope_noise(times, noise))
         least = 2.0 * s.rate_enter * scale(mind.frame_size)
-        with np.errstate(invalid="ignore"):
-            turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
-            turned &= np.sign(quick) != np.sign(slope)
+        turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
+        if not turned.any():
+            return slope, sigma
+        turned &= np.sign(quick) != np.sign(slope)
         return np.where(turned, quick, slope), np.where(turned, spread, sigma)
 
     def _parting(
@@ -254,6 +258,8 @@ class Measuring:
         s, diagonal = self.settings, scale(mind.frame_size)
         if not len(h.times):
             return slope, sigma  # nobody has looked for longer than the window
+        if not (gaps <= s.parting_gap * diagonal).any():
+            return slope, sigma
         speed, spread = parting_speed(objects, h.support[-1], mind.time)
         with np.errstate(invalid="ignore"):
             sure = speed > np.maximum(2.0 * s.rate_enter * diagonal, s.quick_sigmas * spread)
@@ -261,8 +267,8 @@ class Measuring:
         return np.where(sure, speed, slope), np.where(sure, spread, sigma)
 
     def _velocity_noise(self, h: History, mind: Mind) -> float:
-        recent = h.times > mind.time - self.settings.motion_window_s
-        return slope_noise(h.times[recent], self.settings.judge.noise_px)
+        recent = _recent(h, mind, self.settings.motion_window_s)
+        return slope_noise(h.times[recent:], self.settings.judge.noise_px)
 
     def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
         """Over the window of motion, and over its two halves."""
@@ -270,16 +276,11 @@ class Measuring:
         unknown = np.full((m, 2), np.nan)
         if m == 0 or not covered(h, self.settings.window_s):
             return unknown, unknown, unknown
-        recent = h.times > mind.time - self.settings.motion_window_s
-        times, support, free = h.times[recent], h.support[recent], h.free[recent]
+        recent = _recent(h, mind, self.settings.motion_window_s)
+        times, support, free = h.times[recent:], h.support[recent:], h.free[recent:]
         half = len(times) // 2
         spans = (slice(None), slice(None, half), slice(half, None))
-        fits = [reach_slopes(times[p], support[p], free[p]) for p in spans]
-        found = common_motion(
-            np.concatenate([slopes for slopes, _ in fits]),
-            np.concatenate([usable for _, usable in fits]),
-            misfit,
-        )
+        found = common_motion(*slopes_of_spans(times, support, free, spans), misfit)
         return found[:m], found[m : 2 * m], found[2 * m :]
 
     def _gaps(
@@ -301,7 +302,12 @@ class Measuring:
         return square(found, m)
 
 
-def at_rest(now: Measured, settings: RelationSettings, diagonal: float) -> NDArray[np.bool_]:
+def _recent(h: History, mind: Mind, window_s: float) -> int:
+    """Number of the first sample of a window that ends now."""
+    return int(h.times.searchsorted(mind.time - window_s, side="right"))
+
+
+def at_rest(now: Measured, settings: RelationSettings, *diagonals: float) -> NDArray[np.bool_]:
     """Whether bodies are at rest to each other: over the window, and in both of its halves.
 
     The halves are looked at so that a body that bounces off, whose mean relative velocity is zero
@@ -310,14 +316,20 @@ def at_rest(now: Measured, settings: RelationSettings, diagonal: float) -> NDArr
     Args:
         now: Velocities.
         settings: Thresholds.
-        diagonal: Image diagonal, pixels.
+        diagonals: Image diagonals, or times as much, pixels; each widens the limits.
 
     Returns:
-        (M, M) bool; false where a velocity is unknown.
+        (K, M, M) bool, for each of them; false where a velocity is unknown.
     """
-    early = np.linalg.norm(now.early[:, None] - now.early[None], axis=2)
-    late = np.linalg.norm(now.late[:, None] - now.late[None], axis=2)
-    with np.errstate(invalid="ignore"):
-        halves = np.maximum(early, late) < settings.still_half * diagonal
-        rest: NDArray[np.bool_] = halves & (now.relative_speed < settings.still_speed * diagonal)
+    halves = np.maximum(distances(now.early), distances(now.late))
+    wide = np.array(diagonals)[:, None, None]
+    rest: NDArray[np.bool_] = halves < settings.still_half * wide
+    rest &= now.relative_speed < settings.still_speed * wide
     return rest
+
+
+def distances(vectors: Floats) -> Floats:
+    """(M, M) lengths of the differences of all pairs of (M, 2) vectors."""
+    x, y = (vectors[:, None] - vectors[None]).transpose(2, 0, 1)
+    apart: Floats = np.sqrt(x * x + y * y)
+    return apart

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from visup.agent import ObjectBelief, Presence
+from visup.agent.changing import replace
 from visup.rules.geometry import moved, shared_pixels
 from visup.rules.tracks import Track
 from visup.rules.work import Work

@@ -11,9 +11,9 @@ from visup.rules.sentences import sentence
 
 NARRATIVE = "rules.narrative"
 TEMPLATES = {
-    "converging": "{0} and {1} appear to be converging.",
-    "diverging": "{0} and {1} appear to be moving apart.",
-    "keeping_distance": "{0} and {1} appear to be keeping their distance.",
+    "converging": "{0} and {1} {are} converging.",
+    "diverging": "{0} and {1} {are} moving apart.",
+    "keeping_distance": "{0} and {1} {are} keeping their distance.",
 }
 Told = tuple[str, float]
 
@@ -75,7 +75,7 @@ def _event(relation: Relation, mind: Mind, observation: Observation) -> Event:
         "relation",
         observation.time,
         observation.frame_index,
-        sentence(mind, TEMPLATES[relation.name], *relation.objects),
+        sentence(mind, TEMPLATES[relation.name], *relation.objects, confidence=relation.confidence),
         relation.objects,
         relation.confidence,
         data=MappingProxyType(data),

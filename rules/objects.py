@@ -8,7 +8,7 @@ mind's memory, so that an object keeps its id when the tracker gives its region 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from visup.agent import (
@@ -21,6 +21,7 @@ from visup.agent import (
     Presence,
     Region,
 )
+from visup.agent.changing import replace
 
 OWNERS = "rules.objects"
 KNOWN_KINDS = frozenset({"region", "hypothesis", "depth", "health"})

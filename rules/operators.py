@@ -123,13 +123,18 @@ class Ends(NamedTuple):
 
     Attributes:
         then: Time of the last sample.
-        until: (2, ...) microseconds up to which each bound was not as wanted.
+        until: (2, ...) microseconds up to which each bound was not as wanted; of those that are not
+            as wanted now it is told once they are again.
         broken: (2, ...) whether it is not as wanted now.
+        latest: Latest time of `until`.
+        lasting: The interval once that is before the window.
     """
 
     then: int
     until: Any
     broken: Any
+    latest: int
+    lasting: Any
 
 
 @dataclass(frozen=True)
@@ -148,20 +153,37 @@ class Lasting:
 
     def step(self, state: Ends | None, now: int, *values: Any) -> tuple[Ends, Any]:
         """See `Operator`."""
-        value = values[0] if self.kind == "always" else self.algebra.negated(values[0])
-        broken = value < 0
+        value = values[0]
+        broken = value < 0 if self.kind == "always" else (value > 0)[::-1]
+        state = self._after(state, now, broken)
+        if state.latest <= now - self.high:
+            return state, state.lasting
+        return state, self._result(state.broken | (state.until > now - self.high))
+
+    def _after(self, state: Ends | None, now: int, broken: Any) -> Ends:
         if state is None:
-            until = np.full_like(value, LONG_AGO, dtype=np.int64)
+            until = np.full_like(broken, LONG_AGO, dtype=np.int64)
             until[0] = now  # before the first sample nothing is known: it may have been false
-        elif now - state.then > REACH:
-            until = np.where(state.broken, state.then + REACH, state.until)
+            return Ends(now, until, broken, now, self._result(broken))
+        until, latest = state.until, state.latest
+        # Nearly always all is as it was, and the state but for its time can be shared.
+        same = broken.tobytes() == state.broken.tobytes()
+        if now - state.then > REACH:
+            until = np.where(state.broken, state.then + REACH, until)
             until[0] = now
-        else:
-            until = np.where(state.broken, now, state.until) if state.broken.any() else state.until
-        result = np.where(broken | (until > now - self.high), -np.inf, np.inf)
-        if self.kind == "once":
-            result = self.algebra.negated(result)
-        return Ends(now, until, broken), result
+            latest = now
+        elif not same:
+            over = state.broken & ~broken
+            if over.any():
+                until, latest = np.where(over, now, until), now
+        if same:
+            return Ends(now, until, state.broken, latest, state.lasting)
+        return Ends(now, until, broken, latest, self._result(broken))
+
+    def _result(self, broken: Any) -> Any:
+        low, high = (-np.inf, np.inf) if self.kind == "always" else (np.inf, -np.inf)
+        result = np.where(broken, low, high)
+        return result if self.kind == "always" else result[::-1]
 
     @property
     def kept(self) -> int:
@@ -170,11 +192,10 @@ class Lasting:
 
     def rows(self, state: Ends, now: int, pick: Pick) -> Ends:
         """See `Operator`."""
-        return Ends(
-            state.then,
-            pick(state.until, (state.then + REACH, LONG_AGO)),
-            pick(state.broken, (True, False)),
-        )
+        until = pick(state.until, (state.then + REACH, LONG_AGO))
+        broken = pick(state.broken, (True, False))
+        latest = int(until.max(initial=LONG_AGO))
+        return Ends(state.then, until, broken, latest, self._result(broken))
 
 
 class SoFarState(NamedTuple):
@@ -379,8 +400,8 @@ class Latching:
         entered = self.algebra.constant(FALSE)[0] > 0 if state is None else state
         enter, leave = values
         result = self.algebra.choose(entered, leave, enter)
-        surely, possibly = self.algebra.held(result)
-        return (surely > 0) | (entered & (possibly > 0)), result
+        low, high = result
+        return (low > 0) | (entered & (high >= 0)), result
 
     @property
     def kept(self) -> int:

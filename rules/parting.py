@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from visup.agent import ObjectBelief
-from visup.rules.geometry import DIRECTIONS, FAN, Floats
+from visup.rules.geometry import DIRECTIONS, OPPOSITE, Floats
 
 
 def parting_speed(
@@ -35,9 +35,8 @@ def parting_speed(
         [b.region.velocity if k else unknown for b, k in zip(objects, known, strict=True)]
     ).reshape(m, 2)
     spread = np.array([b.region.velocity_sigma for b in objects])
-    opposite = np.roll(support, -FAN // 2, axis=1)
-    apart = -(support[:, None, :] + opposite[None, :, :])
+    reach = support[:, None, :] + support[:, OPPOSITE]
     # The direction, from the first to the second, in which the hulls overlap least.
-    towards = DIRECTIONS[apart.argmax(axis=2)]
+    towards = DIRECTIONS[reach.argmin(axis=2)]
     speed: Floats = ((velocity[None] - velocity[:, None]) * towards).sum(axis=2)
     return speed, np.hypot(spread[:, None], spread[None])

@@ -9,13 +9,14 @@ measured (`spin.py`). How much dearer the paths of other models are tells who th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
 
 import numpy as np
 
 from visup.agent import Hypothesis, Mind, ObjectBelief, Observation, Outcome, Pose, Presence
+from visup.agent.changing import replace
 from visup.agent.viewing import views
 from visup.rules.interpretation import (
     NONE,

@@ -106,11 +106,13 @@ class Program:
         algebra: Of the intervals.
         runs: The steps.
         operators: What remembers, with the axes of its objects, in the order of their states.
+        looks: What is looked up, each with its axes.
     """
 
     algebra: Any
     runs: list[Run] = field(default_factory=list)
     operators: list[tuple[Operator, frozenset[int]]] = field(default_factory=list)
+    looks: list[tuple[Predicate | Measure, tuple[int, ...]]] = field(default_factory=list)
     places: dict[Hashable, int] = field(default_factory=dict)
 
     def step(self, moment: Moment) -> list[Any]:
@@ -354,8 +356,12 @@ class Compiler:
         axes = tuple(axis[w] for w in node.words if w in axis)
         words = tuple(axis.get(w, w) for w in node.words)
         key = ("look", type(node).__name__, node.name, words)
-        step = self.program.add(key, lambda: lambda values, m: m.look(node, axes))
-        return Place(step, 0, frozenset(axes), certain)
+
+        def run() -> Run:
+            self.program.looks.append((node, axes))
+            return lambda values, m: m.look(node, axes)
+
+        return Place(self.program.add(key, run), 0, frozenset(axes), certain)
 
     def _quantified(self, node: Quantified, scope: Scope) -> Place:
         axis = len(scope)

@@ -44,7 +44,7 @@ def components(places: Floats, velocities: Floats) -> tuple[Floats, Floats]:
     vx, vy = velocities[j].T
     # With y down, a positive cross product turns to the right; seen from the second, the line
     # runs the other way.
-    speeds = np.stack([-(ux * x + uy * y), vx * x + vy * y, x * uy - y * ux, y * vx - x * vy])
+    speeds = np.array((-(ux * x + uy * y), vx * x + vy * y, x * uy - y * ux, y * vx - x * vy))
     return speeds, length
 
 

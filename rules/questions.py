@@ -8,7 +8,7 @@ answered, settles by itself, or its object is gone.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import (
@@ -21,6 +21,7 @@ from visup.agent import (
     Presence,
     Question,
 )
+from visup.agent.changing import replace
 from visup.rules.sentences import called, spaced
 
 QUESTIONS = "rules.questions"

@@ -14,6 +14,7 @@ Holes within an outline count as outside.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from visup.agent import Region
 from visup.rules.geometry import RCC8, Floats, signed_distances
 from visup.rules.latch import ABOVE, BELOW, UNKNOWN, WITHIN, Codes
-from visup.rules.pairs import pairs
+from visup.rules.pairs import Indices, pairs
 
 DC, EC, PO, EQ, TPP, NTPP, TPPI, NTPPI = range(8)
 CONVERSE: Codes = np.array(
@@ -40,11 +41,19 @@ def edge_differences(boxes: Floats) -> Floats:
         (8, P) pixels, for each pair (a, b) and each axis x, y: start of a after that of b; end of b
         after that of a; end of b after the start of a; end of a after the start of b.
     """
-    i, j = pairs(len(boxes))
-    edges = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1).T
-    low, high = edges[:2], edges[2:]
-    low_a, low_b, high_a, high_b = low[:, i], low[:, j], high[:, i], high[:, j]
-    return np.concatenate([low_a - low_b, high_b - high_a, high_b - low_a, high_a - low_b])
+    edges = np.array(boxes)
+    edges[:, 2:] += edges[:, :2]
+    plus, minus = _edges_of(len(boxes))
+    return edges.take(plus) - edges.take(minus)
+
+
+@lru_cache(maxsize=64)
+def _edges_of(m: int) -> tuple[Indices, Indices]:
+    """Places (8, P) of what is subtracted from what, among (M, 4) edges: left, top, right, bottom."""
+    low = np.array([[0], [1]])
+    a, b = (4 * k + low for k in pairs(m))
+    plus, minus = [a, b + 2, b + 2, a + 2], [b, a + 2, a, b]
+    return np.concatenate(plus), np.concatenate(minus)
 
 
 def from_signs(signs: Codes) -> Codes:
@@ -57,8 +66,15 @@ def from_signs(signs: Codes) -> Codes:
         (P,) codes into `RCC8`: what a is to b.
     """
     nested, overlap = signs[:4], signs[4:].min(axis=0)
-    least, most = nested.min(axis=0), nested.max(axis=0)
-    code = np.full(signs.shape[1], PO, dtype=np.int8)
+    codes: Codes = _RELATIONS[overlap, nested.min(axis=0), nested.max(axis=0)]
+    return codes
+
+
+def _relations() -> Codes:
+    """Relation by the codes of the least overlap and of the least and most nested order; -1 is last."""
+    codes = np.array([BELOW, WITHIN, ABOVE, UNKNOWN])
+    overlap, least, most = np.meshgrid(codes, codes, codes, indexing="ij")
+    code = np.full(overlap.shape, PO, dtype=np.int8)
     code[least >= WITHIN] = TPP
     code[least == ABOVE] = NTPP
     code[most <= WITHIN] = TPPI
@@ -68,6 +84,9 @@ def from_signs(signs: Codes) -> Codes:
     code[overlap == BELOW] = DC
     code[np.minimum(overlap, least) == UNKNOWN] = UNKNOWN
     return code
+
+
+_RELATIONS = _relations()
 
 
 def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:

@@ -26,7 +26,7 @@ How to read them off a mind:
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from visup.agent import (
     RelationTable,
     Truth,
 )
+from visup.agent.changing import replace
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES
@@ -140,9 +141,12 @@ class Kept:
     smooth: Smooth = field(default_factory=lambda: _no_smooth())
 
 
+NOTHING_KEPT = Kept()
+
+
 def measured(mind: Mind) -> Measured:
     """The quantities of the last step, as `Relations` left them in the mind."""
-    kept: Kept = mind.memory.get(RELATIONS, Kept())
+    kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
     return kept.measured
 
 
@@ -166,7 +170,7 @@ def related(mind: Mind, name: str, a: int, b: int) -> Truth:
 
 def qtc(mind: Mind, a: int, b: int) -> str | None:
     """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
-    kept: Kept = mind.memory.get(RELATIONS, Kept())
+    kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
     k, turned = RelationTable(kept.history.ids).pair(a, b)
     if k < 0:
         return None
@@ -180,20 +184,27 @@ class Relations:
     """Thinker of the cogitate phase: judges all relations of all pairs of present objects."""
 
     settings: RelationSettings = field(default_factory=RelationSettings)
+    _lasts: Floats = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_lasts", self._durations())
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
         s = self.settings
-        kept: Kept = mind.memory.get(RELATIONS, Kept())
+        kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
         objects = mind.present()
         before = _of_these(kept, tuple(b.id for b in objects), mind.time)
         history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
         now = Measuring(s)(history, objects, mind, kept.measured)
         smooth = self._smooth(before.smooth, now, objects, mind)
         wants = self._wanted(before.latch.state, history, now, smooth, mind)
-        latch = step(before.latch, wants, mind.time, self._durations())
-        held = np.stack([from_signs(latch.state[ORDER]), from_outline_signs(latch.state[OUTLINE])])
-        rcc8 = step(before.rcc8, held, mind.time, 0.0)
+        latch = step(before.latch, wants, mind.time, self._lasts)
+        rcc8 = before.rcc8
+        if latch is not before.latch:  # else these follow from what is as it was
+            state = latch.state
+            held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
+            rcc8 = step(rcc8, held, mind.time, 0.0)
         kept = Kept(history, now, latch, rcc8, smooth)
         table = RelationTable(now.ids, self._columns(kept, mind))
         return Outcome(replace(mind, relations=table).remember(RELATIONS, kept))
@@ -299,9 +310,9 @@ class Relations:
         held = before == 1
         least = 2 * s.still_speed * diagonal * np.where(held, s.moving_exit, 1.0)
         moves = np.minimum(now.speed[i], now.speed[j]) > least
-        rest = at_rest(now, s, diagonal)[i, j]
-        rest |= held & at_rest(now, s, diagonal * s.together_exit)[i, j]
-        wanted = (rest & moves).astype(np.int8)
+        rest = at_rest(now, s, diagonal, diagonal * s.together_exit)
+        rest = rest[0][i, j] | (held & rest[1][i, j])
+        wanted: Codes = (rest & moves).astype(np.int8)
         wanted[np.isnan(now.relative_speed[i, j])] = UNKNOWN
         return wanted
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
+from visup.agent.changing import replace
 from visup.rules.explain import evidence
-from visup.rules.facts import RELATION_NAMES, Facts
-from visup.rules.formula import Predicate, Rule, calls
+from visup.rules.facts import Facts
+from visup.rules.formula import Rule
 from visup.rules.operators import SPACING
 from visup.rules.sentences import sentence, with_names
 from visup.rules.units import ticks
-from visup.rules.verdicts import States, Values, rerowed, ruled
+from visup.rules.verdicts import Ruled, States, Values, rerowed, ruled
 
 SAFETY = "rules.safety"
 MOST_RETOLD = 3
@@ -70,6 +71,11 @@ class RuleThinker:
     """
 
     rules: tuple[Rule, ...]
+    _prepared: Ruled = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # Rules are long trees: to look up by them what was prepared costs as much as a rule.
+        object.__setattr__(self, "_prepared", ruled(self.rules))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
@@ -78,7 +84,7 @@ class RuleThinker:
             old = Kept(self.rules)
         if old.now is not None and now - old.now < SPACING:
             return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
-        prepared, facts = ruled(self.rules), Facts(mind)
+        prepared, facts = self._prepared, Facts(mind)
         before = prepared.program.fresh if old.now is None else old.after
         if old.now is not None and old.ids != facts.ids:
             before = rerowed(prepared, before, now, old.ids, facts.ids)
@@ -130,7 +136,7 @@ def _raised(rule: Rule, ids: tuple[int, ...], values: Values, before: Held | Non
     mind = values.facts.mind
     objects = ids if before is None else before.concern.objects
     words = with_names(rule.say, rule.variables)
-    cause = sentence(mind, words, *objects, confidence=confidence(rule, ids, mind))
+    cause = sentence(mind, words, *objects, confidence=confidence(rule, ids, values))
     concern = Concern(rule.name, objects, rule.severity, cause, evidence(rule, ids, values))
     return Held(concern, _until(rule, mind.time), mind.time)
 
@@ -139,15 +145,13 @@ def _until(rule: Rule, now: float) -> float:
     return now + (rule.hold.base if rule.hold is not None else 0.0)
 
 
-def confidence(rule: Rule, ids: tuple[int, ...], mind: Mind) -> float:
+def confidence(rule: Rule, ids: tuple[int, ...], values: Values) -> float:
     """The least confidence of the relations that `when` names of these objects and that are true."""
-    objects = dict(zip(rule.variables, ids, strict=True))
+    objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
     found = [
         r.confidence
-        for call in calls(rule.when)
-        if isinstance(call, Predicate) and call.name in RELATION_NAMES
-        if set(call.words) <= objects.keys()
-        if (r := mind.relation(call.name, *(objects[w] for w in call.words))) is not None
+        for call in values.prepared.related(rule)
+        if (r := mind.relation(call.name, *[objects[w] for w in call.words])) is not None
         if r.truth is Truth.TRUE
     ]
     return min(found, default=1.0)

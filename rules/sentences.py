@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from visup.agent.mind import UNKNOWN_OBJECT, Mind
 
 ORDINALS = ("an", "a second", "a third", "a fourth", "a fifth", "a sixth", "a seventh", "an eighth")
+SURE, LIKELY = 0.95, 0.5
+"""Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
+
+# As it is, and its infinitive. What stands in braces in a template is told as its confidence allows.
+_SINGULAR = {
+    "is": "be",
+    "enters": "enter",
+    "leaves": "leave",
+    "comes": "come",
+    "begins": "begin",
+    "reappears": "reappear",
+}
+_PLURAL = {"are": "be"}
+VERBS = frozenset(_SINGULAR) | frozenset(_PLURAL)
 _MENTION = re.compile(r"\{(\w+)\}")
+_DOUBLED = re.compile(r",(?=\s*[,.;:!?])")
 
 
 def believed_name(mind: Mind, object_id: int) -> str | None:
@@ -61,9 +77,27 @@ def short(mind: Mind, object_id: int) -> str:
 
 def seems(confidence: float) -> str:
     """The verb that a confidence earns: 'is', 'appears to be' or 'may be'."""
-    if confidence >= 0.95:
-        return "is"
-    return "appears to be" if confidence >= 0.5 else "may be"
+    return graded("is", confidence)
+
+
+def graded(verb: str, confidence: float) -> str:
+    """A verb as strong as a confidence allows.
+
+    Args:
+        verb: One of `VERBS`.
+        confidence: 0 to 1.
+
+    Example:
+        >>> [graded("leaves", c) for c in (1.0, 0.8, 0.3)]
+        ['leaves', 'appears to leave', 'may leave']
+        >>> graded("are", 0.8)
+        'appear to be'
+    """
+    infinitive = _SINGULAR.get(verb) or _PLURAL[verb]
+    if confidence >= SURE:
+        return verb
+    appears = "appears" if verb in _SINGULAR else "appear"
+    return f"{appears} to {infinitive}" if confidence >= LIKELY else f"may {infinitive}"
 
 
 def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> str:
@@ -71,11 +105,12 @@ def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> s
 
     Args:
         mind: The mind.
-        template: Text with `{0}`, `{1}`, ... for the objects in the order of `ids`, and `{is}` for
-            the verb. An object's first mention describes it, later ones say 'it' when it is the
-            only one, else 'the first object', 'the second object'.
+        template: Text with `{0}`, `{1}`, ... for the objects in the order of `ids`, and a verb of
+            `VERBS`, such as `{is}`, for what its confidence grades. An object's first mention
+            describes it, later ones say 'it' when it is the only one, else 'the first object',
+            'the second object'.
         ids: The objects.
-        confidence: 0 to 1; chooses the verb for `{is}`.
+        confidence: 0 to 1; how strong the verb is.
 
     Returns:
         The sentence, with a capital and the commas that the descriptions need.
@@ -84,8 +119,8 @@ def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> s
 
     def fill(match: re.Match[str]) -> str:
         word = match.group(1)
-        if word == "is":
-            return seems(confidence)
+        if word in VERBS:
+            return graded(word, confidence)
         if not word.isdecimal() or int(word) >= len(ids):
             return match.group(0)
         return _mention(mind, ids[int(word)], mentioned)
@@ -93,6 +128,7 @@ def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> s
     return tidy(_MENTION.sub(fill, template))
 
 
+@lru_cache(maxsize=256)
 def with_names(template: str, names: tuple[str, ...]) -> str:
     """The same template with its named objects numbered: '{a}' becomes '{0}' for names ('a', ...)."""
 
@@ -110,7 +146,7 @@ def mentions(template: str) -> tuple[str, ...]:
 
 def tidy(text: str) -> str:
     """Close the commas round 'believed to be', and begin with a capital."""
-    text = re.sub(r",(?=\s*[,.;:!?])", "", text)
+    text = _DOUBLED.sub("", text)
     return text[:1].upper() + text[1:]
 
 

@@ -30,4 +30,7 @@ def smoothed(before: Floats, now: Floats, seconds: float, jump: float) -> Floats
     """
     step = now - before
     share = 1.0 - exp(-seconds / TAU_S)
-    return np.where(np.abs(step) <= jump, before + share * step, now)
+    steady = np.abs(step) <= jump
+    step *= share
+    step += before
+    return np.where(steady, step, now)

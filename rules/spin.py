@@ -42,7 +42,7 @@ class SpinSettings(FitSettings):
 
     window_s: float = 40.0
     recent_s: float = 4.0
-    changes_s: tuple[float, ...] = (3.0, 7.0, 14.0)
+    changes_s: tuple[float, ...] = (3.0, 6.0, 10.0, 15.0, 22.0)
     change: float = 8.0
     unchanged: float = 2.0
     gain: float = 4.0
@@ -171,12 +171,12 @@ def _changed(
     turns, pieces = thinned(turns, pieces, settings)
     times = [now - ago for ago in settings.changes_s]
     inside = [t for t in times if turns.times[0] + 1.0 < t < turns.times[-1] - 1.0]
-    same = [Fit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
-    promises = [fit.promise() for fit in same]
-    worth = settings.gain * 2 * steady.cost / steady.residuals
-    if not promises or max(promises) < worth:
+    # What one step saves tells where to look: the promise of a step alone is often an empty one.
+    tried = [Fit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
+    tried = [fit for fit in tried if fit.run(1)]
+    if not tried or min(fit.cost for fit in tried) > steady.cost:
         return None
-    change = inside[int(np.argmax(promises))]
+    change = min(tried, key=lambda fit: fit.cost).since
     fit = Fit(turns, pieces, np.stack([before, after]), change, settings)
     believed = fit.run(2 * settings.steps) and fit.contrast() > settings.change
     return fit if believed and _gain(steady, fit) > settings.gain else None
@@ -188,9 +188,11 @@ def _gain(steady: Fit, changed: Fit) -> float:
 
 
 def _rate_of(fit: Fit, settings: SpinSettings) -> Rate:
-    covariance = fit.covariance(-1)
+    covariance, span = fit.covariance(-1), max(fit.span, 1e-6)
     # However still the views stand, the object may have turned a part of the way to the next.
-    unseen = (np.radians(settings.view_deg) / max(fit.span, 1e-6)) ** 2
+    unseen = (np.radians(settings.view_deg) / span) ** 2
+    stuck = settings.view_share * float(np.linalg.norm(fit.rates[-1]))
+    unseen += min(stuck, np.radians(settings.view_most_deg) / span) ** 2
     scatter = float(np.trace(covariance))
     share = scatter / (scatter + 3 * unseen)
     before = fit.rates[0] if fit.change is not None else None

@@ -32,6 +32,8 @@ class FitSettings:
         most_pieces: Pieces that are used; the longest.
         steps: Gauss-Newton steps from a start that is near.
         view_deg: What the discreteness of views leaves unknown of the turn over a window.
+        view_share: Between two views the turn is told too small or too great by this share, ...
+        view_most_deg: ... over a window by no more than this, as it is made good at the next view.
         change_sigma_s: How far from where it is looked for a change may be.
         fastest_deg_s: Greatest rate that is looked for.
     """
@@ -45,6 +47,8 @@ class FitSettings:
     most_pieces: int = 4
     steps: int = 2
     view_deg: float = 3.5
+    view_share: float = 0.3
+    view_most_deg: float = 8.0
     change_sigma_s: float = 2.0
     fastest_deg_s: float = 120.0
 

@@ -7,16 +7,20 @@ both serve to tell an object that left from one that something else hides.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
 
 import numpy as np
 
 from visup.agent import Mind, Region
-from visup.rules.geometry import Box, box_overlap, grow, shift
+from visup.agent.changing import replace
+from visup.rules.geometry import Box, box_overlap, grow, shared_pixels, shift
 
 TRACKS = "rules.presence"
+LEAVES_S = 6.0
+"""What is leaving is out of sight after so long, seconds."""
+
 Fix = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
 
@@ -168,16 +172,22 @@ def expected_outside(track: Track, now: float, frame_size: tuple[int, int]) -> f
 
 
 def heading_out(track: Track, frame_size: tuple[int, int], margin: int = 3) -> bool:
-    """Whether the object was at an edge of the image and moving over it."""
+    """Whether the object was at an edge of the image, moving over it, and may be out of sight soon.
+
+    What would need longer than `LEAVES_S` at its pace, such as an arm that reaches far into the image and
+    whose drift is noise, is not leaving whatever happens to it.
+    """
     x, y, w, h = track.region.bbox
     vx, vy = track.drift
     width, height = frame_size
-    return (
-        (x <= margin and vx < -1.0)
-        or (y <= margin and vy < -1.0)
-        or (x + w >= width - margin and vx > 1.0)
-        or (y + h >= height - margin and vy > 1.0)
+    # For each edge: how near it the box is, its pace towards it, and the way to go until it is out.
+    edges = (
+        (x, -vx, x + w),
+        (y, -vy, y + h),
+        (width - x - w, vx, width - x),
+        (height - y - h, vy, height - y),
     )
+    return any(gap <= margin and pace > 1.0 and way < LEAVES_S * pace for gap, pace, way in edges)
 
 
 def border_sides(region: Region, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
@@ -205,6 +215,10 @@ def at_border(region: Region, frame_size: tuple[int, int], margin: int = 3) -> b
 def _coherent(before: Region, after: Region) -> bool:
     near = box_overlap(grow(before.bbox, 4), after.bbox) > 0
     ratio = after.area / max(before.area, 1.0)
+    if before.cut and after.cut and ratio >= 2.5:
+        # What comes over the border shows in pieces that grow together: it goes on while it still
+        # is where it was.
+        return near and shared_pixels(before, after) > 0.6 * before.area
     return near and 0.4 < ratio < 2.5
 
 

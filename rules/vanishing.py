@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from visup.agent import ObjectBelief, Presence
+from visup.agent.changing import replace
 from visup.rules.geometry import grow, pixels_in, shared_pixels
 from visup.rules.tracks import Track, at_border, expected_box, expected_outside, heading_out
 from visup.rules.work import Work
@@ -61,11 +60,11 @@ def _much_shows(work: Work, belief: ObjectBelief, track: Track) -> None:
     told = track.told
     work.put(shown, told="seen", clear_since=None, partial_since=None)
     if told == "left":
-        work.tell("entry", "{0} comes back into the field of view.", belief.id)
+        work.tell("entry", "{0} {comes} back into the field of view.", belief.id)
     elif told == "lost":
-        work.tell("found", "{0} is seen again.", belief.id)
+        work.tell("found", "{0} {is} seen again.", belief.id)
     else:
-        work.tell("reappearance", "{0} reappears.", belief.id)
+        work.tell("reappearance", "{0} {reappears}.", belief.id)
 
 
 def miss(work: Work) -> None:
@@ -87,7 +86,9 @@ def miss(work: Work) -> None:
             _hide(work, belief, cover)
         elif work.now - track.seen_at >= s.lost_s - 1e-6:
             work.put(replace(belief, presence=Presence.HIDDEN), told="lost", clear_since=None)
-            work.tell("lost", "{0} is no longer seen, and nothing tells why.", belief.id)
+            work.tell(
+                "lost", "{0} {is} lost: it is no longer seen, and nothing tells why.", belief.id
+            )
 
 
 def _hidden_now(work: Work, track: Track, cover: ObjectBelief) -> bool:
@@ -128,12 +129,12 @@ def _hide(work: Work, belief: ObjectBelief, cover: ObjectBelief | None = None) -
     hidden = replace(belief, presence=Presence.HIDDEN)
     work.put(hidden, told="occluded", partial_since=None, clear_since=None)
     if cover is not None and cover.confirmed:
-        work.tell("occlusion", "{0} is hidden by {1}.", belief.id, cover.id)
+        work.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, cover.id)
     else:
-        work.tell("occlusion", "{0} is hidden.", belief.id)
+        work.tell("occlusion", "{0} {is} hidden.", belief.id)
 
 
 def _leave(work: Work, belief: ObjectBelief, confidence: float) -> None:
     gone = replace(belief, presence=Presence.LEFT)
     work.put(gone, told="left", partial_since=None, clear_since=None)
-    work.tell("exit", "{0} leaves the field of view.", belief.id, confidence=confidence)
+    work.tell("exit", "{0} {leaves} the field of view.", belief.id, confidence=confidence)

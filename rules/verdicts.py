@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
 from itertools import combinations
 from typing import Any
 
@@ -12,18 +12,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.rules.bounds import variables_of
-from visup.rules.facts import Facts
-from visup.rules.formula import Predicate, Rule
+from visup.rules.facts import RELATION_NAMES, Facts
+from visup.rules.formula import Formula, Predicate, Rule, calls, mark, named
 from visup.rules.inputs import blind
 from visup.rules.intervals import Arrays, Box
 from visup.rules.operators import Pick
 from visup.rules.program import Compiler, Moment, Place, Program, Scope
-from visup.rules.terms import Measure
+from visup.rules.terms import Measure, Term
 from visup.rules.vocabulary import RULES, Quantity, Word
 
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
 """Intervals of what is false, unknown, true; by code + 1."""
 States = tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A fact that rules look up.
+
+    Attributes:
+        key: By which a step finds it.
+        codes: Of all objects.
+        axes: Axes of its objects.
+        name: Its word.
+    """
+
+    key: tuple[int, tuple[int, ...]]
+    codes: Callable[[Facts], Any]
+    axes: tuple[int, ...]
+    name: str
+
+
+def _asked(node: Predicate | Measure) -> Callable[[Facts], Any]:
+    """What a fact or quantity looks at, with those of its arguments that are no objects."""
+    fact = isinstance(node, Predicate)
+    word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
+    others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
+    return partial(_look, word.look, others) if others else word.look
+
+
+def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
+    return look(facts, *others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +68,68 @@ class Ruled:
     rules: tuple[Rule, ...]
     compiler: Compiler
     places: tuple[tuple[Place, ...], ...]
+    _placed: dict[tuple[int, Scope], Place] = field(default_factory=dict, repr=False)
+    _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
+    _texts: dict[tuple[int, tuple[str, ...]], str] = field(default_factory=dict, repr=False)
 
     @property
     def program(self) -> Program:
         """All steps of all rules."""
         return self.compiler.program
+
+    def place(self, node: Formula | Term, scope: Scope) -> Place:
+        """Where the value of a part of these rules is found."""
+        key = (id(node), scope)
+        if key not in self._placed:
+            self._placed[key] = (
+                self.compiler.term(node, scope)
+                if isinstance(node, Term)
+                else self.compiler.formula(node, scope)
+            )
+        return self._placed[key]
+
+    def related(self, rule: Rule) -> tuple[Predicate, ...]:
+        """The relations between its objects that the `when` of one of these rules names."""
+        if id(rule) not in self._related:
+            self._related[id(rule)] = tuple(
+                call
+                for call in calls(rule.when)
+                if isinstance(call, Predicate) and call.name in RELATION_NAMES
+                if set(call.words) <= set(rule.variables)
+            )
+        return self._related[id(rule)]
+
+    def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
+        """The source of a part of these rules, with marks where its variables stand."""
+        key = (id(node), variables)
+        if key not in self._texts:
+            self._texts[key] = str(named(node, {v: mark(v) for v in variables}))
+        return self._texts[key]
+
+    @cached_property
+    def relations(self) -> tuple[str, ...]:
+        """Relations that the rules name."""
+        named = {n.name for n, _ in self.program.looks if n.name in RELATION_NAMES}
+        return tuple(sorted(named))
+
+    @cached_property
+    def verdicts(self) -> tuple[tuple[Rule, tuple[Place, ...], tuple[tuple[int, int], ...]], ...]:
+        """Each rule with its places, and the pairs of its variables that must not be one object."""
+        return tuple(
+            (rule, places, tuple(_apart(rule)))
+            for rule, places in zip(self.rules, self.places, strict=True)
+        )
+
+    @cached_property
+    def facts(self) -> tuple[Fact, ...]:
+        """What the rules look up that is true, false or unknown."""
+        looks = ((node, axes) for node, axes in self.program.looks if isinstance(node, Predicate))
+        return tuple(Fact((id(node), axes), _asked(node), axes, node.name) for node, axes in looks)
+
+
+def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
+    once = [i for i, v in enumerate(rule.variables) if v not in rule.may_repeat]
+    return combinations(once, 2)
 
 
 @lru_cache(maxsize=16)
@@ -76,23 +162,50 @@ class Values:
         self.facts = facts
         self.axes = prepared.compiler.algebra.axes
         self._same: dict[tuple[int, int], NDArray[np.bool_]] = {}
+        self._shapes: dict[tuple[int, ...], tuple[int, ...]] = {}
+        facts.relate(prepared.relations)
+        self._found = self._truths()
         moment = Moment(now, before, self._look, self._same_object)
         self._values: list[Box] = prepared.program.step(moment)
         self.after: States = tuple(moment.after)
 
+    def _truths(self) -> dict[tuple[int, tuple[int, ...]], Box]:
+        """All facts at once, since there are dozens of small ones."""
+        facts, wanted = self.facts, self.prepared.facts
+        if not wanted:
+            return {}
+        facts.relate(self.prepared.relations)
+        codes = [fact.codes(facts).ravel() for fact in wanted]
+        whole = TRUTHS.take(np.concatenate(codes) + 1, axis=1)
+        found, end = {}, 0
+        for fact, code in zip(wanted, codes, strict=True):
+            begin, end = end, end + len(code)
+            value = whole[:, begin:end]
+            if blind(facts.mind, fact.name):
+                value = _nothing_known(value)
+            found[fact.key] = self._laid(value, fact.axes)
+        return found
+
     def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:
         """A fact or quantity of all objects, laid along its axes."""
-        fact = isinstance(node, Predicate)
-        word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
-        others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
-        found: Any = word.look(self.facts, *others)
-        value: Box = TRUTHS[:, found + 1] if fact else found
-        if blind(self.facts.mind, node.name):
-            value = np.stack([np.full(value.shape[1:], -np.inf), np.full(value.shape[1:], np.inf)])
-        if len(axes) == 2 and axes[0] > axes[1]:
-            value = value.swapaxes(1, 2)
+        found = self._found.get((id(node), axes))
+        if found is not None:
+            return found
+        value: Box = _asked(node)(self.facts)
+        return self._laid(
+            _nothing_known(value) if blind(self.facts.mind, node.name) else value, axes
+        )
+
+    def _laid(self, value: Box, axes: tuple[int, ...]) -> Box:
+        """(2, ...) values of one or two objects along the axes of these."""
         n = len(self.facts.ids)
-        return value.reshape(2, *(n if axis in axes else 1 for axis in range(self.axes)))
+        if len(axes) == 2 and axes[0] > axes[1]:
+            value = value.reshape(2, n, n).swapaxes(1, 2)
+        shape = self._shapes.get(axes)
+        if shape is None:
+            shape = (2, *(n if axis in axes else 1 for axis in range(self.axes)))
+            self._shapes[axes] = shape
+        return value.reshape(shape)
 
     def _same_object(self, one: int, other: int) -> NDArray[np.bool_]:
         """Whether two axes stand for one object."""
@@ -110,23 +223,32 @@ class Values:
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
-        for rule, places in zip(self.prepared.rules, self.prepared.places, strict=True):
-            holds = self.at(places[0])[0] > 0
-            if len(places) > 1 and holds.any():
-                holds = holds & ~(self.at(places[1])[0] > 0)
-            if holds.any():
-                yield from ((rule, ids) for ids in self._choices(rule, holds))
+        values = self._values
+        for rule, places, apart in self.prepared.verdicts:
+            holds = values[places[0].step][0] > 0
+            if not holds.any():
+                continue
+            if len(places) > 1:
+                holds = holds & ~(values[places[1].step][0] > 0)
+            yield from ((rule, ids) for ids in self._choices(rule, holds, apart))
 
-    def _choices(self, rule: Rule, holds: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
+    def _choices(
+        self, rule: Rule, holds: NDArray[np.bool_], apart: tuple[tuple[int, int], ...]
+    ) -> Iterator[tuple[int, ...]]:
         count, ids = len(rule.variables), self.facts.ids
-        for i, j in combinations(range(count), 2):
-            if rule.variables[i] not in rule.may_repeat and (
-                rule.variables[j] not in rule.may_repeat
-            ):
-                holds = holds & ~self._same_object(i, j)
+        if not count:
+            yield ()
+            return
         shape = (len(ids),) * count + (1,) * (self.axes - count)
-        for rows in np.argwhere(np.broadcast_to(holds, shape)):
-            yield tuple(ids[row] for row in rows[:count])
+        if holds.shape != shape:
+            holds = np.broadcast_to(holds, shape)
+        for rows in zip(*(axis.tolist() for axis in holds.nonzero()[:count]), strict=True):
+            if all(rows[i] != rows[j] for i, j in apart):
+                yield tuple([ids[row] for row in rows])
+
+
+def _nothing_known(value: Box) -> Box:
+    return np.stack([np.full(value.shape[1:], -np.inf), np.full(value.shape[1:], np.inf)])
 
 
 def rerowed(

@@ -40,6 +40,7 @@ IMPLIED = MappingProxyType(
 )
 """Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
 
+STILL_SPEED = RelationSettings().still_speed
 KEEP_OUT = "keep_out"
 """Zones whose names begin so are forbidden to all."""
 KINDS = ("region", "hypothesis", "depth", "health")
@@ -141,7 +142,7 @@ def is_named(facts: Facts, name: str) -> Codes:
 def moving(facts: Facts) -> Codes:
     """Whether an object moves in the image."""
     speed = facts.one("speed")
-    still = RelationSettings().still_speed * scale(facts.mind.frame_size)
+    still = STILL_SPEED * scale(facts.mind.frame_size)
     return np.where(np.isnan(speed), MAYBE, np.where(speed > still, YES, NO)).astype(np.int8)
 
 
@@ -153,17 +154,16 @@ def whole(facts: Facts) -> Codes:
 def first_contact(facts: Facts) -> Codes:
     """Whether the second is what the first would meet first."""
     times = facts.contact[1].copy()
-    known = ~np.isnan(times)
+    known = times == times  # NaN is not equal to itself
     np.fill_diagonal(known, False)
+    codes: Codes = known.astype(np.int8)
+    if not codes.any():
+        return codes  # MAYBE
+    np.negative(codes, out=codes)  # what is known is NO until it is first
     times[~known] = np.inf
     # Of several that are never met, the first one counts, so that one always does.
-    first = np.where(
-        np.isfinite(times.min(axis=1, initial=np.inf)),
-        times.argmin(axis=1) if len(times) else 0,
-        known.argmax(axis=1) if len(times) else 0,
-    )
-    codes = np.where(known, NO, MAYBE).astype(np.int8)
-    some = np.flatnonzero(known.any(axis=1))
+    first = np.where(np.isfinite(times.min(axis=1)), times.argmin(axis=1), known.argmax(axis=1))
+    some = known.any(axis=1).nonzero()[0]
     codes[some, first[some]] = YES
     return codes
 

@@ -30,7 +30,7 @@ the operator answers is no evidence but a fact, and settles the vote.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
 
@@ -44,6 +44,7 @@ from visup.agent import (
     Outcome,
     Presence,
 )
+from visup.agent.changing import replace
 from visup.agent.mind import UNKNOWN_OBJECT
 from visup.rules.objects import hypotheses_by_object
 from visup.rules.pose import pose_support

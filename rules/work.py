@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Region
+from visup.agent.changing import replace
 from visup.rules.fragments import Doubt
 from visup.rules.geometry import box_gap, outline_gap
 from visup.rules.sentences import sentence
@@ -91,7 +92,7 @@ class Work:
     def put(self, belief: ObjectBelief, **track: object) -> None:
         """Believe it, and change what its track says."""
         self.mind = self.mind.with_objects(belief)
-        self.of[belief.id] = replace(self.of[belief.id], **track)  # type: ignore[arg-type]
+        self.of[belief.id] = replace(self.of[belief.id], **track)
 
     def tell(self, kind: str, template: str, *ids: int, confidence: float = 0.9) -> None:
         """Add an event; its template speaks of the objects as {0}, {1}."""

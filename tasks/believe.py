@@ -8,6 +8,7 @@ from visup.agent import (
     Binding,
     Expectation,
     Mind,
+    Prospect,
     StageBelief,
     Status,
     TaskBelief,
@@ -15,16 +16,18 @@ from visup.agent import (
     Verdict,
 )
 from visup.tasks.conditions import Condition
-from visup.tasks.course import Leaf, Step, leaves, moves
+from visup.tasks.course import Leaf, Step, leaves
 from visup.tasks.observe import NEVER, Relations, Sighting, observe
 from visup.tasks.readings import Follower, Reading, confidence
 from visup.tasks.sentences import evidence, outcome
 from visup.tasks.signs import Conditions
 from visup.tasks.structure import stage_names
 from visup.tasks.tree import Hold
-from visup.tasks.verify import BAD, Watch, entered
+from visup.tasks.verify import BAD, Watch
 
-NEAR = 1.0  # readings that cost so little more than the best have a say in what is expected
+NEAR = 0.01  # readings that are so likely against the best have a say in what is expected
+
+LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # there is no way back from these
 
 # Of several steps of one stage the first of these speaks for the stage.
 WORST_FIRST = (
@@ -109,7 +112,7 @@ def believe(
     Args:
         follower: The task with its settings.
         scene: What is seen now.
-        readings: Cheapest first; empty while the task has not begun.
+        readings: Likeliest first; empty while the task has not begun.
         interrupted: Why it is interrupted, or empty.
 
     Returns:
@@ -130,7 +133,7 @@ def believe(
     stages = _stages(follower, best, now, sure)
     verdict, why = _verdict(best, stages, interrupted)
     current = None if best.finished is not None else _current(follower, best)
-    near = tuple(r for r in readings if r.cost <= NEAR)
+    near = tuple(r for r in readings if r.mass >= NEAR * best.mass)
     return TaskBelief(
         name,
         verdict,
@@ -140,7 +143,16 @@ def believe(
         _expected(follower, scene, near),
         confidence=sure,
         evidence=why,
+        prospects=_prospects(follower, near),
+        success=0.0 if verdict in LOST else follower.success(near),
     )
+
+
+def _prospects(follower: Follower, readings: tuple[Reading, ...]) -> tuple[Prospect, ...]:
+    """The stages that may begin next; those that are hardly possible are left out."""
+    found = follower.next_stages(readings).items()
+    likely = sorted((s for s in found if s[1] >= NEAR), key=lambda s: -s[1])
+    return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
 
 
 def _stages(
@@ -220,10 +232,9 @@ def _expected(
             meaning = follower.actions[leaf.step.action]
             names = (meaning.name, *meaning.holds, *meaning.expects)
             wanted.update(_asked(scene, leaf.step, names))
-        for move in moves(follower.task, reading.state, entered(now), now):
-            for leaf in move.entered:
-                names = follower.actions[leaf.step.action].begins
-                wanted.update(_asked(scene, leaf.step, names))
+        for way in follower.onward(reading, now):
+            for step in way.entered:
+                wanted.update(_asked(scene, step, follower.actions[step.action].begins))
     return tuple(wanted)
 
 

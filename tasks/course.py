@@ -10,10 +10,11 @@ are values: a supervisor may follow as many of them side by side as it likes.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
+from visup.agent.changing import replace
 from visup.tasks.conditions import Fact
 from visup.tasks.structure import keyed
 from visup.tasks.tree import (

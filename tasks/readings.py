@@ -1,9 +1,11 @@
 """Readings: the courses that what was seen may have taken through a task, side by side.
 
-A reading is one state of the course with what is kept about the steps under way, the stages that
-lie behind it, and a cost: seconds in which what was seen did not fit. The cheapest reading is what
-supervision tells. Costs stand where a probabilistic parser has log probabilities, so that such a
-parser can take the place of `follow` without anything around it changing.
+A reading is one state of the course with what is kept about the steps under way and the stages that
+lie behind it. Its mass is the probability of all that leads to it, by the forward algorithm
+(`forward.py`) with the probabilities of the model (`process.py`): readings of the same state are
+merged, their masses add up. The phase of a step is not guessed at here: it is read off what is kept
+about it (`verify.py`), so that what is told of a step can be accounted for. The likeliest reading
+is what supervision tells, and its mass is how sure that is.
 """
 
 from __future__ import annotations
@@ -11,37 +13,31 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.tasks.actions import Meaning
-from visup.tasks.course import (
-    Leaf,
-    Move,
-    State,
-    Step,
-    begin,
-    enter,
-    form,
-    leaves,
-    moves,
-    with_leaves,
-)
+from visup.tasks.automaton import END, Automaton
+from visup.tasks.course import Leaf, State, Step, leaves, with_leaves
+from visup.tasks.foresight import Foresight
+from visup.tasks.forward import merged, settled
 from visup.tasks.observe import Sighting
+from visup.tasks.onward import Onward, Paths
+from visup.tasks.process import SUPERVISED, WAITING, Process, Seen
 from visup.tasks.sentences import outcome
 from visup.tasks.settings import TaskSettings
+from visup.tasks.trail import Trail, longer
+from visup.tasks.transitions import Place
 from visup.tasks.tree import Task
 from visup.tasks.verify import BAD, Watch, entered, over, update
 from visup.tasks.vocabulary import Look
 
-CONTRARY, IDLE, UNOBSERVED, WAITING = 1.0, 0.2, 0.05, 0.02  # cost per second of one step
-STAYED = 0.5  # cost of staying, once, when what comes next was seen to begin
-GUESSED = 0.4  # cost of going on when what comes next is seen to come nearer, not yet to begin
-SKIPPED = 1.5  # cost of leaving a step that was not seen through
-MISSED = 3.0  # cost of leaving a step that was seen not to happen
-SHARPNESS = 5.0  # how fast a reading loses credit with its cost
-WORST = 6.0  # a reading that costs so much more than the best is given up
+LEAST = 1e-13  # a reading with less of the mass is given up
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
+
+# How strongly something speaks for a way on; each time that this rises, it is chosen or not.
+NEARER, OVER, BEGUN = 1, 2, 3
 
 See = Callable[[Step], Sighting]
 
@@ -52,20 +48,26 @@ class Reading:
 
     Attributes:
         state: Where it is.
-        cost: How badly it fits, 0 for the best.
+        node: The number of that state (see `Automaton`).
+        mass: Its probability, given all that was seen.
+        best: Probability of the best single way to it, relative to that of all.
         past: Stages that lie behind it, the latest word on each.
         finished: When the task was done by it, or None.
         met: Steps that may come next and whose entry was seen, with the time when it last was.
-        stayed: Whether it has paid for staying where it is.
+        weighed: Ways on that were not taken, by their steps, and how strongly they were spoken for.
+        trail: The steps that lie behind it, and when each was left.
         gone_on: Whether it has left a step.
     """
 
     state: State[Watch]
-    cost: float = 0.0
+    node: int
+    mass: float = 1.0
+    best: float = 1.0
     past: tuple[StageBelief, ...] = ()
     finished: float | None = None
     met: tuple[tuple[tuple[Step, ...], float], ...] = ()
-    stayed: bool = False
+    weighed: tuple[tuple[tuple[Step, ...], int], ...] = ()
+    trail: Trail | None = None
     gone_on: bool = False
 
     @property
@@ -73,8 +75,12 @@ class Reading:
         """Whether anything of the task was seen by it."""
         return self.gone_on or any(x.watch.begun is not None for x in leaves(self.state))
 
+    def times(self, factor: float) -> Reading:
+        """The same reading, so much likelier."""
+        return replace(self, mass=self.mass * factor, best=self.best * factor)
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True)
 class Follower:
     """What following the readings of one task needs.
 
@@ -83,17 +89,37 @@ class Follower:
         actions: Meanings of its actions, with those of comparisons and zones (see `vocabulary`).
         settings: Patience.
         looks: Whether what is no plain relation of the mind holds.
+        process: The probabilities of the model.
     """
 
     task: Task
     actions: Mapping[str, Meaning]
     settings: TaskSettings
     looks: Mapping[str, Look] = field(default_factory=dict)
+    process: Process = SUPERVISED
+
+    @cached_property
+    def automaton(self) -> Automaton:
+        """The states of the course, worked out as they are come to."""
+        return Automaton(self.task)
+
+    @cached_property
+    def foresight(self) -> Foresight:
+        """What the model expects of the rest of the task."""
+        return Foresight(self.automaton, self.process)
+
+    @cached_property
+    def _paths(self) -> Paths:
+        return Paths(self.task, self.automaton)
 
     def start(self, now: float) -> tuple[Reading, ...]:
         """The readings in which the task begins now."""
-        ways = enter(self.task, begin(self.task), entered(now), now)
-        return tuple(Reading(s) for s in ways if s is not None)
+        found = [s for s in self._paths.begin(now) if s is not None]
+        return tuple(Reading(s, self.automaton.node(s), 1.0 / len(found)) for s in found)
+
+    def onward(self, reading: Reading, now: float) -> list[Onward]:
+        """The ways on from a reading."""
+        return self._paths.onward(reading.state, reading.node, now)
 
     def follow(
         self, readings: tuple[Reading, ...], see: See, now: float, dt: float
@@ -107,10 +133,46 @@ class Follower:
             dt: Seconds since the last time.
 
         Returns:
-            At most `most_courses` readings, the cheapest first; its cost is 0.
+            At most `most_courses` readings, the likeliest first; their masses sum to 1.
         """
         aged = [self._age(r, see, now, dt) for r in readings]
-        return self._best(n for r in aged for n in self._go_on(r, see, now))
+        grown = (n for r in aged for n in self._go_on(r, see, now, dt))
+        found = merged((r.node, r, r.mass, r.best) for r in grown)
+        kept = settled(found, self.settings.most_courses, LEAST).kept.values()
+        ranked = sorted(kept, key=lambda w: -w.mass)
+        return tuple(replace(w.what, mass=w.mass, best=w.best) for w in ranked)
+
+    def next_stages(self, readings: tuple[Reading, ...]) -> dict[str, float]:
+        """For each stage the probability that it is the next to begin; the rest is for the end."""
+        found: dict[str, float] = {}
+        for reading in readings:
+            if reading.finished is None:
+                for stage, chance in self.foresight.next_stages(reading.node).items():
+                    found[stage] = found.get(stage, 0.0) + reading.mass * chance
+        return found
+
+    def success(self, readings: tuple[Reading, ...]) -> float:
+        """Probability that the course as followed reaches its end, with no stage failed for good."""
+        hopes = (
+            r.mass * self.foresight.success(self.place(r))
+            for r in readings
+            if all(p.status is not Status.FAILED for p in r.past)
+        )
+        return min(1.0, sum(hopes))
+
+    def place(self, reading: Reading) -> Place:
+        """Where a reading is by the model: its phases are read off what is kept of its steps."""
+        if reading.finished is not None:
+            return Place(END, ())
+        return Place(reading.node, tuple(self._phase(x) for x in leaves(reading.state)))
+
+    def _phase(self, leaf: Leaf[Watch]) -> int:
+        watch, whole = leaf.watch, self.process.count(leaf.step)
+        if watch.status in BAD:
+            return whole + (1 if watch.status is Status.FAILING else 2)
+        if watch.fulfilled:
+            return whole
+        return WAITING if watch.begun is None else 1
 
     def _age(self, reading: Reading, see: See, now: float, dt: float) -> Reading:
         """The same reading after `dt` seconds in which it stays where it is."""
@@ -118,12 +180,13 @@ class Follower:
             return reading
         done = reading.finished is not None
         new = [self._look(leaf, see(leaf.step), now, dt, done) for leaf in leaves(reading.state)]
-        cost = reading.cost + dt * sum(self._cost(x, see(x.step), done) for x in new)
+        fits = math.prod(self._fit(x, see(x.step), done, dt) for x in new)
         lost = any(x.watch.status in BAD for x in new)
         return replace(
             reading,
             state=with_leaves(reading.state, iter(new)),
-            cost=cost,
+            mass=reading.mass * fits,
+            best=reading.best * fits,
             finished=None if lost else reading.finished,
         )
 
@@ -136,68 +199,89 @@ class Follower:
         watch = update(leaf.watch, step, meaning, seen, now, dt, self.settings)
         return replace(leaf, watch=watch)
 
-    def _cost(self, leaf: Leaf[Watch], seen: Sighting, done: bool) -> float:
+    def _fit(self, leaf: Leaf[Watch], seen: Sighting, done: bool, dt: float) -> float:
+        """How well `dt` seconds of what is seen fit a step; 1 at best."""
         if not seen.observed:
-            return UNOBSERVED
+            return self.process.fit(Seen.UNKNOWN, 1.0, dt)
         if seen.contrary is not None and (seen.stern or seen.holds is not Truth.TRUE):
-            return CONTRARY
-        if seen.helps is not None or done or self._over(leaf):
-            return 0.0
-        return WAITING if leaf.watch.begun is None else IDLE
+            return self.process.fit(Seen.CONTRARY, seen.contrary.confidence, dt)
+        if done or self._over(leaf) or (seen.helps is not None and leaf.watch.held):
+            return 1.0
+        if seen.helps is not None or leaf.watch.begun is None:
+            return math.exp(-self.process.begin * dt)  # it has not begun to hold in all that time
+        return self.process.fit(Seen.NEITHER, 1.0, dt)
 
     def _over(self, leaf: Leaf[Watch]) -> bool:
         return over(leaf.watch, leaf.step, self.actions[leaf.step.action])
 
-    def _go_on(self, reading: Reading, see: See, now: float) -> Iterator[Reading]:
+    def _go_on(self, reading: Reading, see: See, now: float, dt: float) -> Iterator[Reading]:
         """A reading and those that come out of it by leaving a step."""
-        ways = list(moves(self.task, reading.state, entered(now), now))
+        ways = self.onward(reading, now)
         reading = replace(reading, met=self._met(reading, ways, see, now))
-        ends = any(w.state is None and self._may_end(w) for w in ways)
+        ends = [w for w in ways if w.ends and self._may_end(w)]
         if ends and reading.finished is None:
             reading = replace(reading, finished=now)
-        forced = tempted = False
-        for way in ways:
-            price = None if way.state is None else self._price(reading, way, see, now)
-            if price is None or way.state is None:
-                continue
-            forced = forced or all(self._over(x) for x in way.left)
-            tempted = tempted or (price == 0.0 and self._seen(reading, way, see, now))
-            yield self._moved(reading, way.state, way, price, see, now)
-        if ends or not forced:
-            if tempted and not reading.stayed:
-                reading = replace(reading, cost=reading.cost + STAYED, stayed=True)
-            yield reading
+        open_to = [(w, self._spoken_for(reading, w, see, now)) for w in ways if not w.ends]
+        open_to = [(w, level) for w, level in open_to if level > 0]
+        # Where the steps are over by themselves, nothing is left to stay for but the end.
+        shares = sum(w.share for w, _ in open_to) or 1.0
+        forced = not ends and any(level >= OVER and self._all_over(w) for w, level in open_to)
+        gone = 0.0
+        for way, level in open_to:
+            chance = self._chance(reading, way, level, bool(ends), dt) * way.share / shares
+            if forced:
+                chance = way.share / shares * self._skipped(way)
+            if chance > 0.0:
+                gone += chance
+                yield self._moved(reading, way, chance, see, now)
+        if not forced:
+            weighed = tuple((w.entered, level) for w, level in open_to)
+            yield replace(reading, weighed=weighed).times(max(0.0, 1.0 - gone))
 
-    def _may_end(self, way: Move[Watch]) -> bool:
+    def _may_end(self, way: Onward) -> bool:
         return all(x.watch.fulfilled and x.watch.status not in BAD for x in way.left)
 
-    def _price(self, reading: Reading, way: Move[Watch], see: See, now: float) -> float | None:
-        """What a move costs, or None when nothing speaks for it."""
-        if all(self._over(x) for x in way.left):
-            return 0.0
-        if all(self._goes_on(x.step, way.left) for x in way.entered):
-            return None
-        skipped = sum(self._skipped(x) for x in way.left)
-        if self._seen(reading, way, see, now):
-            return skipped
-        nearer = all(self._comes(x.step, see(x.step), now) for x in way.entered)
-        return skipped + GUESSED if nearer else None
+    def _all_over(self, way: Onward) -> bool:
+        return all(self._over(x) for x in way.left)
 
-    def _seen(self, reading: Reading, way: Move[Watch], see: See, now: float) -> bool:
-        """Whether all that a move enters has been seen to begin, and nothing says "not yet"."""
-        if any(see(x.step).not_yet for x in way.entered):
+    def _spoken_for(self, reading: Reading, way: Onward, see: See, now: float) -> int:
+        """How strongly something speaks for a way on; 0 when nothing does."""
+        finished = self._all_over(way)
+        if not finished and all(self._goes_on(s, way.left) for s in way.entered):
+            return 0
+        if way.entered and self._seen(reading, way, see, now):
+            return BEGUN
+        if finished:
+            return OVER
+        return NEARER if all(self._comes(s, see(s), now) for s in way.entered) else 0
+
+    def _chance(self, reading: Reading, way: Onward, level: int, ends: bool, dt: float) -> float:
+        """Probability that the course goes on now by a way that is spoken for."""
+        seen_through = self._skipped(way)
+        if level <= dict(reading.weighed).get(way.entered, 0):
+            # What was told already is told once; but what was seen to begin may begin later on.
+            return seen_through * -math.expm1(-self.process.leave * dt) if level == BEGUN else 0.0
+        if level == BEGUN:
+            return seen_through * (1.0 - self.process.spurious)
+        if level == OVER:
+            return 0.5 if ends else 1.0
+        return seen_through * self.process.unseen
+
+    def _seen(self, reading: Reading, way: Onward, see: See, now: float) -> bool:
+        """Whether all that a way enters has been seen to begin, and nothing says "not yet"."""
+        if any(see(s).not_yet for s in way.entered):
             return False
-        return now - dict(reading.met).get(_steps(way), -math.inf) <= self.settings.contact_s
+        return now - dict(reading.met).get(way.entered, -math.inf) <= self.settings.contact_s
 
     def _met(
-        self, reading: Reading, ways: list[Move[Watch]], see: See, now: float
+        self, reading: Reading, ways: list[Onward], see: See, now: float
     ) -> tuple[tuple[tuple[Step, ...], float], ...]:
         """When the entry to each move was last seen, with what is seen now."""
         met = dict(reading.met)
         for way in ways:
-            signs = (see(x.step).entry for x in way.entered)
+            signs = (see(s).entry for s in way.entered)
             if way.entered and all(self._enters(sign, now) for sign in signs):
-                met[_steps(way)] = now
+                met[way.entered] = now
         return tuple(met.items())
 
     def _enters(self, sign: Relation | None, now: float) -> bool:
@@ -212,27 +296,23 @@ class Follower:
         """Whether a step asks for what is going on already: it can only begin once that ceased."""
         return any(step.same_as(x.step) and not x.watch.ceased for x in left)
 
-    def _skipped(self, leaf: Leaf[Watch]) -> float:
-        """What leaving a step costs."""
+    def _skipped(self, way: Onward) -> float:
+        """Probability that the steps that a way leaves are left as they stand."""
+        return math.prod(self._passed_over(x) for x in way.left)
+
+    def _passed_over(self, leaf: Leaf[Watch]) -> float:
         if leaf.watch.fulfilled:
-            return 0.0
+            return 1.0
         lasts = self.actions[leaf.step.action].lasts
         missed = not lasts and not leaf.watch.held and leaf.watch.broken_since is not None
-        return MISSED if missed else SKIPPED
+        return self.process.pass_over ** (2 if missed else 1)
 
-    def _moved(
-        self,
-        reading: Reading,
-        state: State[Watch],
-        way: Move[Watch],
-        price: float,
-        see: See,
-        now: float,
-    ) -> Reading:
+    def _moved(self, reading: Reading, way: Onward, chance: float, see: See, now: float) -> Reading:
         opened = self._seen(reading, way, see, now)
+        state, node = self._paths.taken(way, reading.state, entered(now))
         fresh = [
-            self._look(_opened(x, opened), see(x.step), now, 0.0, False) if x in way.entered else x
-            for x in leaves(state)
+            self._look(_opened(x, opened), see(x.step), now, 0.0, False) if i in way.fresh else x
+            for i, x in enumerate(leaves(state))
         ]
         under_way = {x.step.stage for x in fresh}
         told = {p.stage: p for p in reading.past}
@@ -244,38 +324,22 @@ class Follower:
                 continue  # there is no way back from that
             if ending.stage not in under_way or failed:
                 told[ending.stage] = ending
-        cost = reading.cost + price
         now_at = with_leaves(state, iter(fresh))
-        return Reading(now_at, cost, tuple(told.values()), gone_on=True)
+        past = tuple(told.values())
+        trail = longer(reading.trail, tuple(x.step for x in way.left), now)
+        mass, best = reading.mass * chance, reading.best * chance
+        return Reading(now_at, node, mass, best, past, trail=trail, gone_on=True)
 
     def _ending(self, leaf: Leaf[Watch], now: float) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
         status, why = outcome(leaf.step, self.actions[leaf.step.action], leaf.watch, now)
         return StageBelief(leaf.step.stage, status, now, leaf.watch.confidence, why)
 
-    def _best(self, readings: Iterator[Reading]) -> tuple[Reading, ...]:
-        """The cheapest reading of each form, cheapest first, the best at cost 0."""
-        cheapest: dict[object, Reading] = {}
-        for reading in readings:
-            key = form(reading.state)
-            if key not in cheapest or reading.cost < cheapest[key].cost - 1e-9:
-                cheapest[key] = reading
-        ranked = sorted(cheapest.values(), key=lambda r: r.cost)[: self.settings.most_courses]
-        least = ranked[0].cost
-        kept = (replace(r, cost=r.cost - least) for r in ranked if r.cost - least <= WORST)
-        return tuple(kept)
-
 
 def _opened(leaf: Leaf[Watch], opened: bool) -> Leaf[Watch]:
     return replace(leaf, watch=replace(leaf.watch, opened=True)) if opened else leaf
 
 
-def _steps(way: Move[Watch]) -> tuple[Step, ...]:
-    return tuple(x.step for x in way.entered)
-
-
 def confidence(readings: tuple[Reading, ...]) -> float:
-    """How sure the best reading is against the others, 0 to 1."""
-    if not readings:
-        return 0.0
-    return 1.0 / sum(math.exp(SHARPNESS * (readings[0].cost - r.cost)) for r in readings)
+    """How likely the reading is that is told: its probability, given all that was seen."""
+    return readings[0].mass if readings else 0.0

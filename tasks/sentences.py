@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from visup.agent import Status, Verdict
+from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions import Meaning
 from visup.tasks.course import Step
 from visup.tasks.verify import Watch
@@ -114,3 +114,14 @@ VERDICT_WORDS = {
 def _say(relation: str, actions: Words) -> str:
     meaning = actions.get(relation)
     return meaning.text if meaning else relation.replace("_", " ")
+
+
+def prospects_text(belief: TaskBelief) -> str:
+    """What may come next and how likely the task still ends well, in one line."""
+    said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
+    end = 1.0 - sum(p.probability for p in belief.prospects)
+    said += [f"the end ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
+    coming = f"next: {', '.join(said)}" if said else "next: not known"
+    if belief.success is None:
+        return coming
+    return f"{coming}; ends well with a probability of {belief.success:.0%}"

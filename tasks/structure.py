@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import wraps
+from typing import TypeVar
 
 from visup.tasks.conditions import Comparison, Fact, action_of, facts_of
 from visup.tasks.tree import Action, Actors, Course, Judged, Reference, Stage, Task, walk
 from visup.tasks.units import value
+
+T = TypeVar("T")
+MOST_TASKS = 64  # of so many tasks what was read off is remembered
+
+
+def once(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
+    """A function of a task that is worked out once for each, as long as it is the same object.
+
+    Supervision asks at each step; comparing whole trees would take as long as reading them.
+    """
+    known: dict[int, tuple[Task, T]] = {}
+
+    @wraps(read_off)
+    def remembered(task: Task) -> T:
+        found = known.get(id(task))
+        if found is None or found[0] is not task:
+            if len(known) >= MOST_TASKS:
+                known.clear()
+            found = known[id(task)] = (task, read_off(task))
+        return found[1]
+
+    return remembered
 
 
 def tasks_of(file: Task) -> tuple[Task, ...]:
@@ -21,6 +45,7 @@ def tasks_of(file: Task) -> tuple[Task, ...]:
     return tuple(found)
 
 
+@once
 def stage_names(task: Task) -> tuple[str, ...]:
     """The stages that ask for actions themselves, in the order in which the task comes to them."""
     root = task.stage(task.name)
@@ -43,6 +68,7 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(a for n in walk(rule.body) for a in _names(task, n)))
 
 
+@once
 def task_actors(task: Task) -> tuple[str, ...]:
     """All actors of a task, in the order in which its stages ask for them."""
     staged = [a for s in stage_names(task) for a in stage_actors(task, s)]

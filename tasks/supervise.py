@@ -8,7 +8,7 @@ should be seen next and what the verdict is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from visup.agent import (
     Binding,
@@ -26,6 +26,7 @@ from visup.agent import (
     Truth,
     Verdict,
 )
+from visup.agent.changing import replace
 from visup.tasks.actions import Meaning, known_actions
 from visup.tasks.believe import Scene, believe
 from visup.tasks.conditions import facts_of
@@ -34,7 +35,8 @@ from visup.tasks.matching import match, strength, unexplained
 from visup.tasks.readings import Follower, Reading
 from visup.tasks.settings import DEFAULT_SETTINGS, TaskSettings
 from visup.tasks.structure import keyed, stage_names
-from visup.tasks.tell import stage_concerns, stage_events
+from visup.tasks.tell import revision_events, stage_concerns, stage_events
+from visup.tasks.trail import Revision, revised
 from visup.tasks.tree import Invariant, Task
 from visup.tasks.units import value
 from visup.tasks.verify import BAD
@@ -91,7 +93,7 @@ def task_thinker(
         A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
         in order, keeps its memory in `Mind.memory['tasks']`, and gives events 'stage_started',
         'stage_progressing', 'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
-        'stage_unknown', 'invariant_broken' and 'verdict', and concerns 'stage_failing' and
+        'stage_unknown', 'stage_revised', 'invariant_broken' and 'verdict', and concerns 'stage_failing' and
         'invariant_broken'.
     """
     followers = tuple(_follower(t, actions or known_actions(), settings) for t in tasks)
@@ -124,7 +126,9 @@ def finish(belief: TaskBelief) -> Verdict:
 
 def _follower(task: Task, actions: Mapping[str, Meaning], settings: TaskSettings) -> Follower:
     words = vocabulary(task, actions)
-    return Follower(task, words.meanings, settings, words.looks)
+    follower = Follower(task, words.meanings, settings, words.looks)
+    follower.success(follower.start(0.0))  # so that no step has to work out the whole course
+    return follower
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +184,17 @@ def _step(follower: Follower, memory: TaskMemory, mind: Mind) -> _Step:
     )
     events = (
         *stage_events(memory.belief, belief, mind, follower.task),
+        *revision_events(memory.belief, belief, _revised(memory, readings, now), mind),
         *_invariant_events(follower, memory, new, mind),
     )
     return _Step(new, events, (*stage_concerns(belief), *_invariant_concerns(follower, new, scene)))
+
+
+def _revised(memory: TaskMemory, readings: tuple[Reading, ...], now: float) -> tuple[Revision, ...]:
+    """Steps that lay behind by the reading told before and do not by the one told now."""
+    if not memory.readings or not readings:
+        return ()
+    return tuple(revised(memory.readings[0].trail, readings[0].trail, now))
 
 
 def _bind(

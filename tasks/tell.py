@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 from visup.agent import (
     Concern,
@@ -15,9 +14,11 @@ from visup.agent import (
     TaskBelief,
     Verdict,
 )
+from visup.agent.changing import replace
 from visup.rules.sentences import describe
 from visup.tasks.sentences import stage_sentence, verdict_sentence
 from visup.tasks.structure import stages_inside
+from visup.tasks.trail import Revision
 from visup.tasks.tree import Task
 from visup.tasks.verify import BAD
 
@@ -56,6 +57,31 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
             yield event
     if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
         yield _verdict_event(now, mind)
+
+
+def revision_events(
+    before: TaskBelief, now: TaskBelief, revisions: Sequence[Revision], mind: Mind
+) -> Iterator[Event]:
+    """Events of stages that were told done, and are believed not to have happened after all."""
+    done, still = _done(before), _done(now)
+    earliest = {r.step.stage: r for r in revisions}  # they come with the last step first
+    for stage, revision in earliest.items():
+        if stage in done and stage not in still:
+            data = {"task": now.task, "stage": stage, "told": revision.told}
+            text = f"Stage {revision}."
+            yield Event(
+                "stage_revised",
+                mind.time,
+                mind.frame_index,
+                text,
+                _objects(now),
+                now.confidence,
+                data=data,
+            )
+
+
+def _done(belief: TaskBelief) -> set[str]:
+    return {s.stage for s in belief.stages if s.status is Status.DONE}
 
 
 def stage_concerns(belief: TaskBelief) -> Iterator[Concern]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from visup.agent import Status, Truth
+from visup.agent.changing import replace
 from visup.tasks.actions import Meaning
 from visup.tasks.course import Step
 from visup.tasks.observe import UNSEEN, Sighting

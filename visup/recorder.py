@@ -20,6 +20,8 @@ from visup.agent.journal import Journal, Limits
 from visup.agent.recording import JOURNAL, export_events
 from visup.percepts.video import Source
 from visup.settings import WatchSettings
+from visup.tasks import load_tasks
+from visup.tasks.outline import outline
 
 if TYPE_CHECKING:
     from visup.agent import Verdict
@@ -82,6 +84,7 @@ class Recorder:
             self.journal.note(**self.facts)
         self.notes = source.notes
         self.collector = Collector()
+        self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
         path = _free(folder / "annotated.webm")
         self.video = AnnotatedVideo(path, source.fps / settings.every) if video else None
         self._wants_report = report
@@ -199,7 +202,9 @@ class Recorder:
         return path
 
     def _run_data(self, verdict: Verdict | None, problem: str | None) -> RunData:
-        return self.collector.finish(verdict, self.facts, problem=problem, notes=self.notes)
+        return self.collector.finish(
+            verdict, self.facts, problem=problem, notes=self.notes, courses=self._courses
+        )
 
 
 def kept_of(recorder: Recorder | None) -> Mapping[str, Any]:

@@ -143,9 +143,9 @@ def supervise(
     tally = _Tally(past.grave if past else False)
     troubles = Troubles()
     with ExitStack() as stack:
-        agent = build_agent(settings, also=(troubles,))
-        stack.callback(agent.close)
         source = stack.enter_context(open_video(settings))
+        agent = build_agent(settings, also=(troubles,), live=source.live)
+        stack.callback(agent.close)
         recorder = _recorder(settings, source, folder, options, past is not None, stack)
         sinks = Sinks(options.sinks, settings.source)
         stack.callback(sinks.close)

@@ -2,71 +2,106 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterable, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
-from rich.tree import Tree
 
-from visup.agent import Frame, Mind, ObjectBelief, Relation, RelationTable
+from visup.agent import Frame, Observation
 from visup.agent.agent import Agent, Step
 from visup.agent.errors import VisupError
+from visup.display import shown
 from visup.narrative import line
+from visup.session_words import COMMANDS, HELP
+from visup.stepping import Feed, Mark, Stepper, Stopped, stop_of
+from visup.stepping.stops import FrameStop, Stop, TimeStop
+from visup.supposing import supposed, swapped
+from visup.tables import (
+    alerts_list,
+    behaviours_table,
+    candidates_table,
+    objects_table,
+    questions_list,
+    regions_table,
+    relations_table,
+    tasks_tree,
+)
 from visup.wording import worded_once
 
-Predicate = Callable[[Step], bool]
-HELP = """\
-step [N]          one step, or N
-run [until WHAT]  until an event of kind WHAT, a stage, a time (12.5), the end
-regions           what moved in the last frame
-objects           who is there, with their most likely identities
-candidates ID     all identities that object ID may have
-questions         what the operator is asked
-answer ID NAME    say what object ID is
-relations [ID]    what holds between objects
-tasks             stages, actors and verdicts
-alerts            what is open
-events            the latest events
-behaviours        what each behaviour did in the last step
-help, quit
-An empty line repeats the last command."""
+__all__ = ["HELP", "Session"]
+
+Answer = RenderableType | None
 
 
 class Session:
-    """Holds an agent and its source, and answers commands.
+    """Holds a stepper, with the branches that were begun, and answers commands.
 
     Args:
         agent: The agent.
-        frames: Where its frames come from.
+        frames: Where its frames come from, or a feed of what was perceived.
         console: Where to write; standard output by default.
+
+    Attributes:
+        courses: The run, and the branches that were begun from one another; the last one is stepped.
     """
 
     def __init__(
-        self, agent: Agent, frames: Iterable[Frame], console: Console | None = None
+        self, agent: Agent, frames: Iterable[Frame] | Feed, console: Console | None = None
     ) -> None:
-        self.agent = agent
+        self.courses = [Stepper(agent, frames)]
         self.console = console or Console(highlight=False)
-        self._frames = iter(frames)
-        self._last: Step | None = None
-        self._events: list[RenderableType] = []
-        self._commands: dict[str, Callable[[Sequence[str]], RenderableType | None]] = {
+        self._marks: dict[str, Mark] = {}
+        self._commands: dict[str, Callable[[Sequence[str]], Answer]] = {
             "step": self._step,
             "run": self._run,
-            "regions": lambda _: regions_table(self._last),
-            "objects": lambda _: objects_table(self.agent.mind),
+            "back": self._back,
+            "go": self._go,
+            "mark": self._mark,
+            "break": self._break,
+            "delete": lambda words: self._breakpoint(words, "delete"),
+            "disable": lambda words: self._breakpoint(words, "disable"),
+            "enable": lambda words: self._breakpoint(words, "enable"),
+            "watch": self._watch,
+            "unwatch": self._unwatch,
+            "why": self._why,
+            "diff": self._diff,
+            "assert": lambda words: self._suppose(words, retract=False),
+            "forget": lambda words: self._suppose(words, retract=True),
+            "use": self._use,
+            "branch": lambda _: self._begin(self.stepper.branch()),
+            "compare": self._compare,
+            "leave": self._leave,
+            "mind": lambda _: shown(self.stepper.mind),
+            "percepts": lambda _: shown(seen) if (seen := self._seen()) else Text(_NO_STEP),
+            "regions": lambda _: regions_table(self._seen()),
+            "objects": lambda _: objects_table(self.stepper.mind.objects.values()),
             "candidates": self._candidates,
-            "questions": lambda _: questions_list(self.agent.mind),
+            "questions": lambda _: questions_list(self.stepper.mind.questions),
             "answer": self._answer,
-            "relations": lambda words: relations_table(self.agent.mind, _number(words)),
-            "tasks": lambda _: tasks_tree(self.agent.mind),
-            "alerts": lambda _: alerts_list(self.agent.mind),
-            "events": lambda _: Group(*self._events[-10:]) if self._events else Text("none yet"),
-            "behaviours": lambda _: behaviours_table(self._last),
-            "help": lambda _: Text(HELP),
+            "relations": lambda words: relations_table(self.stepper.mind.relations, _number(words)),
+            "tasks": lambda _: tasks_tree(self.stepper.mind),
+            "alerts": lambda _: alerts_list(self.stepper.mind.alerts),
+            "events": self._events,
+            "directives": self._directives,
+            "behaviours": self._behaviours,
+            "help": _help,
         }
+
+    @property
+    def stepper(self) -> Stepper:
+        """The course that is stepped."""
+        return self.courses[-1]
+
+    @property
+    def agent(self) -> Agent:
+        """The agent of that course."""
+        return self.stepper.agent
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """Names of the places that are remembered."""
+        return tuple(self._marks)
 
     def words(self) -> list[str]:
         """The commands, for completion."""
@@ -81,188 +116,273 @@ class Session:
         self.console.print("[dim]'step' goes on by one frame, 'help' shows the commands.[/dim]")
         last = "step"
         for entered in commands:
-            command = entered.strip() or last
+            command = entered.split(" #")[0].strip() or last
+            if command.startswith("#"):
+                continue
             if command in ("quit", "exit", "q"):
                 break
             last = command
-            shown = self.obey(command)
-            if shown is not None:
-                self.console.print(shown)
+            answer = self.obey(command)
+            if answer is not None:
+                self.console.print(answer)
         return 0
 
-    def obey(self, command: str) -> RenderableType | None:
+    def obey(self, command: str) -> Answer:
         """Carry out one command; a unique beginning of its name will do."""
         word, *rest = command.split()
+        if word.endswith("!"):
+            word, rest = word[:-1], ["!", *rest]
         names = [n for n in self._commands if n.startswith(word)]
         name = word if word in self._commands else names[0] if len(names) == 1 else None
         if name is None:
             meant = f" ({', '.join(names)}?)" if names else ""
-            return Text(f"'{word}' is not a command{meant}; 'help' lists them", style="yellow")
-        return self._commands[name](rest)
+            return _amiss(f"'{word}' is not a command{meant}; 'help' lists them")
+        try:
+            return self._commands[name](rest)
+        except VisupError as fault:
+            return _amiss(str(fault))
 
-    def _step(self, words: Sequence[str]) -> RenderableType | None:
+    # Forth and back
+
+    def _step(self, words: Sequence[str]) -> Answer:
         count = _number(words)
-        return self._advance(1 if count is None else count, None)
+        what = " ".join(words if count is None else words[1:]).removeprefix("until").strip()
+        return self._advance(count, what)
 
-    def _run(self, words: Sequence[str]) -> RenderableType | None:
-        what = words[-1] if words and words[-1] != "until" else None
-        return self._advance(None, until(what) if what else None)
+    def _run(self, words: Sequence[str]) -> Answer:
+        what = " ".join(words).removeprefix("until").strip()
+        return self._advance(None, what or _never)
 
-    def _advance(self, count: int | None, stop: Predicate | None) -> RenderableType | None:
-        taken = 0
-        for frame in islice(self._frames, count):
-            self._last = self.agent.step(frame)
-            taken += 1
-            told = [line(e) for e in worded_once(self._last.events)]
-            self._events = [*self._events, *told][-1000:]
-            for text in told:
-                self.console.print(text)
-            if stop and stop(self._last):
-                break
-        if not taken:
-            return Text("the source has ended", style="yellow")
-        mind = self.agent.mind
+    def _advance(self, count: int | None, what: str | Callable[[Step], bool]) -> Answer:
+        stop: Stop | None = stop_of(what, self.stepper.mind) if what else None
+        if stop is not None and self._is_past(stop):
+            return _amiss(f"{stop.text} is past: 'go' and 'back' lead there")
+        stopped = self.stepper.step(count, stop, self._tell)
+        return self._place(stopped)
+
+    def _is_past(self, stop: Stop) -> bool:
+        mind = self.stepper.mind
+        if mind.frame_index < 0:
+            return False
+        if isinstance(stop, TimeStop):
+            return stop.time <= mind.time
+        return isinstance(stop, FrameStop) and stop.frame <= mind.frame_index
+
+    def _tell(self, step: Step) -> None:
+        for event in worded_once(step.events):
+            self.console.print(line(event))
+
+    def _place(self, stopped: Stopped | None = None) -> RenderableType:
+        """Where the session is: why it stopped, what is watched, frame and time."""
+        mind, lines = self.stepper.mind, []
+        if stopped is not None:
+            lines += [Text(f"stopped: {why}", style="bold") for why in stopped.reasons]
+            if stopped.ended:
+                lines.append(Text("the source has ended", style="yellow"))
+        for watch in self.stepper.watches.values():
+            values = [f"{_ids(r.objects)} {r}".strip() for r in watch.readings[:6]]
+            told = ", ".join(values) or "nobody is meant by it"
+            lines.append(Text(f"watch {watch.id}  {watch.text}: {told}", style="cyan"))
         seen = sum(b.last_seen == mind.time for b in mind.objects.values())
-        return Text(f"frame {mind.frame_index}, {mind.time:.2f} s, {seen} regions", style="dim")
+        where = f"frame {mind.frame_index}, {mind.time:.2f} s, {seen} regions"
+        lines.append(Text(f"{where}{self._aside()}", style="dim"))
+        return Group(*lines)
 
-    def _answer(self, words: Sequence[str]) -> RenderableType:
+    def _aside(self) -> str:
+        """What is to be known of the place besides frame and time."""
+        stepper = self.stepper
+        told = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
+        if stepper.midway:
+            told.append(f"; inside the step, after {stepper.midway.phase.value}")
+        if len(self.courses) > 1:
+            told.append(f"; branch from step {stepper.begin}")
+        return "".join(told)
+
+    def _back(self, words: Sequence[str]) -> Answer:
+        count = _number(words)
+        self.stepper.back(1 if count is None else count)
+        return self._place()
+
+    def _go(self, words: Sequence[str]) -> Answer:
+        place = words[0] if words else ""
+        if place in self._marks:
+            self.stepper.restore(self._marks[place])
+        elif place in ("start", "end"):
+            self.stepper.go(self.stepper.begin if place == "start" else self.stepper.made)
+        elif place.removesuffix("s").replace(".", "", 1).isdecimal() and not place.isdecimal():
+            self.stepper.go_to_time(float(place.removesuffix("s")))
+        elif place.isdecimal():
+            self.stepper.go(int(place))
+        else:
+            return _amiss(f"{_usage('go')}; marks: {', '.join(self._marks) or 'none'}")
+        return self._place()
+
+    def _mark(self, words: Sequence[str]) -> Answer:
+        if not words:
+            rows = [f"{name}  step {mark.number}" for name, mark in self._marks.items()]
+            return Text("\n".join(rows) or "no place is marked")
+        self._marks[words[0]] = self.stepper.snapshot()
+        return Text(f"step {self.stepper.at} is '{words[0]}'", style="dim")
+
+    # Where to stop
+
+    def _break(self, words: Sequence[str]) -> Answer:
+        if not words:
+            every = self.stepper.breakpoints.values()
+            return Text("\n".join(map(str, every)) or "no breakpoint is set")
+        return Text(str(self.stepper.break_at(" ".join(words))))
+
+    def _breakpoint(self, words: Sequence[str], what: str) -> Answer:
+        number = _number(words)
+        if number is None:
+            return _amiss(_usage(what))
+        if what == "delete":
+            self.stepper.delete(number)
+        else:
+            self.stepper.enable(number, what == "enable")
+        return self._break(())
+
+    def _watch(self, words: Sequence[str]) -> Answer:
+        breaks = bool(words) and words[0] == "!"
+        text = " ".join(words[breaks:])
+        if text:
+            self.stepper.watch(text, breaks=breaks)
+        return self._place() if self.stepper.watches else Text("nothing is watched")
+
+    def _unwatch(self, words: Sequence[str]) -> Answer:
+        number = _number(words)
+        if number is None:
+            return _amiss(_usage("unwatch"))
+        self.stepper.unwatch(number)
+        return self._watch(())
+
+    # Why
+
+    def _why(self, words: Sequence[str]) -> Answer:
+        if not words:
+            return Text(COMMANDS["why"].text)
+        if words[0] == "not":
+            return shown(self.stepper.why_not(" ".join(words[1:])))
+        return shown(self.stepper.why(" ".join(words)))
+
+    def _diff(self, words: Sequence[str]) -> Answer:
+        numbers = [int(w) for w in words if w.isdecimal()]
+        if self.stepper.at == self.stepper.begin and not numbers:
+            return Text(_NO_STEP)
+        first = numbers[0] if numbers else self.stepper.at - 1
+        return shown(self.stepper.diff(first, *numbers[1:2]))
+
+    # What if
+
+    def _suppose(self, words: Sequence[str], *, retract: bool) -> Answer:
+        belief = supposed(self.stepper.mind, words, self.agent.models, retract=retract)
+        return self._begin(self.stepper.branch(belief))
+
+    def _use(self, words: Sequence[str]) -> Answer:
+        if len(words) != 2 or words[0] not in ("rules", "task"):
+            return _amiss(_usage("use"))
+        thinkers = swapped(self.agent.thinkers, words[0], words[1])
+        return self._begin(self.stepper.branch(thinkers=thinkers))
+
+    def _begin(self, branch: Stepper) -> Answer:
+        for watch in self.stepper.watches.values():
+            branch.watch(watch.text, breaks=watch.breaks)
+        for point in self.stepper.breakpoints.values():
+            branch.enable(branch.break_at(point.stop).id, point.enabled)
+        self.courses.append(branch)
+        return self._place()
+
+    def _compare(self, words: Sequence[str]) -> Answer:
+        changed = self.stepper.compare()
+        told = [
+            *(Text(f"- {float(e['time']):7.1f} s  {e['text']}", style="red") for e in changed.gone),
+            *(
+                Text(f"+ {float(e['time']):7.1f} s  {e['text']}", style="green")
+                for e in changed.new
+            ),
+        ]
+        before, after = changed.verdicts
+        verdict = Text(f"verdict: {before or 'none'} -> {after or 'none'}")
+        return Group(*(told or [Text("nothing is told differently")]), verdict)
+
+    def _leave(self, words: Sequence[str]) -> Answer:
+        if len(self.courses) == 1:
+            return _amiss("this is no branch")
+        self.courses.pop()
+        return self._place()
+
+    def _answer(self, words: Sequence[str]) -> Answer:
         number = _number(words)
         if number is None or len(words) < 2:
-            return Text("answer ID NAME, such as: answer 2 arm", style="yellow")
-        try:
-            self.agent.answer(number, " ".join(words[1:]))
-        except VisupError as fault:
-            return Text(str(fault), style="yellow")
+            return _amiss("answer ID NAME, such as: answer 2 arm")
+        name = " ".join(words[1:])
+        if not self.stepper.may_answer:
+            branch = self.stepper.branch()
+            branch.answer(number, name)
+            return self._begin(branch)
+        self.stepper.answer(number, name)
         return Text("taken as a fact from the next step on", style="dim")
 
-    def _candidates(self, words: Sequence[str]) -> RenderableType:
+    # What is believed
+
+    def _seen(self) -> Observation | None:
+        """What was perceived in this step."""
+        midway, last = self.stepper.midway, self.stepper.last
+        if midway is not None:
+            return midway.seen
+        return None if last is None else last.observation
+
+    def _candidates(self, words: Sequence[str]) -> Answer:
         number = _number(words)
-        belief = self.agent.mind.objects.get(number) if number is not None else None
+        belief = self.stepper.mind.objects.get(number) if number is not None else None
         if belief is None:
-            return Text("which object? 'objects' lists their ids", style="yellow")
+            return _amiss("which object? 'objects' lists their ids")
         return candidates_table(belief)
 
+    def _events(self, words: Sequence[str]) -> Answer:
+        most = _number(words) or 10
+        told = list(self.stepper.told(last=self.stepper.at))[-most:]
+        rows = Table.grid(padding=(0, 1))
+        for number, event in told:
+            rows.add_row(Text(f"step {number}", style="dim"), line(event))
+        return rows if told else Text("none yet")
 
-def until(what: str) -> Predicate:
-    """When to stop: at a time in seconds, an event kind, or a stage that becomes current."""
-    try:
-        at = float(what)
-    except ValueError:
-        return lambda step: (
-            any(e.kind == what for e in step.events)
-            or any(t.current == what for t in step.mind.tasks)
-        )
-    return lambda step: step.time >= at
+    def _directives(self, words: Sequence[str]) -> Answer:
+        asked = self.agent.directives
+        return Group(*map(shown, asked)) if asked else Text("nothing is asked for")
 
-
-def regions_table(step: Step | None) -> RenderableType:
-    """What motion segmentation saw in the last frame."""
-    if step is None:
-        return Text("no step was taken yet")
-    table = Table("region", "box", "area", "velocity px/s", "cut", "confidence")
-    for r in step.observation.of("region"):
-        box = ",".join(map(str, r.bbox))
-        velocity = f"{r.velocity[0]:.1f}, {r.velocity[1]:.1f} ± {r.velocity_sigma:.1f}"
-        cut = "yes" if r.cut else "no"
-        table.add_row(str(r.id), box, f"{r.area:.0f}", velocity, cut, f"{r.confidence:.2f}")
-    return table
+    def _behaviours(self, words: Sequence[str]) -> Answer:
+        seen = self._seen()
+        return behaviours_table(seen.reports) if seen else Text(_NO_STEP)
 
 
-def objects_table(mind: Mind) -> Table:
-    """Who is believed to be there."""
-    table = Table("id", "identity", "share", "presence", "box", "px/s", "depth")
-    for b in sorted(mind.objects.values(), key=lambda b: b.id):
-        speed = sum(v * v for v in b.region.velocity) ** 0.5
-        depth = f"{b.depth:.1f}" if b.depth is not None else "unknown"
-        box = ",".join(map(str, b.region.bbox))
-        table.add_row(
-            str(b.id), b.name, f"{b.strength:.2f}", b.presence.value, box, f"{speed:.1f}", depth
-        )
-    return table
+_NO_STEP = "no step was taken yet"
 
 
-def candidates_table(belief: ObjectBelief) -> Table:
-    """The identities that an object may have."""
-    table = Table("identity", "votes", "share", title=f"object {belief.id}")
-    for c in belief.candidates:
-        table.add_row(c.name, f"{c.votes:.2f}", f"{c.share:.2f}")
-    return table
+def _never(step: Step) -> bool:
+    return False
 
 
-def relations_table(mind: Mind, object_id: int | None) -> Table:
-    """What holds between objects; of one object and the others also what is seldom asked for."""
-    table = Table("relation", "objects", "truth", "since", "value", "confidence")
-    held = mind.relations
-    told: Iterable[Relation] = held
-    if object_id is not None and isinstance(held, RelationTable):
-        told = held.all()
-    for r in told:
-        if object_id is None or object_id in r.objects:
-            value = "" if r.value is None else f"{r.value:.1f}"
-            objects = " ".join(map(str, r.objects))
-            since = f"{r.since:.1f} s"
-            table.add_row(r.name, objects, r.truth.value, since, value, f"{r.confidence:.2f}")
-    return table
+def _help(words: Sequence[str]) -> Answer:
+    if not words:
+        return Text(HELP)
+    found = [c for c in COMMANDS.values() if c.name.startswith(words[0])]
+    if not found:
+        return _amiss(f"'{words[0]}' is not a command; 'help' lists them")
+    return Text("\n\n".join(c.text for c in found))
 
 
-def tasks_tree(mind: Mind) -> RenderableType:
-    """How each task stands."""
-    if not mind.tasks:
-        return Text("no task was given")
-    return Group(*(_task_tree(mind, n) for n in range(len(mind.tasks))))
+def _usage(name: str) -> str:
+    return f"{COMMANDS[name].usage}: {COMMANDS[name].does}"
 
 
-def _task_tree(mind: Mind, number: int) -> Tree:
-    task = mind.tasks[number]
-    tree = Tree(f"{task.task}: {task.verdict.value}  {task.evidence}".rstrip())
-    for s in task.stages:
-        here = "> " if s.stage == task.current else "  "
-        tree.add(f"{here}{s.stage}: {s.status.value} since {s.since:.1f} s  {s.evidence}".rstrip())
-    for b in task.bindings:
-        who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
-        tree.add(f"  {b.actor} is played by {who}")
-    return tree
+def _ids(objects: tuple[int, ...]) -> str:
+    return f"({', '.join(map(str, objects))})" if objects else ""
 
 
-def alerts_list(mind: Mind) -> RenderableType:
-    """What is open."""
-    lines = [
-        f"{a.id}  {a.severity.name.lower()}  since {a.opened:.1f} s  {a.cause}" for a in mind.alerts
-    ]
-    return Text("\n".join(lines) or "no alert is open")
-
-
-def questions_list(mind: Mind) -> RenderableType:
-    """What waits for an answer."""
-    return Text("\n".join(q.text for q in mind.questions) or "nothing is asked")
-
-
-def behaviours_table(step: Step | None) -> RenderableType:
-    """What each behaviour did."""
-    if step is None:
-        return Text("no step was taken yet")
-    table = Table("behaviour", "state", "percepts", "ms", "error")
-    for r in step.reports:
-        count, took = str(len(r.percepts)), f"{r.elapsed_ms:.1f}"
-        table.add_row(r.behaviour, r.state.value, count, took, r.error)
-    return table
+def _amiss(text: str) -> Text:
+    return Text(text, style="yellow")
 
 
 def _number(words: Sequence[str]) -> int | None:
-    return int(words[0]) if words and words[0].isdigit() else None
-
-
-def read_commands(words: Sequence[str]) -> Iterator[str]:
-    """Lines that the user enters: with history and completion on a terminal, plain from a pipe."""
-    if not sys.stdin.isatty():
-        yield from sys.stdin
-        return
-    from prompt_toolkit import PromptSession
-    from prompt_toolkit.completion import WordCompleter
-
-    prompt: PromptSession[str] = PromptSession(completer=WordCompleter(list(words)))
-    while True:
-        try:
-            yield prompt.prompt("visup> ")
-        except (EOFError, KeyboardInterrupt):
-            return
+    return int(words[0]) if words and words[0].isdecimal() else None

@@ -30,6 +30,7 @@ class WatchSettings:
         fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
         zones: Settings file with zones that rules can name, or None.
         patience_s: How long a camera or stream that drops is tried again, seconds.
+        attention: Whether objects that are known well are matched less often; see `rules/attention.py`.
     """
 
     source: str
@@ -47,6 +48,7 @@ class WatchSettings:
     fov_vertical_deg: float | None = None
     zones: Path | None = None
     patience_s: float = 60.0
+    attention: bool = False
 
     def __post_init__(self) -> None:
         if self.every < 1:

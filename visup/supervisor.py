@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from visup.agent import Behaviour, Mind, Severity, Verdict
@@ -16,6 +17,7 @@ from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.video import Source, open_source
 from visup.plugins import plug_ins
+from visup.rules.attention import Attend
 from visup.rules.language import load_rules
 from visup.rules.thinkers import default_thinkers
 from visup.settings import WatchSettings
@@ -27,6 +29,9 @@ from visup.zones import load_zones
 
 if TYPE_CHECKING:
     from visup.tasks.tree import Task
+
+LIVE_HANG_S = 10.0
+"""How long a behaviour may take for a frame of a camera before it is given up."""
 
 __all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
@@ -49,6 +54,8 @@ def build_agent(
     settings: WatchSettings,
     observers: Sequence[Observer] = (),
     also: Sequence[Behaviour] = (),
+    *,
+    live: bool = False,
 ) -> Agent:
     """An agent that supervises as the settings say.
 
@@ -56,6 +63,8 @@ def build_agent(
         settings: What to supervise against.
         observers: Told of each step.
         also: Behaviours besides those of the settings.
+        live: Whether frames are made while they are read, so that a behaviour that hangs must be told
+            soon.
 
     Raises:
         VisupError: A task, rules file, zones file, model database or behaviour is not as it should
@@ -73,7 +82,7 @@ def build_agent(
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
-        limits=Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate)),
+        limits=_limits(settings, live),
     )
 
 
@@ -111,6 +120,11 @@ _GRAVITY = (
 )
 
 
+def _limits(settings: WatchSettings, live: bool) -> Limits:
+    usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
+    return replace(usual, hang_s=LIVE_HANG_S) if live else usual
+
+
 def _behaviours(
     settings: WatchSettings, database: ModelDatabase | None, sizes_m: Mapping[str, float]
 ) -> list[Behaviour]:
@@ -126,7 +140,9 @@ def _behaviours(
 def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
     rules = tuple(rule for path in settings.rules for rule in load_rules(path))
     interpreting = default_thinkers(rules=rules or None)
-    match = (*((task_thinker(tasks),) if tasks else ()), tell_troubles)
+    following = (task_thinker(tasks),) if tasks else ()
+    attending = (Attend(),) if settings.attention else ()
+    match = (*following, *attending, tell_troubles)
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 

@@ -102,7 +102,8 @@ class ShapeBehaviour:
             frame: The frame; its time and its size are used.
             seen: Holds the regions.
             directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
-                (data: names) has these compared whatever the index says.
+                (data: names) has these compared whatever the index says; 'rest' (data: behaviour,
+                region, every_s) has a region matched no more often than that.
         """
         if self.database is None:
             return []
@@ -110,7 +111,7 @@ class ShapeBehaviour:
         restrict, first = _wishes(directives)
         here = {r.id for r in regions}
         self._remembered = {k: v for k, v in self._remembered.items() if k in here}
-        due = self._due(regions, frame.time, restrict)
+        due = self._due(regions, frame.time, restrict, _resting(directives, self.contract.name))
         found = self._match(self.database, due, frame, restrict, first)
         for region, matches in zip(due, found, strict=True):
             self._remembered[region.id] = _remembered(region, frame.time, restrict, matches)
@@ -122,20 +123,26 @@ class ShapeBehaviour:
         ]
 
     def _due(
-        self, regions: Sequence[Region], time: float, restrict: frozenset[str] | None
+        self,
+        regions: Sequence[Region],
+        time: float,
+        restrict: frozenset[str] | None,
+        resting: Mapping[int, float],
     ) -> list[Region]:
         """Regions to be matched now: those never matched first, then those matched longest ago."""
-        due = [r for r in regions if self._is_due(r, time, restrict)]
+        due = [r for r in regions if self._is_due(r, time, restrict, resting.get(r.id, 0.0))]
         last = {k: v.time for k, v in self._remembered.items()}
         due.sort(key=lambda r: (last.get(r.id, -np.inf), r.id))
         return due[: self.settings.matches_per_frame]
 
-    def _is_due(self, region: Region, time: float, restrict: frozenset[str] | None) -> bool:
+    def _is_due(
+        self, region: Region, time: float, restrict: frozenset[str] | None, rests_s: float
+    ) -> bool:
         old = self._remembered.get(region.id)
         if old is None or old.restrict != restrict or time < old.time:
             return True
         since = time - old.time
-        if since < self.settings.every_s - 1e-6:
+        if since < max(self.settings.every_s, rests_s) - 1e-6:
             return False
         return since >= self.settings.renew_s or not self._unchanged(old, region)
 
@@ -207,6 +214,15 @@ def _thumb(region: Region) -> NDArray[np.bool_]:
         region.mask.astype(np.uint8) * np.uint8(255), (_THUMB, _THUMB), interpolation=cv2.INTER_AREA
     )
     return np.asarray(small > 127)
+
+
+def _resting(directives: Sequence[Directive], behaviour: str) -> dict[int, float]:
+    """Regions that need not be looked at so often: id -> least seconds between two looks."""
+    return {
+        d.data["region"]: float(d.data["every_s"])
+        for d in directives
+        if d.kind == "rest" and d.data.get("behaviour") == behaviour
+    }
 
 
 def _wishes(directives: Sequence[Directive]) -> tuple[frozenset[str] | None, frozenset[str]]:

@@ -233,3 +233,18 @@ def test_between_two_views_lies_what_both_tell() -> None:
     assert degrees(np.arctan2(told[1], told[0])) == pytest.approx(degrees(0.15), abs=0.01)
     better = level_of([said[0], replace(said[1], similarity=0.6)], 0.0, 0.8, s)
     assert np.arctan2(*(-better.between[0][2])[[1, 0]]) < 0.02
+
+
+@pytest.mark.parametrize("apart_deg", [14.0, 20.0, 27.0, 33.0])
+def test_between_views_that_stand_wider_apart_greater_differences_tell_as_much(
+    apart_deg: float,
+) -> None:
+    """Similarity falls with the square of the angle: what lies between is told in the same proportion."""
+    s, apart = TreeSettings(), np.radians(apart_deg)
+    lower = 0.8 - 0.03 * (apart_deg / 20.0) ** 2
+    said = [
+        Hypothesis(1, "m", 0, 0.8, 0.0, direction=(1.0, 0.0, 0.0)),
+        Hypothesis(1, "m", 1, lower, 0.0, direction=(np.cos(apart), np.sin(apart), 0.0)),
+    ]
+    told = -level_of(said, 0.0, 0.8, s).between[0][2]
+    assert np.arctan2(told[1], told[0]) / apart == pytest.approx(0.378, abs=0.02)

@@ -85,6 +85,18 @@ def test_spin_is_right_although_looks_are_missing_and_wrong(rate: float) -> None
         assert np.median(late) == pytest.approx(rate, rel=0.2)
 
 
+def test_the_sigma_of_a_slow_spin_is_as_large_as_its_errors() -> None:
+    """Between two views hardly anything is seen of a slow turn: what is told of it must say so."""
+    off = []
+    for seed, rate in enumerate([0.6, 1.0, 1.5, 2.0] * 2):
+        times, true = spinning(rate, 12.0, seed, every=0.2)
+        *_, (_, pose) = believed(times, told_views(true, seed, 32))
+        if pose is not None and pose.spin is not None:
+            off.append(abs(pose.spin.rate - rate) / pose.spin.sigma)
+    assert len(off) >= 5
+    assert np.mean(np.array(off) < 2.0) >= 0.8
+
+
 def test_an_object_that_stands_still_is_told_to_stand_still() -> None:
     for seed in range(3):
         times, true = spinning(0.0, 14.0, seed)

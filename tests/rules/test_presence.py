@@ -101,6 +101,34 @@ def test_an_object_that_stays_at_the_border_is_not_believed_to_leave() -> None:
     assert told == [("entry", 1)]
 
 
+def test_what_comes_over_the_border_in_pieces_enters_when_it_was_first_seen() -> None:
+    """A piece at 1 s, and from 1.2 s on the whole of it, four times as large."""
+
+    def at(i: int) -> Observation:
+        height = 0 if i < 25 else 20 if i < 30 else 90
+        box = box_region(1, (0, 100, 2 * (i - 20), height)) if height else None
+        return seen(i, [still(i, 7), box])
+
+    found = [(k, t) for k, o, t in events(run(at(i) for i in range(25 * 4))) if o == 1]
+    assert [k for k, _ in found] == ["entry"]
+    assert found[0][1] < 1.45
+
+
+def test_what_hardly_drifts_and_reaches_far_into_the_image_has_not_left_when_it_is_missed() -> None:
+    """Of a long arm at the upper border, whose drift is noise, a big box leaves the upper quarter."""
+
+    def at(i: int) -> Observation:
+        right = min(420, 6 * max(0, i - 30))
+        shows = 84 if right > 330 else 300
+        arm = box_region(1, (300, -0.04 * i, 30, shows)) if not 110 <= i < 122 else None
+        if arm is not None:
+            arm = replace(arm, velocity=(0.0, -1.5), velocity_sigma=0.7)
+        return seen(i, [arm, box_region(2, (right - 420, 84, 420, 380))])
+
+    thoughts = run(at(i) for i in range(25 * 6))
+    assert "exit" not in [k for k, _ in kinds(thoughts)]
+
+
 @pytest.mark.parametrize("new_id", [False, True])
 def test_hidden_by_a_passing_object_and_seen_again_with_the_same_identity(new_id: bool) -> None:
     def regions(i: int) -> list[Region | None]:

@@ -130,3 +130,19 @@ def test_what_is_too_uncertain_is_not_told() -> None:
     assert spin is not None
     assert spin.axis == pytest.approx((1.0, 0.0, 0.0))
     assert spin.rate == pytest.approx(np.degrees(0.1), rel=0.01)
+
+
+def test_a_change_is_found_however_long_ago_it_was() -> None:
+    """What only the rate after it tells: a slow turn that became a faster one."""
+    for ago in (9.0, 13.0, 18.0):
+        before, _ = turning(0.6, 14.0, 3)
+        after, true = turning(3.0, ago, 5)
+        link = after.orientations[0].T @ before.orientations[-1]
+        seen = np.concatenate([before.orientations, (after.orientations @ link)[1:]])
+        noise = 3.0 * np.random.default_rng(6).normal(size=(len(seen), 3))
+        times = np.concatenate([before.times, before.times[-1] + after.times[1:]])
+        shaken = Rotation.from_rotvec(np.radians(noise)).as_matrix() @ seen
+        found = measure(Turns(times, shaken))
+        assert found is not None
+        assert found.since == pytest.approx(before.times[-1], abs=2.0)
+        assert np.degrees(np.linalg.norm(found.vector - true)) < 0.2 * 3.0

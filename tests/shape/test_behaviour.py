@@ -253,3 +253,22 @@ def test_a_measured_size_goes_before_that_of_the_database(database: Counting) ->
     assert twice.value.depth == pytest.approx(2 * plain.value.depth)
     assert twice.value.sigma == pytest.approx(2 * plain.value.sigma)
     assert other.value == plain.value
+
+
+def test_a_region_that_rests_is_matched_less_often_and_told_in_every_frame(
+    database: Counting,
+) -> None:
+    shapes = [region(ZOO[name]) for name in list(ZOO)[:2]]
+
+    def looks(*asked: Directive) -> int:
+        before, behaviour = database.queries, ShapeBehaviour(database)
+        for n in range(25):
+            # Two silhouettes in turn, so that a look is due as soon as there may be one.
+            seen = observation(n / 10, region=[shapes[n % 2]])
+            assert behaviour.perceive(frame(n / 10), seen, asked)
+        return database.queries - before
+
+    rest = Directive("rest", "known", {"behaviour": "shape", "region": 1, "every_s": 1.0})
+    other = Directive("rest", "known", {"behaviour": "shape", "region": 2, "every_s": 1.0})
+    assert looks() == looks(other) == 9  # after 0.2 s, at the next other silhouette
+    assert looks(rest) == 3

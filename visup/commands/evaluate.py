@@ -10,9 +10,10 @@ import typer
 
 from visup.commands.clips import clips
 from visup.commands.databases import robustness, scale
+from visup.commands.eval_recognition import recognition
 from visup.commands.eval_tasks import tasks
 from visup.commands.faults import faults
-from visup.commands.lasting import resume, soak
+from visup.commands.lasting import pace, resume, soak, stepping
 from visup.commands.reasoning import reasoning
 from visup.commands.relations import relations
 from visup.commands.rule_figures import rules
@@ -32,8 +33,11 @@ app.command("relations")(relations)
 app.command("rules")(rules)
 app.command("reasoning")(reasoning)
 app.command("tasks")(tasks)
+app.command("recognition")(recognition)
 app.command("resume")(resume)
 app.command("soak")(soak)
+app.command("stepping")(stepping)
+app.command("pace")(pace)
 
 Folder = Annotated[Path, typer.Argument(help="Folder with the data and its ground truth.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures to this file too.")]

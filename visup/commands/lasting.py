@@ -1,9 +1,10 @@
-"""`visup eval resume` and `visup eval soak`: runs that are killed, and runs of hours."""
+"""`visup eval resume`, `soak`, `pace`, `stepping`: kills, runs of hours, the time of a step, the way back."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -66,3 +67,49 @@ def soak(
         console.print(f"{name}: {value:.6g}")
     if json_file:
         write_record(json_file, figures, {"frames": frames})
+
+
+def stepping(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures to this file too.")
+    ] = None,
+    steps: Annotated[int, typer.Option(help="How many are made and kept.")] = 10_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the places to go back from.")] = 0,
+) -> None:
+    """Going back by 500 steps: its time, the memory that it takes, and whether it leads to the same."""
+    from rich.console import Console
+
+    from visup.commands.evaluate import print_table, told, writable
+    from visup.evaluation.record import write_record
+    from visup.evaluation.stepping import evaluate_stepping, missed
+
+    writable(json_file)
+    with told("stepping") as tell:
+        figures = evaluate_stepping(steps, seed=seed, progress=tell)
+    console = Console()
+    print_table(console, "stepping", figures, ("median_ms", "most_ms"))
+    for name, value in figures["total"].items():
+        console.print(f"{name}: {value:.6g}")
+    for text in missed(figures):
+        console.print(text, soft_wrap=True)
+    if json_file:
+        write_record(json_file, figures, {"steps": steps, "seed": seed})
+    raise typer.Exit(int(bool(missed(figures))))
+
+
+def pace(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Write the figures to this file too.")
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Length of each script.")] = 2000,
+    kept: Annotated[int, typer.Option(min=100, help="Minds that are kept in a row.")] = 10_000,
+) -> None:
+    """The time of a step without perception, of replay and observers, and what a kept mind takes."""
+    from visup.commands.databases import run_and_show
+    from visup.evaluation.pace import evaluate_pace
+
+    def run(tell: Callable[[str], None]) -> dict[str, Any]:
+        return evaluate_pace(steps, kept=kept, progress=tell)
+
+    keys = ("ms", "ms_low", "think_ms", "alerts", "observers", "replay_fps", "mind_kb")
+    run_and_show("pace", run, keys, json_file, {"steps": steps, "kept": kept})

@@ -1,11 +1,16 @@
-"""`visup step`: step the agent in the terminal and look into its mind."""
+"""`visup step`: step the agent in the terminal and look into its mind, live or on a recorded run."""
 
 from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from visup.commands.watch import (
     Actors,
+    Attention,
     Behaviours,
     Every,
     Fov,
@@ -16,15 +21,21 @@ from visup.commands.watch import (
     Rules,
     Set,
     SettingsFile,
-    Source,
     Tasks,
     Zones,
     settings_of,
 )
 
+if TYPE_CHECKING:
+    from visup.agent.agent import Agent
+    from visup.settings import WatchSettings
+    from visup.stepping import Feed
+
 
 def step(
-    source: Source,
+    source: Annotated[
+        str, typer.Argument(help="Video file, folder of images, camera, URL, or a run folder.")
+    ],
     task: Tasks = None,
     models: Models = None,
     rules: Rules = None,
@@ -38,28 +49,63 @@ def step(
     setting: Set = None,
     settings_file: SettingsFile = None,
     isolate: Isolate = None,
+    attention: Attention = False,
 ) -> None:
-    """Step through a video and look into the agent's mind."""
-    from visup.session import Session, read_commands
+    """Step through a video or a recorded run, forth and back, and look into the agent's mind.
+
+    Commands are read from the terminal, or from a pipe: one a line, see `help`.
+    """
+    # All options by their names: a run folder takes those that replay takes, and refuses the rest.
+    given = dict(locals())
+    from visup.prompt import read_commands
+    from visup.session import Session
+
+    with ExitStack() as stack:
+        agent, frames = _recorded(given) if _is_run(source) else _live(settings_of(**given), stack)
+        session = Session(agent, frames)
+        code = session.run(read_commands(session))
+    raise typer.Exit(code)
+
+
+def _is_run(source: str) -> bool:
+    from visup.agent.recording import JOURNAL
+
+    path = Path(source)
+    return (path / JOURNAL).is_file() or (path.is_file() and path.name == JOURNAL)
+
+
+def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
     from visup.supervisor import build_agent, open_video
 
-    settings = settings_of(
-        source,
-        task,
-        models,
-        rules,
-        actor,
-        every,
-        behaviour,
-        plugin,
-        fps,
-        fov,
-        zones,
-        setting,
-        settings_file,
-        isolate,
+    agent = build_agent(settings)
+    stack.callback(agent.close)
+    return agent, stack.enter_context(open_video(settings))
+
+
+_AGAIN = ("source", "task", "rules", "actor", "zones")
+"""What a recorded run can be reasoned about again with."""
+
+
+def _recorded(given: dict[str, Any]) -> tuple[Agent, Feed]:
+    from visup.agent.errors import SettingsError
+    from visup.agent.recording import Recording
+    from visup.replay import settings_for
+    from visup.settings import parse_actors
+    from visup.stepping import RecordedFeed
+    from visup.supervisor import reasoning_agent
+
+    beyond = [k for k, v in given.items() if k not in _AGAIN and v not in (None, [], 1, False)]
+    if beyond:
+        raise SettingsError(
+            f"a recorded run is not seen again: {', '.join(beyond)} cannot be changed",
+            expected="--task, --rules, --actor or --zones",
+        )
+    recording = Recording.open(Path(given["source"]))
+    settings = settings_for(
+        recording,
+        tasks=tuple(given["task"] or ()),
+        rules=tuple(given["rules"] or ()),
+        actors=parse_actors(given["actor"] or ()),
+        zones=given["zones"],
     )
-    with open_video(settings) as video:
-        session = Session(build_agent(settings), video)
-        code = session.run(read_commands(session.words()))
-    raise typer.Exit(code)
+    return reasoning_agent(settings), RecordedFeed(recording)

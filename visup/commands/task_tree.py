@@ -5,24 +5,18 @@ from __future__ import annotations
 from rich.markup import escape
 from rich.tree import Tree
 
-from visup.tasks.tree import (
-    Action,
-    Actors,
-    AnyOrder,
-    Choice,
-    Comparison,
-    Counted,
-    Course,
-    Judged,
-    Reference,
-    Repeated,
-    Sequence,
-    Task,
-    Timed,
-    Together,
-)
+from visup.tasks.outline import Branch, Kind, outline
+from visup.tasks.tree import Task
 
-REPEATS = {"?": "perhaps", "*": "any number of times", "+": "at least once"}
+STYLES: dict[Kind, str] = {
+    "task": "bold",
+    "stage": "bold",
+    "action": "cyan",
+    "actor": "green",
+    "clause": "magenta",
+    "way": "dim",
+    "words": "italic",
+}
 
 
 def task_tree(task: Task) -> Tree:
@@ -34,8 +28,9 @@ def task_tree(task: Task) -> Tree:
     Returns:
         A rich tree; each stage is opened where it is first referred to.
     """
-    tree = Tree(f"[bold]{escape(task.name)}[/bold]")
-    _grow(tree, task, task.name, set())
+    whole = outline(task)
+    tree = Tree(_text(whole))
+    _grow(tree, whole)
     declared = (
         ("actors", task.actors),
         ("zones", task.zones),
@@ -50,42 +45,13 @@ def task_tree(task: Task) -> Tree:
     return tree
 
 
-def _grow(tree: Tree, task: Task, name: str, shown: set[str]) -> None:
-    stage = task.stage(name)
-    if stage is None or name in shown:
-        return
-    shown.add(name)
-    if stage.text:
-        tree.add(f"[italic]{escape(stage.text)}[/italic]")
-    if isinstance(stage.body, Actors):
-        for actor in stage.body.names:
-            tree.add(f"[green]{actor}[/green]")
-    else:
-        _grow_course(tree, task, stage.body, shown)
+def _grow(tree: Tree, branch: Branch) -> None:
+    for inner in branch.inside:
+        _grow(tree.add(_text(inner)), inner)
 
 
-TITLES = {Choice: "one of", Together: "at the same time", AnyOrder: "each, in any order"}
-
-
-def _grow_course(tree: Tree, task: Task, course: Course, shown: set[str]) -> None:
-    match course:
-        case Action() | Comparison():
-            tree.add(f"[cyan]{escape(str(course))}[/cyan]")
-        case Reference(stage=name):
-            again = " [dim](see above)[/dim]" if name in shown else ""
-            _grow(tree.add(f"[bold]<{escape(name)}>[/bold]{again}"), task, name, shown)
-        case Sequence(items=items):
-            for item in items:
-                _grow_course(tree, task, item, shown)
-        case Choice(options=parts) | Together(parts=parts) | AnyOrder(items=parts):
-            branch = tree.add(f"[dim]{TITLES[type(course)]}[/dim]")
-            for part in parts:
-                inner = branch.add("[dim]in turn[/dim]") if isinstance(part, Sequence) else branch
-                _grow_course(inner, task, part, shown)
-        case Timed(item=item, clauses=said) | Judged(item=item, signs=said):
-            words = " ".join(map(str, said))
-            _grow_course(tree.add(f"[magenta]{escape(words)}[/magenta]"), task, item, shown)
-        case Repeated(item=item, mark=mark):
-            _grow_course(tree.add(f"[dim]{REPEATS[mark]}[/dim]"), task, item, shown)
-        case Counted(item=item):
-            _grow_course(tree.add(f"[dim]{course.times}[/dim]"), task, item, shown)
+def _text(branch: Branch) -> str:
+    style = STYLES[branch.kind]
+    text = f"<{branch.text}>" if branch.kind == "stage" else branch.text
+    again = " [dim](see above)[/dim]" if branch.again else ""
+    return f"[{style}]{escape(text)}[/{style}]{again}"

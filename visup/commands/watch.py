@@ -57,6 +57,9 @@ Isolate = Annotated[
 Budgets = Annotated[
     bool, typer.Option("--budgets", help="Give up what exceeds its budget; for live sources.")
 ]
+Attention = Annotated[
+    bool, typer.Option("--attention", help="Match what is known well less often: cheaper.")
+]
 Fps = Annotated[float | None, typer.Option(help="Frame rate, where the source has none.")]
 Fov = Annotated[float | None, typer.Option(help="Vertical field of view of the camera, degrees.")]
 
@@ -82,6 +85,7 @@ def settings_of(
     settings_file: Path | None = None,
     isolate: list[str] | None = None,
     budgets: bool = False,
+    attention: bool = False,
 ) -> WatchSettings:
     """The settings of a run, from the command's options."""
     from visup.agent.plugin_settings import merged, parse_settings, read_settings
@@ -100,6 +104,7 @@ def settings_of(
         ),
         isolate=tuple(isolate or ()),
         budgets=budgets,
+        attention=attention,
         every=every,
         fps=fps,
         fov_vertical_deg=fov,
@@ -128,6 +133,7 @@ def watch(
     settings_file: SettingsFile = None,
     isolate: Isolate = None,
     budgets: Budgets = False,
+    attention: Attention = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only the verdict.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Events as JSON, one a line.")] = False,
     video: Annotated[bool, typer.Option(help="Write the annotated video.")] = True,
@@ -171,7 +177,7 @@ def watch(
     )
     if resume:
         given = (source, task, models, rules, out, actor, behaviour, plugin, fps, fov, zones)
-        more = (setting, settings_file, isolate, budgets, every != 1)
+        more = (setting, settings_file, isolate, budgets, attention, every != 1)
         settings, past = _past(resume, *given, *more)
     elif source is None:
         raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
@@ -193,6 +199,7 @@ def watch(
             settings_file,
             isolate,
             budgets,
+            attention,
         )
     result = run_and_tell(
         settings,

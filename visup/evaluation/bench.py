@@ -46,9 +46,12 @@ def main() -> int:
             "relations",
             "rules",
             "tasks",
+            "recognition",
             "faults",
             "resume",
+            "pace",
             "soak",
+            "stepping",
         )
         if (given.only or "") in kind
     ]

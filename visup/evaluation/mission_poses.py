@@ -46,13 +46,20 @@ def spin_error(truth: Mapping[str, Any], poses: Poses) -> float | None:
     """
     errors = []
     for (index, name), pose in poses.items():
-        true = _true_spin(truth, index, name)
+        true = true_spin(truth, index, name)
         if pose.spin is not None and true is not None:
             errors.append(abs(pose.spin.rate - true))
     return float(np.median(errors)) if errors else None
 
 
-def _true_spin(truth: Mapping[str, Any], index: int, name: str) -> float | None:
+def true_spin(truth: Mapping[str, Any], index: int, name: str) -> float | None:
+    """How fast an object truly turns at a frame, degrees per second; None where that is not known.
+
+    Args:
+        truth: What `truth.json` holds.
+        index: Number of the frame.
+        name: The object.
+    """
     from scipy.spatial.transform import Rotation
 
     frames = truth["frames"]

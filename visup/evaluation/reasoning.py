@@ -20,6 +20,7 @@ from visup.agent import Frame, Mind, ObjectBelief, Presence
 from visup.agent.agent import Agent, Step, Thinkers
 from visup.evaluation.calibration import Calibration
 from visup.evaluation.mission_files import mission_folders
+from visup.evaluation.mission_poses import true_spin
 from visup.evaluation.mission_scores import UNSCORED_START_S, Truths, truths_of
 from visup.evaluation.missions import (
     COVERING_IOU,
@@ -190,11 +191,22 @@ def run_scores(watch: Watch) -> dict[str, Any]:
 
 
 def _spin_errors(watch: Watch) -> list[float]:
-    """Relative error of the satellite's spin at the end of a mission, where it is believed."""
-    true = float(watch.mission.truth.get("spin_deg_per_s", 0.0))
+    """Relative error of the satellite's spin at the end of a mission, where it is believed.
+
+    What it is compared with is how the satellite truly turns then: what was caught turns as it is carried.
+    """
     end = watch.said.last.time if watch.said.last else 0.0
-    told = [r for t, r in watch.spins.get("satellite", []) if t > end - SPIN_SPAN_S]
-    return [abs(float(np.median(told)) - true) / true] if told and true > 0 else []
+    late = [(t, r) for t, r in watch.spins.get("satellite", []) if t > end - SPIN_SPAN_S]
+    rates = [(r, true_spin(watch.mission.truth, _index(watch, t), "satellite")) for t, r in late]
+    both = [(told, true) for told, true in rates if true is not None]
+    if not both:
+        return []
+    told, true = np.median(np.array(both), axis=0).tolist()
+    return [abs(told - true) / true] if true > 0 else []
+
+
+def _index(watch: Watch, time: float) -> int:
+    return round(time * watch.mission.fps)
 
 
 def evaluate_reasoning(

@@ -187,12 +187,12 @@ def _long(
     for seen in scripted(frames):
         long.step(seen)
         if seen.frame_index == last_tenth:
-            memory.append(_rss_mb())
+            memory.append(rss_mb())
             fresh = _Run(folder / "fresh", LIMITS)
         if fresh:
             fresh.step(seen)
         if seen.frame_index == frames // 10:
-            memory.append(_rss_mb())
+            memory.append(rss_mb())
         if seen.frame_index % 1000 == 0:
             tell(f"{seen.frame_index} of {frames} frames")
     long.journal.close()
@@ -276,7 +276,8 @@ def sinks_ratio(place: Path, frames: int, also: tuple[str, ...] = ()) -> float:
     return float(np.percentile(taken[1], 25) / np.percentile(taken[0], 25))
 
 
-def _rss_mb() -> float:
+def rss_mb() -> float:
+    """Memory that this process takes, megabytes."""
     pages = Path("/proc/self/statm")
     if pages.exists():
         return int(pages.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20

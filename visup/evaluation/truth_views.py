@@ -2,34 +2,35 @@
 
 Names are wrong in runs: what a silhouette is mistaken for, it is mistaken for again a moment later. What
 it may be mistaken for are the mission's other models and some that are not there; some of them far more
-often than others. Views are those of a database: the direction to the viewer is one of a fixed set, near
-the true one.
+often than others. Views are those of a database: directions spread over half the sphere, each standing
+for the opposite one too. As matching does, a few views of the right model are told at once, less similar the
+farther they are from the true direction (`told_views.py`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Depth, Hypothesis, Region
-from visup.agent.viewing import picture_axes
+from visup.evaluation.told_views import ToldViews, ViewNoise
 from visup.evaluation.truth_masks import Mission
-from visup.percepts.shape.views import sphere_directions
+from visup.percepts.shape.views import half_sphere_directions
 
 ABSENT = ("antenna", "barrel", "chair", "drill", "engine", "funnel", "guitar", "hammer", "iron")
 """Models that no mission of ours shows, for silhouettes to be mistaken for."""
 
-VIEWS = 48
-"""Directions from which a model's views are seen."""
+VIEWS = 32
+"""Views of a model, as many as `visup models build` makes by default; each is seen from behind too."""
 
-_DIRECTIONS = sphere_directions(VIEWS)
+# Names that are wrong, and looks without a name, are chosen here: told views have only their own noise.
+_NOISE = ViewNoise(missing=0.0, wrong=0.0)
+_DIRECTIONS = half_sphere_directions(VIEWS)
 _PERSISTS = 0.7  # how often a wrong name stays the same within a run of wrong names
-_NEIGHBOUR = 0.3  # how often the view is not the nearest one but one of those around it
-_OPPOSITE = 0.05  # how often a silhouette is taken for its mirror image, as seen from behind
-_TURN_RAD = 0.06  # of in-plane rotation, standard deviation
 _TOLD = 4  # names told each time
 
 
@@ -66,6 +67,7 @@ class Namer:
         self._odds /= self._odds.sum()
         self._end = 1.0 / run
         self._wrong, self._listed, self._depth, self._rng = wrong, listed, depth, rng
+        self._views = ToldViews(self.model, _DIRECTIONS, _NOISE, rng)
         self._mistaken: str | None = None
         self._off = 0.0
 
@@ -83,7 +85,7 @@ class Namer:
         names = self._names(self._wrong if alone else min(0.9, 2 * self._wrong))
         true = self._frames[index].get(self._name, {})
         for name in names:
-            yield self._hypothesis(region, name, min(similarity, 0.99), true)
+            yield from self._hypotheses(region, name, min(similarity, 0.99), true)
             similarity -= 0.01 + abs(0.05 + 0.03 * self._rng.standard_normal())
         self._off = 0.7 * self._off + 0.7 * self._rng.standard_normal()
         if true.get("range_m") and not region.cut and alone and self.model in names:
@@ -110,36 +112,27 @@ class Namer:
     def _other(self) -> str:
         return str(self._rng.choice(self._others, p=self._odds))
 
-    def _hypothesis(
+    def _hypotheses(
         self, region: Region, name: str, similarity: float, true: Mapping[str, Any]
-    ) -> Hypothesis:
-        view = int(self._rng.integers(VIEWS))
+    ) -> Iterator[Hypothesis]:
+        """Views of one model, best first; only the right one has several that are alike."""
         if name != self.model:
+            view = int(self._rng.integers(VIEWS))
             d, turn = _DIRECTIONS[view], float(self._rng.uniform(-np.pi, np.pi))
+            direction = (float(d[0]), float(d[1]), float(d[2]))
+            yield Hypothesis(region.id, name, view, similarity, turn, None, direction)
         elif "quat_xyzw" not in true:
             # Only exemplars of silhouettes are known of it.
-            return Hypothesis(region.id, name, view % 8, similarity)
+            view = int(self._rng.integers(VIEWS))
+            yield Hypothesis(region.id, name, view % 8, similarity)
         else:
-            view, d, turn = self._view(true)
-        direction = (float(d[0]), float(d[1]), float(d[2]))
-        return Hypothesis(region.id, name, view, similarity, turn, None, direction)
+            said = self._views(self._seen(true), region.id)
+            for h in said:
+                alike = max(0.0, similarity - said[0].similarity + h.similarity)
+                yield replace(h, similarity=alike)
 
-    def _view(self, true: Mapping[str, Any]) -> tuple[int, NDArray[np.float64], float]:
-        """Number, direction and in-plane rotation of the view that it is taken for."""
-        rng, turned, ray = self._rng, *self._seen(true)
-        towards = turned.T @ -ray
-        if rng.random() < _OPPOSITE:
-            towards = -towards
-        nearest = np.argsort(-(_DIRECTIONS @ towards))
-        view = int(nearest[rng.integers(1, 5)] if rng.random() < _NEIGHBOUR else nearest[0])
-        d = _DIRECTIONS[view]
-        right, up = (turned @ axis for axis in picture_axes(d))
-        # The turn in the picture that lays both axes of the view best upon those of the object.
-        angle = np.arctan2(right[1] + up[0], right[0] - up[1])
-        return view, d, float(angle + _TURN_RAD * rng.standard_normal())
-
-    def _seen(self, true: Mapping[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Rotation (3, 3) from object to camera, and the unit line of sight to it."""
+    def _seen(self, true: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Orientation (3, 3) in which it is seen: against the line of sight to it, not the optical axis."""
         from scipy.spatial.transform import Rotation
 
         box: Sequence[int] = true.get("bbox") or (0, 0, *self._size)
@@ -147,5 +140,11 @@ class Namer:
         width, height = self._size
         focal = height / 2 / np.tan(self._fov / 2)
         ray = np.array([x + w / 2 - width / 2, y + h / 2 - height / 2, focal])
-        turned = Rotation.from_quat(true["quat_xyzw"]).as_matrix()
-        return np.asarray(turned), ray / np.linalg.norm(ray)
+        turned = Rotation.from_quat(true["quat_xyzw"])
+        # Turned the shortest way to where the line of sight is the optical axis.
+        across = np.cross(ray, [0.0, 0.0, 1.0])
+        sine = float(np.linalg.norm(across))
+        if sine < 1e-9:
+            return np.asarray(turned.as_matrix())
+        aside = Rotation.from_rotvec(across / sine * np.arctan2(sine, ray[2]))
+        return np.asarray((aside * turned).as_matrix())

@@ -38,6 +38,7 @@ from visup.report.records import (
     Subject,
 )
 from visup.rules.geometry import outline_gap
+from visup.tasks.outline import Branch
 from visup.wording import worded_once
 
 __all__ = ["Collector", "Limits", "RunData"]
@@ -175,6 +176,7 @@ class Collector:
         problem: str | None = None,
         notes: Sequence[str] = (),
         events: Sequence[Event] = (),
+        courses: Sequence[Branch] = (),
     ) -> RunData:
         """All that was kept, at the end of the run.
 
@@ -185,6 +187,7 @@ class Collector:
             problem: Why the source ended early (`Source.problem`).
             notes: What had to be assumed (`Source.notes`).
             events: Sentences that were told after the last step.
+            courses: The trees of the tasks (`visup.tasks.outline`).
 
         Returns:
             What `write_report` takes.
@@ -214,6 +217,7 @@ class Collector:
             facts=dict(facts or {}),
             problem=problem,
             notes=tuple(notes),
+            courses=tuple(courses),
         )
 
     def _remember_subjects(self, mind: Mind) -> None:

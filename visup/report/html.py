@@ -10,6 +10,7 @@ from string import Template
 
 from visup.agent.errors import ExtraMissingError, OutputError
 from visup.report import sections
+from visup.report.courses import courses
 from visup.report.figures import (
     Figure,
     distance_figures,
@@ -74,6 +75,7 @@ def report_page(run: RunData) -> str:
         alerts=sections.alerts(run),
         key_frames=sections.key_frames(run),
         tasks=sections.tasks(run),
+        courses=courses(run),
         stages=sections.figures([stages], "No stage was followed."),
         presence=sections.figures([presence], "No object was followed."),
         distances=sections.figures(distances, "No two objects were in view together."),

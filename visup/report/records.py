@@ -8,6 +8,7 @@ from typing import Any
 
 from visup.agent import Alert, Event, Severity, TaskBelief, Verdict
 from visup.agent.records import empty
+from visup.tasks.outline import Branch
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +176,7 @@ class RunData:
             values may be nested mappings and lists.
         problem: Why the source ended early, or None.
         notes: Sentences about what had to be assumed.
+        courses: The tree of each task.
     """
 
     source: str
@@ -194,6 +196,7 @@ class RunData:
     facts: Mapping[str, Any] = field(default_factory=empty)
     problem: str | None = None
     notes: tuple[str, ...] = ()
+    courses: tuple[Branch, ...] = ()
 
     def spans_about(self, kind: str) -> tuple[Span, ...]:
         """Spans of one kind: 'stage', 'relation' or 'presence'."""

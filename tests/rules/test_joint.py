@@ -1,0 +1,98 @@
+"""How two bodies move relative to each other, and what that tells of rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.rules.scenes import SIZE, box_region
+from visup.agent import Region
+from visup.rules.joint import Joint, Kept, Motion, begun, follow, motion
+
+STILL, MOVING = 2.0, 10.0
+speeds = st.floats(-40.0, 40.0)
+
+
+def at_speed(x: float, y: float, variance: float) -> Motion:
+    return Motion(np.array([x, y]), variance * np.eye(2), 0.3)
+
+
+def joint(path: list[tuple[float, ...]]) -> Joint:
+    nothing = Kept(np.zeros((0, 2)), np.zeros((0, 2)))
+    return Joint(nothing, nothing, 0.0, path=tuple(path))
+
+
+def places(speed: float, until: float = 1.0, missing: range = range(0)) -> list[tuple[float, ...]]:
+    """A relative path at 25 places a second, shaken by half a pixel; no image motion is known."""
+    shake = 0.5 * np.random.default_rng(1).normal(size=(round(25 * until), 2))
+    every = [(k / 25, speed * k / 25 + x, y, *[np.nan] * 3) for k, (x, y) in enumerate(shake)]
+    return [p for k, p in enumerate(every) if k not in missing]
+
+
+@given(speeds, speeds, st.floats(0.01, 100.0))
+def test_whichever_way_a_body_moves_it_tells_the_same(x: float, y: float, variance: float) -> None:
+    odds = at_speed(x, y, variance).rest_odds(STILL, MOVING)
+    for other in ((-x, y), (x, -y), (y, x)):
+        assert at_speed(*other, variance).rest_odds(STILL, MOVING) == pytest.approx(odds, abs=1e-6)
+
+
+@given(speeds, st.floats(1.01, 3.0), st.floats(0.01, 100.0))
+def test_the_faster_it_moves_the_less_it_rests(speed: float, more: float, variance: float) -> None:
+    slow = at_speed(speed, 0.0, variance).rest_odds(STILL, MOVING)
+    fast = at_speed(speed * more, 0.0, variance).rest_odds(STILL, MOVING)
+    assert fast <= slow + 1e-9
+
+
+@given(st.floats(0.01, 1e4))
+def test_what_is_hardly_known_tells_little(variance: float) -> None:
+    known = at_speed(0.0, 0.0, variance).rest_odds(STILL, MOVING)
+    less = at_speed(0.0, 0.0, 2 * variance).rest_odds(STILL, MOVING)
+    assert 0.0 < less < known
+    assert at_speed(0.0, 0.0, 1e9).rest_odds(STILL, MOVING) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_rest_and_motion_are_told_apart() -> None:
+    assert at_speed(0.5, 0.5, 1.0).rest_odds(STILL, MOVING) > 2.0
+    assert at_speed(6.0, 0.0, 1.0).rest_odds(STILL, MOVING) < 0.0
+
+
+@pytest.mark.parametrize("speed", [0.0, 8.0, 25.0])
+def test_the_slope_of_a_path_is_its_speed(speed: float) -> None:
+    found = motion(joint(places(speed)), 0.96, 0.3)
+    assert found is not None
+    assert abs(found.velocity[0] - speed) < 3 * np.sqrt(found.covariance[0, 0])
+    assert found.span == pytest.approx(0.28, abs=0.05)
+
+
+def test_after_a_gap_the_way_gone_in_it_tells() -> None:
+    found = motion(joint(places(8.0, missing=range(8, 22))), 0.96, 0.3)
+    assert found is not None
+    assert found.span > 0.6
+    assert found.velocity[0] == pytest.approx(8.0, abs=2.0)
+
+
+@pytest.mark.parametrize("count", range(6))
+def test_of_a_few_places_nothing_is_told(count: int) -> None:
+    assert motion(joint(places(8.0)[:count]), count / 25, 0.3) is None
+
+
+def test_boxes_that_move_apart_are_followed() -> None:
+    def both(t: float) -> tuple[Region, Region]:
+        first, second = (
+            box_region(1, (100, 200, 80, 60)),
+            box_region(2, (184 + 20 * t, 200, 80, 60)),
+        )
+        assert first is not None
+        assert second is not None
+        return first, second
+
+    known = begun(both(0.0), 0.0, SIZE)
+    for k in range(1, 20):
+        known = follow(known, both(k / 25), k / 25, SIZE, lasts_s=1.2, anew_s=2.5)
+    assert known is not None
+    found = motion(known, 19 / 25, 0.3)
+    assert found is not None
+    assert found.velocity[0] == pytest.approx(20.0, abs=1.0)
+    assert found.rest_odds(STILL, MOVING) < -5.0

@@ -1,0 +1,144 @@
+"""The commands of `visup step`: how each is written, what it does, what completes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command of a session.
+
+    Attributes:
+        usage: How it is written.
+        does: What it does, in one clause.
+        more: What else there is to know.
+        completes: What its words may be: 'stop', 'why', 'object', 'relation', 'break', 'mark', 'file',
+            'command', 'expression'.
+    """
+
+    usage: str
+    does: str
+    more: str = ""
+    completes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its first word."""
+        return self.usage.split()[0]
+
+    @property
+    def text(self) -> str:
+        """All that there is to know of it."""
+        return f"{self.usage}\n  {self.does}" + (f"\n\n{self.more}" if self.more else "")
+
+
+_WHERE = """\
+WHAT is one of
+  a phase            update, cogitate, match, act: stops inside the step after
+                     it, with the half-made mind to look at
+  an event           alert, entry, coupled, stage_failing, ...
+  a rule             collision_course: when it becomes true of anybody;
+                     'rule NAME changes': whenever its verdict changes
+  a stage            when it becomes current or its status changes
+  object 2           when its presence or identity changes
+  12.5, frame 300    at that time in seconds, at that frame
+  an expression      when gap(1, 2) < 20 px, change touching(arm, satellite)
+Where a word could be two things, say which: 'event coupled', 'stage coupled'."""
+_EXPRESSION = """\
+An expression of the rule language (docs/rules.md). A number is an object's id,
+a name is an actor or a model, one letter is any object:
+  gap(1, 2)    touching(arm, satellite) for 0.5 s    speed(a) > 40 px/s"""
+_WHY = """\
+  why alert 2              the rule, its conditions and quantities, the percepts
+  why verdict, why captured       a task, a stage
+  why touching 1 2         a relation; why coupled 1 2
+  why identity 1           votes, and what it looked like; why object 1
+  why not collision_course [1 2]  which condition is not met, and by how much
+  why not captured         what a stage waits for
+  why not coupled 1 2, entry 3, exit 1, occlusion 1, identified 1, touching 1 2"""
+_BRANCH = """\
+What is supposed, asserted or swapped begins a branch at this place; the run
+itself stays as it is. 'compare' tells what the branch changes, 'leave' returns."""
+
+_COMMANDS = (
+    Command("step [N] [until WHAT]", "one step, or N, or up to what is so", _WHERE, ("stop",)),
+    Command("run [until WHAT]", "until something is so, or the end", _WHERE, ("stop",)),
+    Command("back [N]", "one step back, or N; forward again tells the same"),
+    Command(
+        "go PLACE",
+        "to a step, a time (12.5s), a mark, 'start' or 'end'",
+        "Steps are numbered from 1. Breakpoints are not looked at on the way.",
+        ("mark",),
+    ),
+    Command("mark [NAME]", "remember this place for 'go NAME'; or list the marks"),
+    Command("break [WHAT]", "stop there in every run; or list what is set", _WHERE, ("stop",)),
+    Command("delete N", "delete breakpoint N", completes=("break",)),
+    Command("disable N", "do not stop at breakpoint N for now", completes=("break",)),
+    Command("enable N", "stop at breakpoint N again", completes=("break",)),
+    Command(
+        "watch [EXPRESSION]",
+        "show its value after each step; or show all",
+        f"{_EXPRESSION}\n'watch! EXPRESSION' also stops whenever what it shows changes.",
+        ("expression",),
+    ),
+    Command("unwatch N", "no longer show watch N"),
+    Command("why [not] WHAT", "evidence, down to frames and percepts", _WHY, ("why",)),
+    Command("diff [A [B]]", "what changed since the last step, or from step A to B"),
+    Command(
+        "assert BELIEF",
+        "what if: insist on a belief, on a branch",
+        f"""\
+  assert touching 1 2 true       a relation; or false, unknown
+  assert object 1 arm            an identity; 'unknown' for none of the models
+  assert object 1 hidden         seen, hidden, left
+{_BRANCH}""",
+        ("relation", "object"),
+    ),
+    Command(
+        "forget BELIEF",
+        "what if: retract a belief, on a branch",
+        f"  forget touching 1 2    forget object 1\n{_BRANCH}",
+        ("relation", "object"),
+    ),
+    Command(
+        "use rules|task FILE",
+        "what if: other rules or another task, on a branch",
+        _BRANCH,
+        ("file",),
+    ),
+    Command("branch", "another course from here, with nothing changed yet", _BRANCH),
+    Command("compare", "what this branch tells differently"),
+    Command("leave", "back to the course that this branch left"),
+    Command("mind", "all that is believed, in short"),
+    Command("percepts", "what was perceived in this step, by behaviour"),
+    Command("regions", "what moved in the last frame"),
+    Command("objects", "who is there, with their most likely identities"),
+    Command("candidates ID", "all identities that object ID may have", completes=("object",)),
+    Command("questions", "what the operator is asked"),
+    Command(
+        "answer ID NAME",
+        "say what object ID is",
+        "In the past, or of a recorded run, it begins a branch.",
+        ("object",),
+    ),
+    Command("relations [ID]", "what holds between objects", completes=("object",)),
+    Command("tasks", "stages, actors and verdicts"),
+    Command("alerts", "what is open"),
+    Command("events [N]", "the latest events with their steps"),
+    Command("directives", "what behaviours are asked for, and why"),
+    Command("behaviours", "what each behaviour did in the last step"),
+    Command("help [COMMAND]", "the commands, or all about one", completes=("command",)),
+)
+COMMANDS: Mapping[str, Command] = MappingProxyType({c.name: c for c in _COMMANDS})
+"""By their names."""
+
+HELP = "\n".join(
+    [
+        *(f"{c.usage:<22} {c.does}" for c in _COMMANDS),
+        f"{'quit':<22} end",
+        "A unique beginning of a command will do; an empty line repeats the last one.",
+    ]
+)

@@ -1,0 +1,170 @@
+"""What differs between two minds: who is there, who is who, what holds, how tasks and alerts stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from visup.agent import Mind, ObjectBelief, Truth
+from visup.agent.shown import showing
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One thing that differs.
+
+    Attributes:
+        about: 'object', 'identity', 'pose', 'measured', 'relation', 'coupling', 'task', 'stage', 'actor',
+            'alert', 'question', 'answer', 'camera', 'unknown', 'percept'.
+        what: What of it, such as 'object 2' or 'touching(1, 2)'.
+        before: How it was; None: it appears.
+        after: How it is; None: it vanishes.
+    """
+
+    about: str
+    what: str
+    before: str | None
+    after: str | None
+
+    def __neg__(self) -> Change:
+        return Change(self.about, self.what, self.after, self.before)
+
+    def __str__(self) -> str:
+        if self.before is None:
+            return f"+ {self.about} {self.what}: {self.after}"
+        if self.after is None:
+            return f"- {self.about} {self.what}: {self.before}"
+        return f"~ {self.about} {self.what}: {self.before} -> {self.after}"
+
+
+@dataclass(frozen=True, slots=True)
+class MindDiff:
+    """All that differs between two minds; false when nothing does.
+
+    Attributes:
+        frames: Numbers of their frames.
+        times: Seconds.
+        changes: What differs, in the order of what is told first of a mind.
+    """
+
+    frames: tuple[int, int]
+    times: tuple[float, float]
+    changes: tuple[Change, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.changes)
+
+    def __neg__(self) -> MindDiff:
+        return MindDiff(self.frames[::-1], self.times[::-1], tuple(-c for c in self.changes))
+
+    def about(self, *kinds: str) -> tuple[Change, ...]:
+        """The changes of some kinds."""
+        return tuple(c for c in self.changes if c.about in kinds)
+
+    def __str__(self) -> str:
+        (a, b), (s, t) = self.frames, self.times
+        head = f"from frame {a} ({s:.2f} s) to frame {b} ({t:.2f} s)"
+        return "\n".join([head, *(f"  {c}" for c in self.changes or ("nothing differs",))])
+
+
+def difference(first: Mind, second: Mind) -> MindDiff:
+    """What differs between two minds."""
+    relations = _true(first) | _true(second)
+    was, now = ({**dict(_facts(m)), **_truths(m, relations)} for m in (first, second))
+    order = sorted({*was, *now}, key=lambda key: (_ORDER.index(key[0]), key[1]))
+    return MindDiff(
+        (first.frame_index, second.frame_index),
+        (first.time, second.time),
+        tuple(
+            Change(*key, was.get(key), now.get(key))
+            for key in order
+            if was.get(key) != now.get(key)
+        ),
+    )
+
+
+_ORDER = (
+    "camera",
+    "unknown",
+    "object",
+    "identity",
+    "pose",
+    "measured",
+    "coupling",
+    "relation",
+    "task",
+    "stage",
+    "actor",
+    "alert",
+    "question",
+    "answer",
+    "percept",
+)
+
+
+def _facts(mind: Mind) -> Iterator[tuple[Key, str]]:
+    """What a mind says, in words by what it is about."""
+    yield ("camera", "health"), mind.health.status.value
+    for kind in sorted(mind.unknown):
+        yield ("unknown", kind), "could not be observed"
+    for belief in mind.objects.values():
+        yield from _of_object(belief)
+    for coupling in mind.couplings:
+        yield ("coupling", _call("", coupling.objects)), f"since {coupling.since:.2f} s"
+    yield from _of_tasks(mind)
+    for a in mind.alerts:
+        yield ("alert", str(a.id)), f"{a.kind} {_call('', a.objects)}, {a.severity.name.lower()}"
+    for q in mind.questions:
+        yield ("question", f"object {q.object_id}"), " or ".join(q.names)
+    for object_id, name in mind.answers.items():
+        yield ("answer", f"object {object_id}"), name
+    for kind, percepts in mind.percepts.items():
+        yield ("percept", kind), _short("; ".join(str(p.value) for p in percepts))
+
+
+def _of_object(b: ObjectBelief) -> Iterator[tuple[Key, str]]:
+    who = f"object {b.id}"
+    yield ("object", who), b.presence.value if b.confirmed else f"{b.presence.value}, unconfirmed"
+    named = ", ".join(f"{c.name} {c.confidence:.2f}" for c in b.candidates)
+    yield ("identity", who), named or f"{b.name} {b.unknown:.2f}"
+    if b.pose is not None:
+        spin = f", {b.pose.spin.rate:.0f} deg/s" if b.pose.spin else ""
+        yield ("pose", who), f"{b.pose.name} view {b.pose.view}{spin}"
+    x, y, w, h = b.region.bbox
+    depth = "" if b.depth is None else f", depth {b.depth:.1f}"
+    speed = ", ".join(f"{v:.0f}" for v in b.region.velocity)
+    yield ("measured", who), f"box {x},{y} {w}x{h}, ({speed}) px/s{depth}"
+
+
+def _of_tasks(mind: Mind) -> Iterator[tuple[Key, str]]:
+    for task in mind.tasks:
+        yield ("task", task.task), f"{task.verdict.value}, at {task.current or 'no stage'}"
+        for s in task.stages:
+            yield ("stage", f"{task.task}.{s.stage}"), s.status.value
+        for b in task.bindings:
+            who = "nobody" if b.object_id is None else f"object {b.object_id}"
+            yield ("actor", f"{task.task}.{b.actor}"), who
+
+
+def _true(mind: Mind) -> frozenset[tuple[str, tuple[int, ...]]]:
+    """The relations that are true, of those that are told when all are gone through."""
+    return frozenset((r.name, r.objects) for r in mind.relations if r.truth is Truth.TRUE)
+
+
+def _truths(mind: Mind, wanted: frozenset[tuple[str, tuple[int, ...]]]) -> dict[Key, str]:
+    """How some relations stand; those that are not judged are left out."""
+    found = {key: mind.relation(key[0], *key[1]) for key in wanted}
+    return {("relation", _call(*key)): r.truth.value for key, r in found.items() if r is not None}
+
+
+def _call(name: str, objects: tuple[int, ...]) -> str:
+    return f"{name}({', '.join(map(str, objects))})"
+
+
+def _short(text: str, most: int = 60) -> str:
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+showing(Change, MindDiff)

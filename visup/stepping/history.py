@@ -1,0 +1,155 @@
+"""All past steps at the price of a few: observations, a mind now and then, and thinking again.
+
+Reasoning is deterministic, so that a step need not be kept: it is thought again from the nearest mind
+before it. How far apart the kept minds are settles both what going back costs (at most `SPACING`
+steps) and what is kept (one mind in `SPACING`): consecutive minds share little, for measured numbers
+differ. The latest steps are kept whole, for looking back a little.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from visup.agent import Alert, Event, Observation, Outcome
+from visup.agent.agent import Agent, Step
+from visup.agent.phases import Phase, Snapshot
+from visup.stepping.tape import Tape
+
+SPACING = 12
+LATEST = 100
+
+
+@dataclass(slots=True)
+class History:
+    """One course of steps, and a place in it.
+
+    Attributes:
+        agent: Thinks; between two steps it is what it was after step `at`.
+        tape: What was perceived; a branch shares it with the course that it left.
+        at: The place: how many steps led here.
+        begin: The number of steps before this course began: 0 but for branches.
+        answers: What the operator said before the step after each number.
+        spacing: Steps between two minds that are kept.
+        latest: How many steps are kept whole.
+        made: How many steps were ever made, those before it began included.
+    """
+
+    agent: Agent
+    tape: Tape = field(default_factory=Tape)
+    at: int = 0
+    begin: int = field(init=False)
+    made: int = field(init=False)
+    answers: dict[int, Mapping[int, str]] = field(default_factory=dict)
+    spacing: int = SPACING
+    latest: int = LATEST
+    _minds: dict[int, Snapshot] = field(default_factory=dict, init=False)
+    _whole: OrderedDict[int, tuple[Step, Snapshot]] = field(default_factory=OrderedDict, init=False)
+    _told: list[tuple[tuple[Event, ...], tuple[Alert, ...]]] = field(
+        default_factory=list, init=False
+    )
+
+    def __post_init__(self) -> None:
+        self.begin = self.made = self.at
+        self._minds[self.at] = self.agent.snapshot()
+
+    @property
+    def here(self) -> Snapshot:
+        """What the agent is now."""
+        return self.agent.snapshot()
+
+    def phases(self, seen: Observation) -> Iterator[tuple[Phase, Outcome]]:
+        """The reasoning of the next step, phase by phase, up to what `conclude` wants."""
+        self._note_answers()
+        return self.agent.phases(seen, self.answers.get(self.at, {}))
+
+    def conclude(self, seen: Observation, thought: Outcome) -> Step:
+        """The last phase of the next step."""
+        step = self.agent.act(seen, thought)
+        self.at += 1
+        was = self.agent.snapshot()
+        if self.at > self.made:
+            self.made = self.at
+            self._told.append((step.events, step.alerts))
+            if (self.at - self.begin) % self.spacing == 0:
+                self._minds[self.at] = was
+        self._whole[self.at] = step, was
+        if len(self._whole) > self.latest:
+            self._whole.popitem(last=False)
+        return step
+
+    def forward(self) -> Step:
+        """One step on along the tape."""
+        seen = self.tape.seen(self.at)
+        *_, (_, thought) = self.phases(seen)
+        return self.conclude(seen, thought)
+
+    def go(self, number: int) -> Step | None:
+        """Be after step `number`, one that was made.
+
+        Returns:
+            That step; None where the course begins.
+        """
+        self._note_answers()
+        step = None
+        near = max(n for n in (*self._minds, *self._whole) if n <= number)
+        if not near < self.at < number:
+            step = self._take_up(near)
+        while self.at < number:
+            step = self.forward()
+        return step
+
+    def step(self, number: int) -> Step | None:
+        """Step `number`, one that was made, without going there; None where the course begins."""
+        with self.elsewhere():
+            return self.go(number)
+
+    def snapshot(self, number: int) -> Snapshot:
+        """What the agent was after step `number`, one that was made."""
+        with self.elsewhere():
+            self.go(number)
+            return self.here
+
+    @contextmanager
+    def elsewhere(self) -> Iterator[None]:
+        """Whatever is done meanwhile, the place is the same again afterwards."""
+        at, was = self.at, self.here
+        try:
+            yield
+        finally:
+            self.at = at
+            self.agent.restore(was)
+
+    def jump(self, number: int, was: Snapshot) -> None:
+        """Be after step `number`, at which the agent was this."""
+        self._note_answers()
+        self.at = number
+        self.agent.restore(was)
+
+    def told(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
+        """Number of the step and event, for all that was told from step `first` to `last`."""
+        end = self.made if last is None else min(last, self.made)
+        for number in range(max(first, self.begin + 1), end + 1):
+            for event in self._told[number - self.begin - 1][0]:
+                yield number, event
+
+    def _note_answers(self) -> None:
+        """Keep what the operator said since the latest step, before the agent becomes another."""
+        if self.at == self.made and (said := self.here.answers):
+            self.answers[self.at] = {**self.answers.get(self.at, {}), **said}
+
+    def _take_up(self, number: int) -> Step | None:
+        """Be after a step that is kept, whole or as a mind."""
+        step, was = self._whole.get(number) or (None, self._minds[number])
+        self.at = number
+        self.agent.restore(was)
+        if number == self.begin:
+            return None
+        if step is not None:
+            self._whole.move_to_end(number)
+            return step
+        events, alerts = self._told[number - self.begin - 1]
+        seen, mind = self.tape.seen(number - 1), was.mind
+        return Step(mind.frame_index, mind.time, seen, mind, events, alerts, was.directives)

@@ -1,0 +1,316 @@
+"""The debugger of an agent: forth, back, inside a step, and aside into what might have been."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from visup.agent import Event, Frame, Mind
+from visup.agent.agent import Agent, Step, Thinkers
+from visup.agent.encode import event_line
+from visup.agent.errors import SettingsError
+from visup.agent.phases import Phase
+from visup.agent.recording import Recording
+from visup.replay import Difference, Told, settings_for
+from visup.replay import difference as told_difference
+from visup.stepping import asking
+from visup.stepping.course import Course
+from visup.stepping.diff import MindDiff, difference
+from visup.stepping.evidence import Why
+from visup.stepping.feeds import Feed, LiveFeed, RecordedFeed
+from visup.stepping.history import LATEST, SPACING, History
+from visup.stepping.places import Stopped
+from visup.stepping.stopping import stop_of
+from visup.stepping.stops import PhaseStop, Predicate, Stop
+from visup.stepping.watching import Breakpoint, Watch
+from visup.stepping.whatif import Belief, insisted, insisting, without_tasks
+from visup.stepping.why import Reasons
+from visup.supervisor import final_verdict, reasoning_agent
+
+
+class Stepper(Course):
+    """Steps an agent forth and back, stops where it is told to, and looks into its mind.
+
+    Args:
+        agent: The agent, new or after any step.
+        frames: Frames for its behaviours; or a `Feed`, such as of a recorded run.
+        spacing: Steps between two minds that are kept; more of them is less to keep and longer to
+            go back.
+        latest: How many steps are kept whole.
+
+    Attributes:
+        breakpoints: By their number.
+        watches: By their number.
+    """
+
+    def __init__(
+        self,
+        agent: Agent,
+        frames: Iterable[Frame] | Feed,
+        *,
+        spacing: int = SPACING,
+        latest: int = LATEST,
+    ) -> None:
+        feed = frames if isinstance(frames, Feed) else LiveFeed(frames)
+        self._take(History(agent, spacing=spacing, latest=latest), feed)
+
+    def _take(self, history: History, source: Feed | Course) -> None:
+        super().__init__(history, source)
+        self.breakpoints: dict[int, Breakpoint] = {}
+        self.watches: dict[int, Watch] = {}
+        self._ahead = False
+
+    @classmethod
+    def of_run(cls, run: Path | Recording, **changed: Any) -> Stepper:
+        """A stepper over what a run perceived; nothing is seen again.
+
+        Args:
+            run: A run folder or its recording.
+            changed: Settings of the run to change, as of `visup.replay.settings_for`.
+
+        Raises:
+            VisupError: There is no such run, or a setting is not as it should be.
+        """
+        recording = run if isinstance(run, Recording) else Recording.open(run)
+        return cls(reasoning_agent(settings_for(recording, **changed)), RecordedFeed(recording))
+
+    def step(
+        self,
+        n: int | None = None,
+        until: str | Phase | Predicate | Stop | None = None,
+        tell: Callable[[Step], None] | None = None,
+    ) -> Stopped:
+        """Go on by some steps, or until something is so; breakpoints end it, too.
+
+        Args:
+            n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
+                inside which it is stopped counts when it is completed.
+            until: See `visup.stepping.stopping.stop_of`.
+            tell: Told of each step as it is completed.
+
+        Returns:
+            Where and why it ended.
+
+        Raises:
+            SettingsError: Nothing is meant by `until`.
+        """
+        goal = (stop_of(until, self.mind),) if until is not None else ()
+        most = n if n is not None or goal else 1
+        stops = (*goal, *(b.stop for b in self.breakpoints.values() if b.enabled))
+        phases = frozenset(s.phase for s in stops if isinstance(s, PhaseStop))
+        done: list[Step] = []
+        taken = 0
+        while most is None or taken < most:
+            before = self.agent.mind
+            step = self._cycle(phases)
+            if step is None:
+                halted = self._midway
+                why = (f"after {halted.phase.value}",) if halted else ()
+                return Stopped(taken, tuple(done), why, halted, halted is None)
+            taken += 1
+            if tell:
+                tell(step)
+            done = [*done[1 - self._history.latest :], step]
+            if reasons := self._reasons(goal, before, step):
+                return Stopped(taken, tuple(done), reasons)
+        return Stopped(taken, tuple(done))
+
+    def _reasons(self, goal: Sequence[Stop], before: Mind, step: Step) -> tuple[str, ...]:
+        """Why to stop after a step; every condition is asked, for some remember."""
+        found = [s.met(before, step) for s in goal]
+        for b in self.breakpoints.values():
+            if b.enabled and (why := b.stop.met(before, step)):
+                b.hits += 1
+                found.append(f"breakpoint {b.id}: {why}")
+        found += [w.changed(before, step) for w in self.watches.values()]
+        return tuple(filter(None, found))
+
+    def _after(self, before: Mind, step: Step) -> None:
+        for watch in () if self._ahead else tuple(self.watches.values()):
+            watch.look(before, step.mind)
+
+    def _look_ahead(self) -> bool:
+        self._ahead = True
+        try:
+            return super()._look_ahead()
+        finally:
+            self._ahead = False
+
+    def _look_again(self) -> None:
+        for watch in self.watches.values() if self.mind.frame_index >= 0 else ():
+            watch.look(self.mind, self.mind)
+
+    # Where to stop, what to watch
+
+    def break_at(self, what: str | Phase | Predicate | Stop) -> Breakpoint:
+        """Set a breakpoint; see `visup.stepping.stopping.stop_of`."""
+        made = Breakpoint(max(self.breakpoints, default=0) + 1, stop_of(what, self.mind))
+        self.breakpoints[made.id] = made
+        return made
+
+    def delete(self, number: int) -> None:
+        """Delete a breakpoint.
+
+        Raises:
+            SettingsError: There is none of that number.
+        """
+        del self.breakpoints[self._breakpoint(number).id]
+
+    def enable(self, number: int, enabled: bool = True) -> None:
+        """Look at a breakpoint again, or no longer.
+
+        Raises:
+            SettingsError: There is none of that number.
+        """
+        self._breakpoint(number).enabled = enabled
+
+    def _breakpoint(self, number: int) -> Breakpoint:
+        if number not in self.breakpoints:
+            known = ", ".join(map(str, self.breakpoints)) or "none is set"
+            raise SettingsError(f"there is no breakpoint {number}", expected=known)
+        return self.breakpoints[number]
+
+    def watch(self, text: str, *, breaks: bool = False) -> Watch:
+        """Judge an expression of the rule language after each step.
+
+        Args:
+            text: Such as `gap(1, 2)` or `touching(arm, satellite) for 1 s`.
+            breaks: Whether steps end when what it shows changes.
+
+        Raises:
+            RuleError: It cannot be read.
+        """
+        made = Watch.of(max(self.watches, default=0) + 1, text, breaks)
+        if self.mind.frame_index >= 0:
+            made.look(self.mind, self.mind)
+        self.watches[made.id] = made
+        return made
+
+    def unwatch(self, number: int) -> None:
+        """No longer judge an expression.
+
+        Raises:
+            SettingsError: There is no watch of that number.
+        """
+        if self.watches.pop(number, None) is None:
+            known = ", ".join(map(str, self.watches)) or "nothing is watched"
+            raise SettingsError(f"there is no watch {number}", expected=known)
+
+    # Aside
+
+    @property
+    def may_answer(self) -> bool:
+        """Whether the operator of this course can still speak: it is neither past nor recorded."""
+        return self.at == self.made and not isinstance(self._feed, RecordedFeed)
+
+    def answer(self, object_id: int, name: str) -> None:
+        """Say what an object is, as the operator of this run; where steps follow, branch first.
+
+        Raises:
+            SettingsError: Later steps were made, or nobody knows such an object or name.
+        """
+        if not self.may_answer:
+            recorded = isinstance(self._feed, RecordedFeed)
+            other = "later steps were made without this answer"
+            what = "the operator of a recorded run has spoken" if recorded else other
+            raise SettingsError(what, hint="branch, and answer there")
+        self.agent.answer(object_id, name)
+
+    def branch(self, *beliefs: Belief, thinkers: Thinkers | None = None) -> Stepper:
+        """Another course from here on, with what is insisted upon; this one stays as it is.
+
+        It perceives the very same; when it comes to the end of what was perceived, this course goes
+        on by itself, ahead of its place.
+
+        Args:
+            beliefs: To be held in every step of the branch whatever is seen, from `visup.stepping.whatif`.
+            thinkers: What reasons there; as here when left out.
+        """
+        thinkers = thinkers or self.agent.thinkers
+        other = replace_agent(self.agent, insisting(thinkers, beliefs))
+        here = self._history.here
+        swapped = thinkers.match != self.agent.thinkers.match
+        mind = insisted(without_tasks(here.mind) if swapped else here.mind, beliefs)
+        other.restore(replace(here, mind=mind))
+        history = self._history
+        course = History(
+            other,
+            history.tape,
+            self.at,
+            {n: said for n, said in history.answers.items() if n >= self.at},
+            history.spacing,
+            history.latest,
+        )
+        made = object.__new__(Stepper)
+        made._take(course, self)
+        made._last = self._last
+        return made
+
+    def compare(self) -> Difference:
+        """What this branch tells differently from the course that it left, over the same steps.
+
+        Returns:
+            Events that only the course told, and only this branch told; and both verdicts here.
+
+        Raises:
+            SettingsError: This is no branch.
+        """
+        parent = self.parent
+        if parent is None:
+            raise SettingsError("this is no branch: there is nothing to compare it with")
+        while parent.made < self.at and parent._look_ahead():
+            continue  # it was stopped inside a step that this branch has made
+        first, last = self.begin + 1, self.at
+        return told_difference(
+            _told(parent.told(first, last), parent.mind_at(last)),
+            _told(self.told(first, last), self.mind_at(last)),
+        )
+
+    def diff(self, first: int, second: int | None = None) -> MindDiff:
+        """What differs between the minds after two steps; the second one is here when left out."""
+        there = self.mind if second is None else self.mind_at(second)
+        return difference(self.mind_at(first), there)
+
+    # Why
+
+    def why(self, what: object) -> Why:
+        """Why something is so here: a tree of reasons, down to percepts and their frames.
+
+        Args:
+            what: An alert, event, relation, coupling, object, stage or task belief; or text, such as
+                `alert 2`, `touching 1 2`, `identity 1`, `captured`, `verdict`.
+
+        Raises:
+            VisupError: Nothing is known of it.
+        """
+        reasons = Reasons(self, self.at, self.mind)
+        return asking.why(reasons, what) if isinstance(what, str) else reasons.of(what)
+
+    def why_not(self, text: str) -> Why:
+        """Why something has not happened: conditions that are not met, and by how much.
+
+        Args:
+            text: Such as `coupled 1 2`, `collision_course`, `stage captured`, `entry 3`, `identified 1`.
+
+        Raises:
+            VisupError: Nothing is known of it.
+        """
+        thinkers = self.agent.thinkers
+        every = (*thinkers.update, *thinkers.cogitate, *thinkers.match)
+        return asking.why_not(self.mind, every, text)
+
+    def close(self) -> None:
+        """Let go of what the agent's behaviours have started."""
+        self.agent.close()
+
+
+def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Told:
+    verdict = final_verdict(mind).value if mind.tasks else None
+    return Told(tuple(event_line(e) for _, e in events), verdict, mind.frame_index)
+
+
+def replace_agent(agent: Agent, thinkers: Thinkers) -> Agent:
+    """An agent that reasons with other thinkers, and perceives nothing."""
+    return Agent(thinkers=thinkers, actors=agent.actors, zones=agent.zones, models=agent.models)
