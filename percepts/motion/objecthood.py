@@ -13,6 +13,7 @@ from visup.percepts.motion.silhouette import Silhouette, Silhouettes, cut
 LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
 LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
 LEAST_SHARE = 0.25  # the same as a share of its size
+FOLLOWED = 0.5  # how far the opposite side must have gone too, as a share
 STRAIGHT = 0.6  # net way as a share of the way
 DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of that at rest
 EVENLY = 1.5  # how much brighter, relative to the rest, the brightest part of a shadow may be
@@ -24,13 +25,19 @@ FRAGMENT = 0.2  # gap between a part and its object, as a share of its length
 def is_salient(s: Silhouette) -> bool:
     """Whether a side of an object's box has left its place and kept a course while it did.
 
-    Shadows do so too, and are none.
+    The opposite side must have followed it, unless the border of the image cuts the object. Shadows do so
+    too, and are none.
     """
     if s.shadow:
         return False
     gone = s.gone()
     least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
-    return s.frames >= 3 and bool(np.any((gone > least) & (gone > STRAIGHT * s.way)))
+    left = (gone > least) & (gone > STRAIGHT * s.way)
+    if not s.cut:
+        # What stays and only grows or shrinks, as a shadow on a thing at rest, moves one side alone.
+        ways = s.sides - s.start
+        left = left & (np.roll(ways, 2) * np.sign(ways) >= FOLLOWED * gone)
+    return s.frames >= 3 and bool(left.any())
 
 
 def joined(known: Silhouettes) -> Silhouettes:

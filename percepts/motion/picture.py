@@ -37,7 +37,7 @@ class Picture:
     Attributes:
         mean: (h, w, 3) float32, tone at rest, grey levels.
         variance: (h, w) float32, of one channel.
-        seen_s: (h, w) float32, for how long that tone was seen, seconds.
+        seen_s: (h, w) float32, for how long that tone was seen, seconds; 0 where the rest is unknown.
         other: (h, w, 3) float32, the tone that is seen instead.
         other_s: (h, w) float32, for how long.
     """
@@ -53,6 +53,26 @@ def first_picture(image: Floats) -> Picture:
     """What rests, after one (h, w, 3) image."""
     bare = np.zeros(image.shape[:2], np.float32)
     return Picture(image, bare + NOISE**2, bare + 0.01, image, bare)
+
+
+def forgotten(picture: Picture, where: Mask) -> Picture:
+    """The picture without what it shows in some places: an object may have stood there."""
+    return replace(picture, seen_s=np.where(where, 0, picture.seen_s).astype(np.float32))
+
+
+def filled(picture: Picture, image: Floats, bare: Mask) -> Picture:
+    """The picture with what is seen of an image where it was unknown and nothing hides the rest."""
+    new = bare & (picture.seen_s <= 0)
+    if not new.any():
+        return picture
+    fresh = first_picture(image)
+    return Picture(
+        np.where(new[..., None], fresh.mean, picture.mean),
+        np.where(new, fresh.variance, picture.variance),
+        np.where(new, fresh.seen_s, picture.seen_s),
+        np.where(new[..., None], fresh.other, picture.other),
+        np.where(new, fresh.other_s, picture.other_s),
+    )
 
 
 def offset(picture: Picture, image: Floats) -> Floats:
@@ -73,9 +93,9 @@ def shaded(picture: Picture, image: Floats) -> Mask:
 
 
 def changed(picture: Picture, image: Floats) -> Mask:
-    """Which pixels show something else than what rests, (h, w) bool."""
+    """Which pixels show something else than what rests, (h, w) bool; where that is unknown, none."""
     off = cv2.GaussianBlur(np.minimum(offset(picture, image), 100.0), (3, 3), 0.8)
-    off = np.where(shaded(picture, image), 0, off)
+    off = np.where(shaded(picture, image) | (picture.seen_s <= 0), 0, off)
     near = cv2.medianBlur((off > NEAR**2).astype(np.uint8), 5)
     _, labels = cv2.connectedComponents(near, connectivity=8)
     sure = np.zeros(labels.max() + 1, bool)
@@ -100,7 +120,8 @@ def learnt(
         The new picture.
     """
     off = offset(picture, image)
-    fits = (off < FAR**2) & ~moving
+    known = picture.seen_s > 0
+    fits = (off < FAR**2) & ~moving & known
     weight = np.maximum(seconds / (picture.seen_s + seconds), 1 - np.exp(-seconds / SETTLE_S))
     weight = np.where(fits, weight, 0).astype(np.float32)
     mean = picture.mean + weight[..., None] * (image - picture.mean)
@@ -114,7 +135,7 @@ def learnt(
     seen = np.minimum(picture.seen_s + fits * np.float32(seconds), 60.0)
     gap = image - picture.other
     alike = np.einsum("ijk,ijk->ij", gap, gap) < 3 * (FAR * NOISE) ** 2
-    away = ~fits
+    away = ~fits & known
     other_s = np.where(away, np.where(alike, picture.other_s + seconds, seconds), picture.other_s)
     step = np.where(away, np.where(alike, 0.3, 1.0), 0)[..., None]
     other = picture.other + step * gap
@@ -122,7 +143,7 @@ def learnt(
     swap = other_s > enough
     if gone is not None:
         other = np.where(gone[..., None], image, other)
-        swap |= gone
+        swap |= gone & known
     mean = np.where(swap[..., None], other, mean)
     variance = np.where(swap, NOISE**2 * 2, variance)
     seen, other_s = np.where(swap, other_s, seen), np.where(swap, 0, other_s)

@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Directive, Region
-from visup.percepts.motion.contour import MARGIN, Outline, outline
+from visup.percepts.motion.contour import Outline, outline
+from visup.percepts.motion.dense import CLIP
+from visup.percepts.motion.fitting import CONTEXT, fitted
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.scene import Scene, least_area
 from visup.percepts.motion.settings import MotionSettings
-from visup.percepts.motion.tracking import Track
+from visup.percepts.motion.telling import Evidence
+from visup.percepts.motion.tracking import Indices, Track
 
 
 def obey(directives: Sequence[Directive], scene: Scene, likelihood: Floats) -> Floats:
@@ -54,6 +57,26 @@ def sought(
     return tuple(np.any(inside, axis=0).tolist()) if boxes else (False,) * len(tracks)
 
 
+def evidence_of(
+    scene: Scene, winner: Indices, likelihood: Floats, has: NDArray[np.bool_]
+) -> Evidence:
+    """Which points tell of the motion of a track, and how surely.
+
+    Args:
+        scene: The frame.
+        winner: (count,) label of each superpixel; label k is track k - 1.
+        likelihood: (N, K) float32 log likelihood of labels at the points.
+        has: (N,) bool, which points say what is seen there.
+
+    Returns:
+        Those in tracks, in frame pixels.
+    """
+    at = winner[scene.at]
+    use = np.flatnonzero(has & (at > 0) & (at < likelihood.shape[1] - 1))
+    gain = likelihood[use, at[use]] - likelihood[use, 0]
+    return Evidence(scene.points.xy[use] / scene.image.scale, np.clip(gain, -CLIP, CLIP))
+
+
 Box = tuple[float, float, float, float]
 
 
@@ -84,17 +107,29 @@ def report(
     out = []
     for t in tracks:
         if t.id > 0 and t.seen == scene.time:
-            shape = _shape(t, scene, size, least)
+            others = [o.share for o in tracks if o is not t and o.id > 0]
+            shape = _shape(t, others, scene, size, least)
             if shape is not None:
                 out.append(_region(t, shape, scale))
     return tuple(sorted(out, key=lambda r: r.id))
 
 
-def _shape(t: Track, scene: Scene, size: tuple[int, int], least: float) -> Outline | None:
+def _shape(
+    t: Track, others: Sequence[Floats], scene: Scene, size: tuple[int, int], least: float
+) -> Outline | None:
     x, y, w, h = scene.cells.box(t.share > 0.5)
-    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
-    labels = scene.cells.labels[top : y + h + MARGIN, left : x + w + MARGIN]
-    return outline(t.share[labels], (left, top), scene.image.shape, size, least) if w else None
+    if not w:
+        return None
+    left, top = max(x - CONTEXT, 0), max(y - CONTEXT, 0)
+    part = np.s_[top : y + h + CONTEXT, left : x + w + CONTEXT]
+    labels = scene.cells.labels[part]
+    share = t.share[labels]
+    drawn = fitted(share, np.ascontiguousarray(scene.image.tone[part]))
+    if others:
+        # What another object shows is not taken from it.
+        taken = (np.max(others, axis=0) > 0.5)[labels]
+        drawn = np.where(taken, share, drawn)
+    return outline(drawn, (left, top), scene.image.shape, size, least)
 
 
 def chosen(regions: Sequence[Region], directives: Sequence[Directive]) -> tuple[Region, ...]:

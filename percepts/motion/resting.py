@@ -22,7 +22,9 @@ from visup.percepts.motion.picture import (
     changed,
     edges,
     exposed,
+    filled,
     first_picture,
+    forgotten,
     learnt,
 )
 from visup.percepts.motion.scene import Scene
@@ -30,7 +32,7 @@ from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.silhouette import Mask, Silhouette, Silhouettes, View, view_of
 from visup.percepts.motion.silhouettes import follow
 from visup.percepts.motion.stillness import camera_rests
-from visup.percepts.motion.telling import Telling
+from visup.percepts.motion.telling import Evidence, Telling
 
 REST_S = 1.0  # how long the camera must rest before the picture is believed, seconds
 LONGEST_S = 4.0  # most seconds of rest that make up for times when too little is seen
@@ -38,6 +40,10 @@ FLOODED = 0.6  # share of the image that no change of what is seen in it explain
 MANY_CELLS = 15  # superpixels of a region whose outline the layers know well
 YOUNG_S = 0.3  # how long what was never told is missed, seconds
 SIZE = 768  # longer side of the picture, pixels
+KNOWN = 0.6  # share of a region that differs from the picture when it shows the rest behind
+START_S = 2.4  # age of the picture up to which it may show what has only begun to be told, seconds
+STRIDE_PX, MOST_STRIDES = 4.0, 32
+HALO = 7  # pixels: a region's outline may be off by half as much
 
 
 class RestingView:
@@ -65,6 +71,7 @@ class RestingView:
         regions: Sequence[Region],
         ids: int,
         settings: MotionSettings,
+        evidence: Evidence,
     ) -> tuple[tuple[Region, ...], int]:
         """What is to be reported of a frame.
 
@@ -74,27 +81,51 @@ class RestingView:
             regions: Those of the layers of motion.
             ids: The last public id given.
             settings: Gives how long objects are remembered.
+            evidence: Which points are seen to move by themselves.
 
         Returns:
             Regions by id: those of the layers unless the camera rests; the last public id given.
         """
+        fresh = [r for r in regions if not self._telling.knows(r.id)]
         self._telling.note(regions, frame.time, settings.memory_s)
         many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
         if not self._is_at_rest(camera_rests(scene), scene.seconds):
             return self._telling.alone(regions, many), ids
         image = _prepared(frame)
         if self._picture is None:
-            self._picture = first_picture(image)
+            hidden = covered(regions, frame.size, image.shape[:2])
+            self._picture = forgotten(first_picture(image), hidden)
             self._time = self._since = frame.time
             return self._telling.alone(regions, many), ids
+        self._reveal(image, frame, regions, fresh)
         view = self._seen(image, frame.time, settings)
         if view is None:
             return self._telling.alone(regions, many), ids
         self.active = min(frame.time - self._since, self._rested_s) >= REST_S
         if not self.active:
             return self._telling.alone(regions, many), ids
-        told, self._known, ids = self._telling.together(frame.size, view, self._known, regions, ids)
+        told, self._known, ids = self._telling.together(
+            frame.size, view, self._known, regions, ids, evidence, many
+        )
         return told, ids
+
+    def _reveal(
+        self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
+    ) -> None:
+        """Forget what a region hid since the picture was begun, and look where none hides it now."""
+        assert self._picture is not None
+        picture, shape = self._picture, image.shape[:2]
+        age = frame.time - self._since
+        if fresh and age < START_S:
+            change = changed(exposed(picture, image), image)
+            for r in fresh:
+                here = covered([r], frame.size, shape)
+                if change[here].mean() < KNOWN:
+                    picture = forgotten(picture, here & ~change)
+                was = swept(here, r, age, shape[1] / frame.size[0])
+                picture = forgotten(picture, was & ~here & change)
+        told = covered(regions, frame.size, shape)
+        self._picture = filled(picture, image, ~told)
 
     def _is_at_rest(self, rests: bool | None, seconds: float) -> bool:
         """Whether the camera rests, as far as is known; else all is forgotten."""
@@ -143,6 +174,55 @@ def _prepared(frame: Frame) -> Floats:
         size = (max(8, round(frame.size[0] * scale)), max(8, round(frame.size[1] * scale)))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.7), dtype=np.float32)
+
+
+def covered(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
+    """(h, w) bool: the pixels of the picture that some regions may hide.
+
+    Args:
+        regions: In frame pixels.
+        size: (width, height) of the frame.
+        shape: (h, w) of the picture.
+    """
+    out = np.zeros(shape, dtype=np.uint8)
+    scale = shape[1] / size[0], shape[0] / size[1]
+    for r in regions:
+        x, y, w, h = r.bbox
+        left, top = round(x * scale[0]), round(y * scale[1])
+        right, bottom = (
+            min(round((x + w) * scale[0]), shape[1]),
+            min(round((y + h) * scale[1]), shape[0]),
+        )
+        if right > left and bottom > top:
+            mask = cv2.resize(
+                r.mask.view(np.uint8), (right - left, bottom - top), interpolation=cv2.INTER_NEAREST
+            )
+            out[top:bottom, left:right] |= np.asarray(mask, dtype=np.uint8)
+    if not regions:
+        return out.view(bool)
+    return np.asarray(cv2.dilate(out, np.ones((HALO, HALO), np.uint8)) > 0)
+
+
+def swept(here: Mask, region: Region, seconds: float, scale: float) -> Mask:
+    """Where a region was during the last seconds if it moved as it does now, (h, w) bool.
+
+    Args:
+        here: (h, w) bool, where it is.
+        region: Gives the velocity, frame pixels per second.
+        seconds: How far back.
+        scale: Pixels of the picture per frame pixel.
+    """
+    way = -np.asarray(region.velocity) * seconds * scale
+    steps = int(np.clip(np.ceil(np.hypot(*way) / STRIDE_PX), 1, MOST_STRIDES))
+    out = here.copy()
+    for k in range(1, steps + 1):
+        dx, dy = way * k / steps
+        matrix = np.array([[1, 0, dx], [0, 1, dy]])
+        moved = cv2.warpAffine(
+            here.view(np.uint8), matrix, here.shape[::-1], flags=cv2.INTER_NEAREST
+        )
+        out |= moved > 0
+    return out
 
 
 def painted(known: Sequence[Silhouette], shape: tuple[int, int]) -> Mask:

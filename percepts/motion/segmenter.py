@@ -31,7 +31,7 @@ from visup.percepts.motion.joining import absorb, merge, release
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.life import bear, bury, confirm, update
 from visup.percepts.motion.looked import Looked
-from visup.percepts.motion.report import chosen, obey, report, sought
+from visup.percepts.motion.report import chosen, evidence_of, obey, report, sought
 from visup.percepts.motion.resting import RestingView
 from visup.percepts.motion.salience import rests, weigh
 from visup.percepts.motion.scene import (
@@ -140,6 +140,7 @@ class MotionSegmenter:
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
         tracks = weigh(tracks, scene, winner)
+        evidence = evidence_of(scene, winner, likelihood, has)
         tracks = absorb(tracks, scene, winner, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
         tracks = release(tracks, scene, winner)
@@ -150,7 +151,7 @@ class MotionSegmenter:
         self._tracks = tracks
         self.looked = Looked(scene, tracks, keys, posterior)
         seen = report(tracks, scene, self._size, self.settings)
-        seen, self._ids = self._resting.step(frame, scene, seen, self._ids, self.settings)
+        seen, self._ids = self._resting.step(frame, scene, seen, self._ids, self.settings, evidence)
         return chosen(seen, directives)
 
     def _look(

@@ -6,13 +6,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.motion.clips import FPS, SIZE, Shot, clip, texture
-from visup.agent import Frame
+from visup.agent import Frame, Region
+from visup.percepts.motion.contour import describe
+from visup.percepts.motion.image import Floats
 from visup.percepts.motion.objecthood import is_deep_shadow, is_salient
-from visup.percepts.motion.picture import changed, exposed, first_picture, learnt, shaded
+from visup.percepts.motion.picture import (
+    changed,
+    exposed,
+    filled,
+    first_picture,
+    forgotten,
+    learnt,
+    shaded,
+)
+from visup.percepts.motion.resting import covered, swept
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.silhouette import Silhouettes, histogram_of, view_of
 from visup.percepts.motion.silhouettes import follow
-from visup.percepts.motion.telling import common
+from visup.percepts.motion.telling import Evidence, Telling, common, touch
 
 GROUND = np.repeat(texture(1, SIZE)[..., None], 3, axis=2).astype(np.float32)
 NOWHERE = np.zeros(SIZE, dtype=bool)
@@ -129,6 +140,95 @@ def test_what_goes_to_and_fro_is_not_salient() -> None:
     swing = followed([with_boxes((box(60 + 4 * (n % 2), 60), 250.0)) for n in range(20)])[-1][0]
     assert is_salient(course)
     assert not is_salient(swing)
+
+
+@pytest.mark.parametrize(("near", "salient"), [(0.0, True), (1.0, False)])
+def test_what_only_grows_on_one_side_is_not_salient(near: float, salient: bool) -> None:
+    frames = [
+        with_boxes((box(60 + round((1 - near) * n), 60, 14 + round(near * n)), 250.0))
+        for n in range(20)
+    ]
+    assert is_salient(followed(frames)[-1][0]) == salient
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 200), st.integers(0, 120))
+def test_what_is_forgotten_shows_no_change_until_it_is_seen_bare(x: int, y: int) -> None:
+    mask = box(x, y)
+    with_object = with_boxes((mask, 250.0))
+    picture = forgotten(first_picture(with_object), mask)
+    assert not changed(picture, GROUND)[mask].any()
+    for _ in range(30):
+        picture = learnt(picture, with_object, NOWHERE, 1 / FPS)
+    assert (picture.seen_s[mask] == 0).all()
+    bare = filled(picture, GROUND, ~NOWHERE)
+    assert np.array_equal(bare.mean[mask], GROUND[mask])
+    assert np.array_equal(bare.mean[~mask], picture.mean[~mask])
+    assert not changed(bare, GROUND).any()
+
+
+def region(mask: np.ndarray, velocity: tuple[float, float] = (0.0, 0.0), number: int = 1) -> Region:
+    return describe(mask, (0, 0), SIZE[::-1]).region(number, velocity, 1.0, 1.0)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(60, 140), st.integers(40, 80), st.integers(-40, 40), st.integers(-30, 30))
+def test_where_a_region_was_is_between_there_and_here(x: int, y: int, vx: int, vy: int) -> None:
+    here = box(x, y)
+    was = swept(here, region(here, (vx, vy)), 1.0, 1.0)
+    assert was[here].all()
+    assert was[box(x - vx, y - vy)].all()
+    left, right = min(x, x - vx), max(x, x - vx) + 14
+    top, bottom = min(y, y - vy), max(y, y - vy) + 30
+    assert not np.delete(was, np.s_[left:right], axis=1).any()
+    assert not np.delete(was, np.s_[top:bottom], axis=0).any()
+
+
+def test_what_regions_cover_is_a_little_wider_than_they_are() -> None:
+    mask = box(100, 60)
+    found = covered([region(mask)], SIZE[::-1], SIZE)
+    assert found[mask].all()
+    assert mask.sum() < found.sum() < 2.5 * mask.sum()
+    assert not covered([], SIZE[::-1], SIZE).any()
+
+
+def test_regions_touch_when_few_pixels_part_them() -> None:
+    one = region(box(60, 60))
+    assert touch(one, region(box(77, 60)))
+    assert not touch(one, region(box(90, 60)))
+
+
+def points(mask: np.ndarray, sure: float) -> Evidence:
+    ys, xs = np.nonzero(mask)
+    xy = np.stack([xs, ys], axis=1)[::7].astype(np.float32)
+    return Evidence(xy, np.full(len(xy), sure, np.float32))
+
+
+@pytest.mark.parametrize(
+    ("sure", "many", "whole"),
+    [(5.0, 100.0, True), (-5.0, 100.0, False), (5.0, 1000.0, False)],
+    ids=["it moves", "it is at rest", "it is small"],
+)
+def test_a_region_is_told_whole_where_its_points_move_and_the_picture_sees_a_part(
+    sure: float, many: float, whole: bool
+) -> None:
+    """Half of the region is of one tone with the rest."""
+    body, part, ids, born = box(60, 60, 40, 40), box(60, 60, 22, 40), 1, 0
+    size, telling = SIZE[::-1], Telling()
+    known: Silhouettes = ()
+    told: tuple[Region, ...] = ()
+    for n in range(12):
+        shift = n * 4
+        seen = np.roll(part, shift, axis=1)
+        own = region(np.roll(body, shift, axis=1), (100.0, 0.0))
+        image: Floats = with_boxes((seen, 250.0))
+        view = view_of(image, seen, 20, n / FPS, 1 / FPS)
+        known, born = follow(known, view, born)
+        telling.note([own], n / FPS, 12.0)
+        evidence = points(np.roll(body & ~part, shift, axis=1), sure)
+        told, known, ids = telling.together(size, view, known, [own], ids, evidence, many)
+    assert len(told) == 1
+    assert (told[0].area == own.area) == whole
 
 
 def thin(frames: int, camera: float = 0.0) -> list[Shot]:
