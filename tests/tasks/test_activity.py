@@ -99,7 +99,9 @@ def test_rivals_of_a_task_that_ended_begin_anew() -> None:
     assert now[0].chance == 1.0
     assert not now[1].begun
     assert not now[1].audible
-    assert weighed(now, [0.0, 0.0], [ONE, ONE], 0.1, [True, False])[1] == now[1]
+    later = weighed(now, [0.0, 3.0], [ONE, ONE], 0.1, [True, False])
+    assert later[0] == now[0]
+    assert later[1].chance > now[1].chance
 
 
 def test_evidence_fades() -> None:
