@@ -108,5 +108,5 @@ showing(
         Question,
         Region,
     ),
-    *(Relation, RelationTable, Report, Spin, StageBelief, TaskBelief, Zone),
+    *(Prospect, Relation, RelationTable, Report, Spin, StageBelief, TaskBelief, Zone),
 )

@@ -183,14 +183,17 @@ def event_text(event: Mapping[str, Any]) -> str:
 
 
 def _opened(path: Path) -> sqlite3.Connection:
-    """The file, to be read only; also where not even the log beside it may be touched."""
+    """The file, to be read only; also where not even the log beside it may be touched.
+
+    A reader that is left half way may be closed by whichever thread collects it.
+    """
     uri = path.absolute().as_uri()
-    db = sqlite3.connect(f"{uri}?mode=ro", uri=True)
+    db = sqlite3.connect(f"{uri}?mode=ro", uri=True, check_same_thread=False)
     try:
         db.execute("SELECT 1 FROM sqlite_schema").fetchone()
     except sqlite3.OperationalError:
         db.close()
-        db = sqlite3.connect(f"{uri}?mode=ro&immutable=1", uri=True)
+        db = sqlite3.connect(f"{uri}?mode=ro&immutable=1", uri=True, check_same_thread=False)
     db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
     return db
 

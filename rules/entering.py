@@ -33,7 +33,15 @@ def enter(work: Work, start: float) -> None:
             continue
         work.put(replace(belief, confirmed=True), told="seen")
         kind, template = _arrival(belief, start, early=early)
-        work.tell(kind, template, belief.id, confidence=belief.region.confidence)
+        work.tell(kind, template, belief.id, confidence=_steadily(belief.region.confidence))
+
+
+def _steadily(confidence: float) -> float:
+    """How sure it is that something is there of which each look is so sure.
+
+    It was seen steadily; looks that follow each other err together, so that all of them count as two.
+    """
+    return 1.0 - (1.0 - confidence) ** 2
 
 
 def _arrival(belief: ObjectBelief, start: float, *, early: bool) -> tuple[str, str]:

@@ -1,6 +1,9 @@
 """Hypothesis profiles: the same examples in every ordinary run, new ones when asked for.
 
 `HYPOTHESIS_PROFILE=explore make test` looks for new counterexamples.
+
+Hypothesis also tries numbers that stand in the modules that happen to be imported, which differ
+from run to run where several processes share the tests. Ordinary runs do without these.
 """
 
 from __future__ import annotations
@@ -8,7 +11,19 @@ from __future__ import annotations
 import os
 
 from hypothesis import settings
+from hypothesis.internal.conjecture.providers import AVAILABLE_PROVIDERS, HypothesisProvider
+from hypothesis.internal.constants_ast import Constants
 
-settings.register_profile("same", derandomize=True, deadline=None)
+
+class SameProvider(HypothesisProvider):
+    """Draws as usual, without what was imported."""
+
+    @property
+    def _local_constants(self) -> Constants:
+        return Constants()
+
+
+AVAILABLE_PROVIDERS["visup-same"] = SameProvider
+settings.register_profile("same", derandomize=True, deadline=None, backend="visup-same")
 settings.register_profile("explore", deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))

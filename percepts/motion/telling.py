@@ -159,7 +159,9 @@ class Telling:
             x, y, w, h = r.bbox
             if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
                 self._same(r, out)
-                continue
+                # What was told once stays told until a silhouette of it is.
+                if r.id not in self._shown or any(common(s, r) for s in out):
+                    continue
             out = [s for s in out if common(s, r) < COMMON * s.area]
             number = self._alias.get(r.id, r.id)
             shown = {s.id for s in out}
