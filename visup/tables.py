@@ -96,6 +96,8 @@ def task_tree(task: TaskBelief) -> Tree:
         who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
         tree.add(Text(f"  {b.actor} is played by {who}"))
     tree.add(Text(f"  {prospects_text(task)}"))
+    if task.active < 1.0:
+        tree.add(Text(f"  going on with probability {task.active:.2f}"))
     return tree
 
 
