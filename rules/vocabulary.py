@@ -45,6 +45,8 @@ KEEP_OUT = "keep_out"
 """Zones whose names begin so are forbidden to all."""
 KINDS = ("region", "hypothesis", "depth", "health")
 
+SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
+
 
 @dataclass(frozen=True, slots=True)
 class Word:
@@ -196,8 +198,12 @@ def depth_difference(facts: Facts) -> Floats:
 
 
 def spin(facts: Facts) -> Floats:
-    """How fast an object turns about itself, degrees per second."""
-    found = [None if b.pose is None else b.pose.spin for b in facts.beliefs]
+    """How fast an object turns about itself, degrees per second.
+
+    Its deviation is that of one course of views; while another is nearly as likely the rate is unknown.
+    """
+    poses = (b.pose for b in facts.beliefs)
+    found = [None if p is None or p.confidence < SURE_POSE else p.spin for p in poses]
     rate = np.array([np.nan if s is None else s.rate for s in found], dtype=float)
     sigma = np.array([0.0 if s is None else SIGMAS * s.sigma for s in found], dtype=float)
     return between(np.maximum(rate - sigma, 0.0), rate + sigma)
