@@ -159,8 +159,9 @@ class Telling:
             x, y, w, h = r.bbox
             if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
                 self._same(r, out)
-                # What was told once stays told until a silhouette of it is.
-                if r.id not in self._shown or any(common(s, r) for s in out):
+                # What is small and was told stays told until a silhouette of it is.
+                small = r.id in self._shown and r.area < many
+                if not small or any(common(s, r) for s in out):
                     continue
             out = [s for s in out if common(s, r) < COMMON * s.area]
             number = self._alias.get(r.id, r.id)
