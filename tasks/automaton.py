@@ -22,6 +22,7 @@ from visup.tasks.course import (
     form,
     leaves,
     moves,
+    nested,
     with_leaves,
 )
 from visup.tasks.tree import Task
@@ -31,6 +32,7 @@ W = TypeVar("W")
 END = -1
 """In place of a node: the course is over."""
 WAYS_A_NODE = 10
+DEEPEST = 60  # courses around a step; each takes some of the depth that Python allows
 NEW = -1
 """In place of a step that is carried over: it begins by the way."""
 
@@ -96,13 +98,16 @@ class Automaton:
         """The first nodes, breadth first from the start.
 
         It ends early where ways grow without bound, as they do with stages that come back to
-        themselves inside others: so many ways as ten for each node are looked at.
+        themselves inside others: so many ways as ten for each node are looked at, and what is
+        nested too deep is not gone on from.
         """
         found = {n: None for n, _ in self.start if n != END}
         seen = 0
         for done, node in enumerate(_growing(found)):
             if seen > WAYS_A_NODE * most:
                 return list(found)[:done]  # the ways of the others are better not worked out
+            if nested(self._states[node]) > DEEPEST:
+                continue
             seen += len(self.ways(node))
             for way in self.ways(node):
                 if way.target != END and len(found) < most:

@@ -153,6 +153,17 @@ def leaves(state: State[W]) -> tuple[Leaf[W], ...]:
             return tuple(leaf for p in parts for leaf in leaves(p))
 
 
+def nested(state: State[W]) -> int:
+    """How deep a state is: 1 for a single step, one more for each course around it."""
+    match state:
+        case Leaf():
+            return 1
+        case Then(head=head):
+            return 1 + nested(head)
+        case Both(parts=parts):
+            return 1 + max(nested(p) for p in parts)
+
+
 def with_leaves(state: State[W], new: Iterator[Leaf[W]]) -> State[W]:
     """The same state with each step under way replaced by the next of `new`."""
     match state:

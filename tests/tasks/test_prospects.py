@@ -10,6 +10,7 @@ from tests.tasks.scripted import Played, Script, Spell, play
 from visup.agent import TaskBelief, Verdict
 from visup.tasks import load_task, parse_task
 from visup.tasks.process import SUPERVISED, Seen
+from visup.tasks.recognise import Recogniser
 from visup.tasks.sentences import prospects_text
 from visup.tasks.supervise import task_thinker
 
@@ -121,3 +122,12 @@ def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:
     fit = SUPERVISED.fit
     order = [fit(s, 1.0, 1.0) for s in (Seen.CONTRARY, Seen.NEITHER, Seen.UNKNOWN, Seen.HOLDS)]
     assert order == sorted(order)
+
+
+def test_a_stage_that_comes_back_to_itself_inside_another_is_not_looked_into_for_ever() -> None:
+    task = parse_task(
+        "<t> ::= <loop>\n<loop> ::= converging(arm, satellite)"
+        " | touching(arm, satellite) & (diverging(arm, satellite) <loop>)"
+    )
+    recogniser = Recogniser(task)
+    assert 0.0 < recogniser.success(recogniser.start()) < 1.0
