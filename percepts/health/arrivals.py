@@ -68,11 +68,12 @@ class Arrivals:
         stale = self._stale(repeated, time - last[1])
         new = Arrival(time, index - last[0], time - last[1], repeated is True, stale)
         self._recent.append(new)
-        missing = self._missing()
+        past = []
         while time - self._recent[0].time >= WINDOW_S:
-            old = self._recent.popleft()
-            if not missing:
-                self._repeats.append(old.repeated)
+            past.append(self._recent.popleft().repeated)
+        missing = self._missing()
+        if not missing:
+            self._repeats.extend(past)
         if not missing:
             self._steps.append(new.step)
             self._waits.append(new.wait)

@@ -32,6 +32,8 @@ FARTHEST = 2.0
 THINNESS = 0.7
 """Area counts by the thickness there to minus this: 0 is area, 1 is length of skeleton."""
 
+SAME_PLACE = 1e-9  # what is nearer along a branch is the same place, but for rounding
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
@@ -114,7 +116,7 @@ class SkeletonTree:
         same = here.branch[:, None] == there.branch[None]
         step = there.offset[None] - here.offset[:, None]
         length = np.where(same, np.abs(step), np.minimum(*sides))
-        return length, np.where(same, step > 0, sides[1] < sides[0])
+        return length, np.where(same, step > SAME_PLACE, sides[1] < sides[0])
 
 
 def _distances(
