@@ -108,12 +108,14 @@ def is_deep_shadow(s: Silhouette, image: Floats, rest: Floats) -> bool:
 def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
     """Whether an outline has its edges in the picture of the rest: it shows where something left.
 
+    A shadow dims the edges of what it falls on, and nothing has left.
+
     Args:
         s: The object.
         now: (h, w, 3) float32 image.
         rest: (h, w, 3) float32 picture of the rest.
     """
-    if s.now is None or s.crowded:
+    if s.now is None or s.crowded or s.shadow:
         return False
     box, shape = s.now
     inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
