@@ -222,3 +222,100 @@ def flattest(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
                 seeds[top + 1 : top + cell - 1, left + 1 : left + cell - 1] = number
             seeds[at_y - 1 : at_y + 2, at_x - 1 : at_x + 2] = number
     return seeds, rows * cols
+
+
+@compiled
+def bounds(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """(left, top, right, bottom) around some cells; (large, large, 0, 0) when there are none."""
+    left, top, right, bottom = np.int32(2**30), np.int32(2**30), np.int32(0), np.int32(0)
+    for k in range(len(members)):
+        if members[k]:
+            left, top = min(left, corners[k, 0]), min(top, corners[k, 1])
+            right, bottom = max(right, corners[k, 2]), max(bottom, corners[k, 3])
+    return left, top, right, bottom
+
+
+@compiled
+def painted(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floats:
+    """1 at the pixels of some cells and 0 elsewhere, (h, w) float32."""
+    out = np.zeros(labels.shape, np.float32)
+    left, top, right, bottom = bounds(corners, members)
+    for y in range(top, bottom):
+        for x in range(left, right):
+            out[y, x] = np.float32(members[labels[y, x]])
+    return out
+
+
+@compiled
+def covered(
+    new: Labels,
+    old: Labels,
+    corners: Labels,
+    members: NDArray[np.bool_],
+    dx: int,
+    dy: int,
+    count: int,
+) -> NDArray[np.int64]:
+    """How many pixels of each of `count` cells some old cells cover when moved by whole pixels."""
+    out = np.zeros(count, np.int64)
+    height, width = new.shape
+    left, top, right, bottom = bounds(corners, members)
+    for y in range(max(top, -dy), min(bottom, height - dy)):
+        for x in range(max(left, -dx), min(right, width - dx)):
+            out[new[y + dy, x + dx]] += members[old[y, x]]
+    return out
+
+
+@compiled
+def means_of_half(
+    labels: Labels, values: Floats, box: tuple[int, int, int, int], count: int
+) -> Floats:
+    """Mean, in each cell, of a map of a part of the image at half its size.
+
+    Args:
+        labels: (h, w) cells.
+        values: (height, width) float32, of the box.
+        box: (x, y, width, height), pixels at half the size.
+        count: How many cells.
+
+    Returns:
+        (count,) float32; 0 where no pixel of a cell is seen.
+    """
+    total, number = np.zeros(count), np.zeros(count, np.int64)
+    for j in range(box[3]):
+        for i in range(box[2]):
+            k = labels[2 * (box[1] + j), 2 * (box[0] + i)]
+            total[k] += values[j, i]
+            number[k] += 1
+    return (total / np.maximum(number, 1)).astype(np.float32)
+
+
+@compiled
+def beside_points(
+    labels: Labels, xy: Floats, normal: Floats, likelihood: Floats, far: float, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What points say of the cells on both of their sides.
+
+    Args:
+        labels: (h, w) cells.
+        xy: (N, 2) float32 positions.
+        normal: (N, 2) float32 unit vectors across the edge at each.
+        likelihood: (N, K) float32 log likelihood of labels.
+        far: How far from a point its sides are, pixels.
+        count: How many cells.
+
+    Returns:
+        (count, K) float64 sums, and (count,) float64, over how many.
+    """
+    height, width = labels.shape
+    kinds = likelihood.shape[1]
+    totals, number = np.zeros((count, kinds)), np.zeros(count)
+    for side in (-np.float32(far), np.float32(far)):
+        for n in range(len(xy)):
+            x = int(np.rint(xy[n, 0] + side * normal[n, 0]))
+            y = int(np.rint(xy[n, 1] + side * normal[n, 1]))
+            k = labels[min(max(y, 0), height - 1), min(max(x, 0), width - 1)]
+            number[k] += 1
+            for i in range(kinds):
+                totals[k, i] += likelihood[n, i]
+    return totals, number

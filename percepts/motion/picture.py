@@ -23,6 +23,7 @@ from visup.percepts.motion.picture_loops import (
     dimmed,
     offsets,
     renewed,
+    standing_out,
     surely,
 )
 
@@ -32,11 +33,12 @@ FAR = 3.0  # standard deviations at which a pixel surely shows something else
 NEAR = 2.2  # the same for one beside a sure one
 SETTLE_S = 8.0  # time constant of what is learnt, seconds
 RESTLESS_S = 8.0  # the same of the variance
-SHADE = (0.6, 0.97)  # brightness in a shadow, as a share of that at rest
+SHADE = 0.6  # least brightness in a shadow, as a share of that at rest
 HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
 RARE = 10.0  # squared distance beyond which a pixel tells no more of how restless it is
 EVEN = 0.03  # change of exposure that is none
 LIT = 1.12  # brightness in reflected light
+CAST = Shade(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,17 +85,17 @@ def filled(picture: Picture, image: Floats, bare: Mask) -> Picture:
 
 def shaded(picture: Picture, image: Floats) -> Mask:
     """Where an image differs as a shadow or a reflection does: in brightness, not in hue."""
-    return dimmed(image, picture.mean, Shade(SHADE[0], LIT, HUE, 3 * NOISE**2 / 4, 60.0**2))
+    return dimmed(image, picture.mean, CAST)
 
 
 def changed(picture: Picture, image: Floats) -> Mask:
     """Which pixels show something else than what rests, (h, w) bool; where that is unknown, none."""
     far = offsets(image, picture.mean, picture.variance, 100.0)
     off = np.asarray(cv2.GaussianBlur(far, (3, 3), 0.8), dtype=np.float32)
-    off[shaded(picture, image) | (picture.seen_s <= 0)] = 0
-    near = cv2.medianBlur((off > NEAR**2).view(np.uint8), 5)
+    out = standing_out(off, image, picture.mean, picture.seen_s, CAST, NEAR**2)
+    near = cv2.medianBlur(out.view(np.uint8), 5)
     count, labels = cv2.connectedComponents(near, connectivity=8)
-    return surely(np.asarray(labels, np.int32), off, count, (FAR * 1.5) ** 2)
+    return surely(np.asarray(labels, np.int32), off, out, count, (FAR * 1.5) ** 2)
 
 
 def learnt(

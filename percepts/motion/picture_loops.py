@@ -81,33 +81,60 @@ def offsets(image: Floats, mean: Floats, variance: Floats, most: float) -> Float
 
 
 @compiled
+def _is_dimmed(image: Floats, mean: Floats, y: int, x: int, shade: Shade) -> bool:
+    """Whether a pixel differs from the rest in brightness, and not in hue."""
+    power, common, own = 1.0, 0.0, 0.0
+    for i in range(3):
+        here, now = float(mean[y, x, i]), float(image[y, x, i])
+        power, common, own = power + here * here, common + now * here, own + now * now
+    bright = common / power
+    # What is left of the tone after the rest, as bright as it is seen, is taken from it.
+    hue = own - 2 * bright * common + bright * bright * (power - 1)
+    same = hue < shade.hue * shade.hue * power + shade.noise
+    return same and shade.darkest < bright < shade.brightest and power > shade.least
+
+
+@compiled
 def dimmed(image: Floats, mean: Floats, shade: Shade) -> Mask:
     """Where an image differs from the rest in brightness, and not in hue, (h, w)."""
     height, width = mean.shape[:2]
     out = np.empty((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
-            power, common, own = 1.0, 0.0, 0.0
-            for i in range(3):
-                here, now = float(mean[y, x, i]), float(image[y, x, i])
-                power, common, own = power + here * here, common + now * here, own + now * now
-            bright = common / power
-            # What is left of the tone after the rest, as bright as it is seen, is taken from it.
-            hue = own - 2 * bright * common + bright * bright * (power - 1)
-            same = hue < shade.hue * shade.hue * power + shade.noise
-            light = shade.darkest < bright < shade.brightest
-            out[y, x] = same and light and power > shade.least
+            out[y, x] = _is_dimmed(image, mean, y, x, shade)
     return out
 
 
 @compiled
-def surely(labels: NDArray[np.int32], off: Floats, count: int, least: float) -> Mask:
-    """Which pixels are in a component of (h, w) labels, 0 for none, that goes beyond `least`."""
+def standing_out(
+    off: Floats, image: Floats, mean: Floats, seen_s: Floats, shade: Shade, least: float
+) -> Mask:
+    """Which pixels are further off than `least`, known, and no shadow or reflection, (h, w)."""
+    height, width = off.shape
+    out = np.zeros((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            if off[y, x] > least and seen_s[y, x] > 0:
+                out[y, x] = not _is_dimmed(image, mean, y, x, shade)
+    return out
+
+
+@compiled
+def surely(labels: NDArray[np.int32], off: Floats, out_of: Mask, count: int, least: float) -> Mask:
+    """Which pixels are in a component that somewhere goes beyond `least`.
+
+    Args:
+        labels: (h, w) number of the component of each pixel, 0 for none.
+        off: (h, w) float32, how far each is off.
+        out_of: (h, w), which of them count.
+        count: How many components, with none.
+        least: What one of its pixels must go beyond.
+    """
     height, width = labels.shape
     sure = np.zeros(count, np.bool_)
     for y in range(height):
         for x in range(width):
-            if off[y, x] > least:
+            if off[y, x] > least and out_of[y, x]:
                 sure[labels[y, x]] = True
     sure[0] = False
     out = np.empty((height, width), np.bool_)

@@ -189,8 +189,8 @@ def foot_of(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, float] 
 def standing(m: Measured, foot: tuple[float, float] | None) -> Affine | None:
     """The motion of a thing at rest that stands upright on the ground, seen by a camera that travels.
 
-    It is as far away as the ground at its foot, so all of it goes as the background does there: what stands before
-    a ground that recedes has parallax against all that is behind it, and none against that place.
+    It is as far away as the ground at its foot, so all of it goes as the background does there:
+    it has parallax against all that is behind it, and none against that place.
     """
     if foot is None:
         return None

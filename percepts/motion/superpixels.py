@@ -15,8 +15,11 @@ from scipy import sparse
 
 from visup.percepts.motion.cell_loops import (
     borders,
+    bounds,
+    covered,
     flattest,
     gathered,
+    painted,
     spread_to,
     totals,
 )
@@ -85,31 +88,17 @@ class Superpixels:
         Returns:
             (count,) float32.
         """
-        x, y, w, h = old.box(members)
-        height, width = self.labels.shape
-        left, top = max(x + by[0], 0), max(y + by[1], 0)
-        right, bottom = min(x + by[0] + w, width), min(y + by[1] + h, height)
-        if left >= right or top >= bottom:
-            return np.zeros(self.count, dtype=np.float32)
-        there = np.s_[top - by[1] : bottom - by[1], left - by[0] : right - by[0]]
-        covered = self.labels[top:bottom, left:right][members[old.labels[there]]]
-        return np.asarray(np.bincount(covered, minlength=self.count) / self.area, dtype=np.float32)
+        some = np.ascontiguousarray(members)
+        pixels = covered(self.labels, old.labels, old.corners, some, *by, self.count)
+        return np.asarray(pixels / self.area, dtype=np.float32)
 
     def paint(self, members: NDArray[np.bool_]) -> Floats:
         """A map that is 1 in some cells and 0 elsewhere, (h, w) float32."""
-        out = np.zeros(self.labels.shape, dtype=np.float32)
-        x, y, w, h = self.box(members)
-        part = np.s_[y : y + h, x : x + w]
-        out[part] = members[self.labels[part]]
-        return out
+        return painted(self.labels, self.corners, np.ascontiguousarray(members))
 
     def box(self, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
         """(x, y, width, height) of the smallest box around some cells; empty when there are none."""
-        some = self.corners[members]
-        if not len(some):
-            return 0, 0, 0, 0
-        x, y = some[:, :2].min(axis=0).tolist()
-        right, bottom = some[:, 2:].max(axis=0).tolist()
+        x, y, right, bottom = bounds(self.corners, np.ascontiguousarray(members))
         return (x, y, right - x, bottom - y) if right > x else (0, 0, 0, 0)
 
 
