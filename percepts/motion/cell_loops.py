@@ -227,11 +227,11 @@ def flattest(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
 @compiled
 def bounds(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
     """(left, top, right, bottom) around some cells; (large, large, 0, 0) when there are none."""
-    left, top, right, bottom = np.int32(2**30), np.int32(2**30), np.int32(0), np.int32(0)
+    left, top, right, bottom = 2**30, 2**30, 0, 0
     for k in range(len(members)):
         if members[k]:
-            left, top = min(left, corners[k, 0]), min(top, corners[k, 1])
-            right, bottom = max(right, corners[k, 2]), max(bottom, corners[k, 3])
+            left, top = min(left, int(corners[k, 0])), min(top, int(corners[k, 1]))
+            right, bottom = max(right, int(corners[k, 2])), max(bottom, int(corners[k, 3]))
     return left, top, right, bottom
 
 
