@@ -73,6 +73,15 @@ def test_after_a_gap_the_way_gone_in_it_tells() -> None:
     assert found.velocity[0] == pytest.approx(8.0, abs=2.0)
 
 
+@given(st.sets(st.integers(0, 24)))
+def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
+    path = [p for k, p in enumerate(places(0.0)) if k not in missing]
+    known = len(path) > 5 and path[-1][0] - path[0][0] >= 0.6 * 0.3
+    found = motion(joint(path), path[-1][0], 0.3) if path else None
+    assert (found is not None) == known
+    assert found is None or found.span >= 0.6 * 0.3 - 1e-6
+
+
 @pytest.mark.parametrize("count", range(6))
 def test_of_a_few_places_nothing_is_told(count: int) -> None:
     assert motion(joint(places(8.0)[:count]), count / 25, 0.3) is None
