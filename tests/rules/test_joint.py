@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tests.rules.scenes import SIZE, box_region
@@ -74,6 +74,7 @@ def test_after_a_gap_the_way_gone_in_it_tells() -> None:
 
 
 @given(st.sets(st.integers(0, 24)))
+@example(set(range(5, 20)))
 def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
     path = [p for k, p in enumerate(places(0.0)) if k not in missing]
     known = len(path) > 5 and path[-1][0] - path[0][0] >= 0.6 * 0.3
