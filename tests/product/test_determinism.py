@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-EVERY = 10
+EVERY = 6
 
 RUN = """
 import os, sys
