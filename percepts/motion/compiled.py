@@ -25,4 +25,8 @@ def compiled(function: Function) -> Function:
     Returns:
         The same function; other threads go on while it runs.
     """
-    return cast(Function, numba.njit(cache=True, nogil=True)(function))
+    try:
+        return cast(Function, numba.njit(cache=True, nogil=True)(function))
+    except RuntimeError:
+        # Neither beside the code nor in the user's folders may anything be written: each run compiles.
+        return cast(Function, numba.njit(nogil=True)(function))

@@ -1,5 +1,6 @@
 """Compiled loops against the slow way to say the same."""
 
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from visup.percepts.motion.compiled import compiled
 from visup.percepts.motion.layer_loops import likelihoods, misfits, reweighted
 from visup.percepts.motion.picture import FAR, NOISE, RARE, SETTLE_S, Picture, learnt
 from visup.percepts.motion.point_loops import strongest, tensors
@@ -161,3 +163,9 @@ def test_points_are_the_steepest_of_their_squares(seed: int) -> None:
         [w[y : y + 11, x : x + 11].sum() for w in wide] for x, y in zip(xs, ys, strict=True)
     ]
     assert tensors(gx, gy, xs, ys, 11) == pytest.approx(np.array(expected), rel=1e-3, abs=1e-3)
+
+
+def test_where_nothing_can_be_kept_loops_are_compiled_all_the_same() -> None:
+    made: dict[str, Callable[[float], float]] = {}
+    exec("def twice(value):\n    return 2.0 * value", made)  # no file, so nowhere to keep it
+    assert compiled(made["twice"])(4.0) == 8.0
