@@ -254,9 +254,8 @@ def _refreshed(binding: Binding, mind: Mind) -> Binding:
 
 def _start(follower: Follower, scene: Scene) -> tuple[Reading, ...]:
     """The task begins once all actors of one of its first steps are found."""
-    readings = follower.start(scene.mind.time)
-    found = any(scene.found(x.step.actors) for r in readings for x in leaves(r.state))
-    return readings if found else ()
+    found = any(scene.found(step.actors) for step in follower.first_steps)
+    return follower.start(scene.mind.time) if found else ()
 
 
 def _strange(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[tuple[int, float], ...]:
