@@ -72,10 +72,13 @@ class RuleThinker:
 
     rules: tuple[Rule, ...]
     _prepared: Ruled = field(init=False, repr=False, compare=False)
+    _latest: list[Values] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # Rules are long trees: to look up by them what was prepared costs as much as a rule.
         object.__setattr__(self, "_prepared", ruled(self.rules))
+        # The values of the latest step, whoever's it was, to save work: nothing else hangs on it.
+        object.__setattr__(self, "_latest", [])
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
@@ -88,7 +91,8 @@ class RuleThinker:
         before = prepared.program.fresh if old.now is None else old.after
         if old.now is not None and old.ids != facts.ids:
             before = rerowed(prepared, before, now, old.ids, facts.ids)
-        values = Values(prepared, facts, now, before)
+        values = Values(prepared, facts, now, before, self._latest[0] if self._latest else None)
+        self._latest[:] = [values]
         held, cooling = _concerns(self.rules, values, old)
         mind = mind.remember(
             SAFETY,

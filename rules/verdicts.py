@@ -24,6 +24,8 @@ from visup.rules.vocabulary import RULES, Quantity, Word
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
 """Intervals of what is false, unknown, true; by code + 1."""
 States = tuple[Any, ...]
+FactKey = tuple[int, tuple[int, ...]]
+"""By which a step finds a fact: its node, and the axes of its objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class Fact:
         name: Its word.
     """
 
-    key: tuple[int, tuple[int, ...]]
+    key: FactKey
     codes: Callable[[Facts], Any]
     axes: tuple[int, ...]
     name: str
@@ -152,38 +154,44 @@ class Values:
         facts: The mind.
         now: Microseconds.
         before: States of the operators before, for the objects of `facts`.
+        known: Values of another step, such as the last one. What is the same now as it was there
+            is not worked out again, whichever step it is.
 
     Attributes:
         after: States after.
     """
 
-    def __init__(self, prepared: Ruled, facts: Facts, now: int, before: States) -> None:
+    def __init__(
+        self, prepared: Ruled, facts: Facts, now: int, before: States, known: Values | None = None
+    ) -> None:
+        if known is not None and (known.prepared, known.facts.ids) != (prepared, facts.ids):
+            known = None
         self.prepared = prepared
         self.facts = facts
         self.axes = prepared.compiler.algebra.axes
         self._same: dict[tuple[int, int], NDArray[np.bool_]] = {}
         self._shapes: dict[tuple[int, ...], tuple[int, ...]] = {}
-        facts.relate(prepared.relations)
-        self._found = self._truths()
+        self._codes: dict[FactKey, bytes | None] = {}
+        self._found = self._truths(known)
         moment = Moment(now, before, self._look, self._same_object)
-        self._values: list[Box] = prepared.program.step(moment)
+        self._values: list[Box] = prepared.program.step(moment, known._values if known else None)
+        self._true = self._judged(known)
         self.after: States = tuple(moment.after)
 
-    def _truths(self) -> dict[tuple[int, tuple[int, ...]], Box]:
-        """All facts at once, since there are dozens of small ones."""
-        facts, wanted = self.facts, self.prepared.facts
-        if not wanted:
-            return {}
+    def _truths(self, known: Values | None) -> dict[FactKey, Box]:
+        """All facts; there are dozens of them, of which few change in a step."""
+        facts = self.facts
         facts.relate(self.prepared.relations)
-        codes = [fact.codes(facts).ravel() for fact in wanted]
-        whole = TRUTHS.take(np.concatenate(codes) + 1, axis=1)
-        found, end = {}, 0
-        for fact, code in zip(wanted, codes, strict=True):
-            begin, end = end, end + len(code)
-            value = whole[:, begin:end]
-            if blind(facts.mind, fact.name):
-                value = _nothing_known(value)
-            found[fact.key] = self._laid(value, fact.axes)
+        found = {}
+        for fact in self.prepared.facts:
+            codes = fact.codes(facts)
+            told = None if blind(facts.mind, fact.name) else codes.tobytes()
+            self._codes[fact.key] = told
+            if known is not None and known._codes[fact.key] == told:
+                found[fact.key] = known._found[fact.key]
+                continue
+            value = TRUTHS.take(codes + 1, axis=1)
+            found[fact.key] = self._laid(_nothing_known(value) if told is None else value, fact.axes)
         return found
 
     def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:
@@ -223,14 +231,22 @@ class Values:
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
-        values = self._values
-        for rule, places, apart in self.prepared.verdicts:
-            holds = values[places[0].step][0] > 0
-            if not holds.any():
+        for (rule, _, _), chosen in zip(self.prepared.verdicts, self._true, strict=True):
+            for ids in chosen:
+                yield rule, ids
+
+    def _judged(self, known: Values | None) -> list[tuple[tuple[int, ...], ...]]:
+        """For each rule the choices of objects for which it is true and not suspended."""
+        values, found = self._values, []
+        for k, (rule, places, apart) in enumerate(self.prepared.verdicts):
+            if known is not None and all(values[p.step] is known._values[p.step] for p in places):
+                found.append(known._true[k])
                 continue
+            holds = values[places[0].step][0] > 0
             if len(places) > 1:
                 holds = holds & ~(values[places[1].step][0] > 0)
-            yield from ((rule, ids) for ids in self._choices(rule, holds, apart))
+            found.append(tuple(self._choices(rule, holds, apart)) if holds.any() else ())
+        return found
 
     def _choices(
         self, rule: Rule, holds: NDArray[np.bool_], apart: tuple[tuple[int, int], ...]
