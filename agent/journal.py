@@ -285,7 +285,10 @@ def _alert_row(a: Alert) -> tuple[Any, ...]:
 
 def _text(value: Any) -> str:
     """Plain values as JSON, the same values as the same text."""
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+    return _TEXT.encode(value)
+
+
+_TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
 def _unwritable(path: Path, fault: sqlite3.Error) -> OutputError:

@@ -341,12 +341,21 @@ class Mind:
     answers: Mapping[int, str] = field(default_factory=lambda: NO_ANSWERS)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
-    def remember(self, thinker: str, value: object) -> Mind:
-        """The same mind with one thinker's memory replaced; `value` must be immutable."""
-        return replace(self, memory=MappingProxyType({**self.memory, thinker: value}))
+    def remember(self, thinker: str, value: object, **changes: Any) -> Mind:
+        """The same mind with one thinker's memory replaced, and other fields with it.
+
+        Args:
+            thinker: Its name.
+            value: What it remembers; must be immutable.
+            changes: Field -> value.
+        """
+        memory = MappingProxyType({**self.memory, thinker: value})
+        return replace(self, memory=memory, **changes)
 
     def with_objects(self, *beliefs: ObjectBelief) -> Mind:
         """The same mind with beliefs about some objects added or replaced."""
+        if all(self.objects.get(b.id) is b for b in beliefs):
+            return self
         updated = {**self.objects, **{b.id: b for b in beliefs}}
         return replace(self, objects=MappingProxyType(updated))
 

@@ -128,8 +128,9 @@ class Couple:
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
         told = tuple(self._relation(pair, coupled.get(pair), held, mind) for pair in pairs)
-        mind = replace(mind, couplings=alive, relations=mind.relations + told)
-        return Outcome(mind.remember(COUPLING, MappingProxyType(kept)), tuple(events))
+        memory = MappingProxyType(kept)
+        mind = mind.remember(COUPLING, memory, couplings=alive, relations=mind.relations + told)
+        return Outcome(mind, tuple(events))
 
     def _look(
         self,

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from visup.agent import Region
 
@@ -106,39 +105,6 @@ def hull_separation(support: Floats) -> Floats:
     return -least
 
 
-def outline_gap(a: Region, b: Region, near: float) -> float | None:
-    """Least distance between two outlines, when it is at most `near`.
-
-    Args:
-        a: One region.
-        b: Another.
-        near: Distance beyond which nobody cares, pixels.
-
-    Returns:
-        Pixels, 0 where the masks overlap or the outlines are neighbours (1 pixel apart or less),
-        or None when it is greater than `near`.
-    """
-    if box_gap(a.bbox, b.bbox) > near:
-        return None
-    inside_a = _within(outline(a), b.bbox, near)
-    inside_b = _within(outline(b), a.bbox, near)
-    if len(inside_a) == 0 or len(inside_b) == 0:
-        # One may still lie deep within the other.
-        return 0.0 if masks_overlap(a, b) else None
-    distance = float(cKDTree(inside_b).query(inside_a)[0].min())
-    if distance > 1.5 and masks_overlap(a, b):
-        return 0.0
-    gap = max(0.0, distance - 1.0)
-    return gap if gap <= near else None
-
-
-def _within(points: Floats, box: Box, margin: float) -> Floats:
-    x, y, w, h = box
-    low = np.array([x - margin - 1, y - margin - 1])
-    high = np.array([x + w + margin, y + h + margin])
-    return points[((points >= low) & (points <= high)).all(axis=1)]
-
-
 def masks_overlap(a: Region, b: Region) -> bool:
     """Whether two regions share a pixel."""
     return shared_pixels(a, b) > 0
@@ -225,29 +191,6 @@ def moved(region: Region, dx: float, dy: float) -> Region:
         cut=region.cut,
         confidence=region.confidence,
     )
-
-
-def signed_distances(a: Region, b: Region, most: int = 200) -> tuple[float, float]:
-    """How far the outline of one region lies outside another, nearest and farthest point.
-
-    Args:
-        a: A region; of its outline at most `most` points are looked at.
-        b: Another.
-        most: Bound on points.
-
-    Returns:
-        The least and the greatest distance of a's points to b's outline, pixels, negative within b.
-    """
-    points, other = outline(a), dense(outline(b))
-    points = dense(points)
-    points = points[:: -(-len(points) // most)]
-    distance = np.asarray(cKDTree(other).query(points)[0], dtype=float)
-    x, y, w, h = b.bbox
-    at = np.rint(points).astype(int) - (x, y)
-    within = (at >= 0).all(axis=1) & (at[:, 0] < w) & (at[:, 1] < h)
-    within[within] = b.mask[at[within, 1], at[within, 0]]
-    signed = np.where(within, -distance, distance)
-    return float(signed.min()), float(signed.max())
 
 
 def dense(points: Floats, step: float = 2.0) -> Floats:

@@ -207,7 +207,7 @@ class Relations:
             rcc8 = step(rcc8, held, mind.time, 0.0)
         kept = Kept(history, now, latch, rcc8, smooth)
         table = RelationTable(now.ids, self._columns(kept, mind))
-        return Outcome(replace(mind, relations=table).remember(RELATIONS, kept))
+        return Outcome(mind.remember(RELATIONS, kept, relations=table))
 
     def _durations(self) -> Floats:
         s = self.settings

@@ -191,7 +191,9 @@ class Values:
                 found[fact.key] = known._found[fact.key]
                 continue
             value = TRUTHS.take(codes + 1, axis=1)
-            found[fact.key] = self._laid(_nothing_known(value) if told is None else value, fact.axes)
+            found[fact.key] = self._laid(
+                _nothing_known(value) if told is None else value, fact.axes
+            )
         return found
 
     def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:

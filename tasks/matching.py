@@ -63,9 +63,7 @@ def match(
     ]
     chosen = best_matching(weight)
     return tuple(
-        Binding(a, m, objects[chosen[i]].id, pure[i][chosen[i]])
-        if i in chosen
-        else Binding(a, m)
+        Binding(a, m, objects[chosen[i]].id, pure[i][chosen[i]]) if i in chosen else Binding(a, m)
         for i, (a, m) in enumerate(zip(actors, models, strict=True))
     )
 

@@ -73,7 +73,7 @@ def task_thinker(
         before = _recall(mind, followers)
         seen = tuple(_follow(f, m, mind) for f, m in zip(followers, before, strict=True))
         new = _inferred(before, seen)
-        believed = replace(mind, tasks=tuple(m.belief for m in new)).remember(MEMORY, new)
+        believed = mind.remember(MEMORY, new, tasks=tuple(m.belief for m in new))
         steps = list(zip(followers, before, new, strict=True))
         events = tuple(e for step in steps for e in _events(*step, mind))
         return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))

@@ -14,12 +14,12 @@ from visup.rules.geometry import (
     RCC8,
     hull_separation,
     moved,
-    outline_gap,
     pixels_in,
     reach,
     shared_pixels,
 )
 from visup.rules.latch import UNKNOWN, hold_sign
+from visup.rules.outlines import outline_gap
 from visup.rules.rcc8 import from_outline_signs, outline_differences, rcc8
 
 some = settings(max_examples=80, deadline=None)
