@@ -57,6 +57,12 @@ class Facts:
         """(n, n) codes that are all the same."""
         return np.full((len(self.ids), len(self.ids)), code, dtype=np.int8)
 
+    def unknown(self, objects: int) -> Floats:
+        """(2, n) or (2, n, n) intervals of what is known of no object, or of no pair of objects."""
+        whole = np.full((2, *(len(self.ids),) * objects), np.inf)
+        whole[0] = -np.inf
+        return whole
+
     def related(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
         if name not in self._codes:
@@ -139,15 +145,13 @@ def code(value: bool) -> int:
 
 def exactly(values: Floats) -> Floats:
     """(2, ...) intervals of known values; NaN becomes unknown."""
-    both = np.array((values, values))
-    unknown = values != values
-    if unknown.any():
-        both[0, unknown], both[1, unknown] = -np.inf, np.inf
-    return both
+    return between(values, values)
 
 
 def between(low: Floats, high: Floats) -> Floats:
     """(2, ...) intervals; NaN becomes unknown."""
-    both = np.array((low, high))
-    both[0, low != low], both[1, high != high] = -np.inf, np.inf
+    both = np.empty((2, *low.shape))
+    # Of NaN and a number, these take the number.
+    np.fmax(low, -np.inf, out=both[0])
+    np.fmin(high, np.inf, out=both[1])
     return both

@@ -391,7 +391,7 @@ class Compiler:
         at = self.formula(node.part, (*scope, (node.variable, node.may_repeat)))
         apart = () if node.may_repeat else tuple(i for i, (_, r) in enumerate(scope) if not r)
         empty = -inf if node.kind == "exists" else inf
-        reduce = np.max if node.kind == "exists" else np.min
+        reduce = (np.maximum if node.kind == "exists" else np.minimum).reduce
 
         def run() -> Run:
             source = at.step

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from itertools import combinations
@@ -172,10 +172,12 @@ class Values:
         self._same: dict[tuple[int, int], NDArray[np.bool_]] = {}
         self._shapes: dict[tuple[int, ...], tuple[int, ...]] = {}
         self._codes: dict[FactKey, bytes | None] = {}
+        self._before: Mapping[FactKey, Box] = known._found if known else {}
         self._found = self._truths(known)
         moment = Moment(now, before, self._look, self._same_object)
         self._values: list[Box] = prepared.program.step(moment, known._values if known else None)
         self._true = self._judged(known)
+        self._before = {}  # values of one step do not keep those of all steps before alive
         self.after: States = tuple(moment.after)
 
     def _truths(self, known: Values | None) -> dict[FactKey, Box]:
@@ -202,9 +204,14 @@ class Values:
         if found is not None:
             return found
         value: Box = _asked(node)(self.facts)
-        return self._laid(
+        value = self._laid(
             _nothing_known(value) if blind(self.facts.mind, node.name) else value, axes
         )
+        before = self._before.get((id(node), axes))
+        if before is not None and value.tobytes() == before.tobytes():
+            value = before  # what follows from it need not be worked out again
+        self._found[id(node), axes] = value
+        return value
 
     def _laid(self, value: Box, axes: tuple[int, ...]) -> Box:
         """(2, ...) values of one or two objects along the axes of these."""
