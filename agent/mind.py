@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.changing import replace
-from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, empty
+from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
 from visup.agent.relations import Relation, RelationTable
 
 if TYPE_CHECKING:
@@ -377,6 +377,10 @@ class Mind:
         The order of the objects matters only for relations that are not symmetric.
         """
         return self._table.find(name, *objects)
+
+    def truth(self, name: str, a: int, b: int) -> Truth | None:
+        """Whether the relation of that name holds from a to b, or None when it is not judged."""
+        return self._table.truth(name, a, b)
 
     def holding(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""

@@ -104,10 +104,10 @@ class Couple:
         objects = mind.present()
         pairs = [(a.id, b.id) for i, a in enumerate(objects) for b in objects[i + 1 :]]
         held: Held = {
-            (name, pair): r.truth
+            (name, pair): truth
             for pair in pairs
             for name in ("touching", "converging", "diverging")
-            if (r := mind.relation(name, *pair)) is not None
+            if (truth := mind.truth(name, *pair)) is not None
         }
         now = measured(mind)
         kept: dict[Pair, Pending] = {}

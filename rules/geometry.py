@@ -10,6 +10,7 @@ without trusting the centroid of a body that the image border cuts off.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,7 +140,7 @@ def box_gap(a: Box, b: Box) -> float:
     """Distance between two boxes, pixels; 0 where they meet or overlap."""
     dx = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]), 0)
     dy = max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3]), 0)
-    return float(np.hypot(dx, dy))
+    return hypot(dx, dy)
 
 
 def box_overlap(a: Box, b: Box) -> float:

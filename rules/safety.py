@@ -152,10 +152,10 @@ def _until(rule: Rule, now: float) -> float:
 def confidence(rule: Rule, ids: tuple[int, ...], values: Values) -> float:
     """The least confidence of the relations that `when` names of these objects and that are true."""
     objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
-    found = [
-        r.confidence
-        for call in values.prepared.related(rule)
-        if (r := mind.relation(call.name, *[objects[w] for w in call.words])) is not None
-        if r.truth is Truth.TRUE
-    ]
+    found = []
+    for call in values.prepared.related(rule):
+        pair = [objects[w] for w in call.words]
+        if mind.truth(call.name, *pair) is Truth.TRUE:
+            relation = mind.relation(call.name, *pair)
+            found += [relation.confidence] if relation else []
     return min(found, default=1.0)

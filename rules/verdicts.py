@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from visup.rules.bounds import variables_of
 from visup.rules.facts import RELATION_NAMES, Facts
-from visup.rules.formula import Formula, Predicate, Rule, calls, mark, named
+from visup.rules.formula import (
+    Comparison,
+    Formula,
+    Predicate,
+    Quantified,
+    Rule,
+    calls,
+    children,
+    mark,
+    named,
+)
 from visup.rules.inputs import blind
 from visup.rules.intervals import Arrays, Box
 from visup.rules.operators import Pick
@@ -72,6 +82,7 @@ class Ruled:
     places: tuple[tuple[Place, ...], ...]
     _placed: dict[tuple[int, Scope], Place] = field(default_factory=dict, repr=False)
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
+    _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
     _texts: dict[tuple[int, tuple[str, ...]], str] = field(default_factory=dict, repr=False)
 
     @property
@@ -101,6 +112,15 @@ class Ruled:
             )
         return self._related[id(rule)]
 
+    def told(self, rule: Rule) -> tuple[Formula, ...]:
+        """The facts, comparisons and quantifiers that the `when` of one of these rules is made of.
+
+        Those under a quantifier are told by the quantifier.
+        """
+        if id(rule) not in self._told:
+            self._told[id(rule)] = tuple(_told(rule.when))
+        return self._told[id(rule)]
+
     def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
         """The source of a part of these rules, with marks where its variables stand."""
         key = (id(node), variables)
@@ -127,6 +147,15 @@ class Ruled:
         """What the rules look up that is true, false or unknown."""
         looks = ((node, axes) for node, axes in self.program.looks if isinstance(node, Predicate))
         return tuple(Fact((id(node), axes), _asked(node), axes, node.name) for node, axes in looks)
+
+
+def _told(formula: Formula) -> Iterator[Formula]:
+    if isinstance(formula, Predicate | Quantified | Comparison):
+        yield formula
+        return
+    for part in children(formula):
+        if not isinstance(part, Term):
+            yield from _told(part)
 
 
 def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
