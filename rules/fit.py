@@ -237,16 +237,15 @@ def common_motion(slopes: Floats, usable: NDArray[np.bool_], misfit: float = np.
     used = usable.astype(float)
     weight = used
     count = usable.sum(axis=1)
-    found = np.empty((len(slopes), 2))
     for _ in range(5):
         # Normal equations of two unknowns, solved by hand for all bodies at once.
         xx, xy, yy = (weight @ _SQUARES + _RIDGE).T
-        bx, by = ((weight * slopes) @ DIRECTIONS).T
-        determinant = xx * yy - xy * xy
-        found[:, 0] = (yy * bx - xy * by) / determinant
-        found[:, 1] = (xx * by - xy * bx) / determinant
-        off = np.abs(slopes - found @ _ACROSS)
+        sides = ((weight * slopes) @ DIRECTIONS).T
+        found = np.array((yy, xx)) * sides
+        found -= xy * sides[::-1]
+        found /= xx * yy - xy * xy
+        off = np.abs(slopes - found.T @ _ACROSS)
         weight = used / np.maximum(off, 0.3)
     mean_off = (off * used).sum(axis=1) / np.maximum(count, 1)
-    as_one = mean_off <= np.maximum(misfit, np.hypot(found[:, 0], found[:, 1]) / 3.0)
-    return np.where(((count >= 3) & as_one)[:, None], found, np.nan)
+    as_one = mean_off <= np.maximum(misfit, np.hypot(*found) / 3.0)
+    return np.where((count >= 3) & as_one, found, np.nan).T

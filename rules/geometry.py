@@ -25,6 +25,8 @@ _ANGLES = 2.0 * np.pi * np.arange(FAN) / FAN
 DIRECTIONS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 """(16, 2) unit vectors, evenly round the circle; the opposite of row k is row k + 8 modulo 16."""
 
+_EACH = np.arange(FAN)
+
 OPPOSITE = (np.arange(FAN) + FAN // 2) % FAN
 """Row of the opposite of each of `DIRECTIONS`."""
 
@@ -82,12 +84,12 @@ def reach(region: Region, frame_size: tuple[int, int]) -> Reach:
         Its reach in each of `DIRECTIONS`.
     """
     points = outline(region)
-    along = points @ DIRECTIONS.T
-    furthest = along.argmax(axis=0)
+    along = DIRECTIONS @ points.T
+    furthest = along.argmax(axis=1)
     x, y = points[furthest].T
     width, height = frame_size
     free = (x > 1.5) & (y > 1.5) & (x < width - 2.5) & (y < height - 2.5)
-    return Reach(along[furthest, np.arange(FAN)], free)
+    return Reach(along[_EACH, furthest], free)
 
 
 def hull_separation(support: Floats) -> Floats:
