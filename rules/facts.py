@@ -71,14 +71,14 @@ class Facts:
 
     def relate(self, names: tuple[str, ...]) -> None:
         """Look several relations up in one pass, before they are asked for."""
-        tables = self.mind.truths_of(names, self.ids)
+        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
+        tables = self.mind.truths_of(tuple([n for n in names if n != "coupled"]), self.ids)
         # An object is equal to itself, and nothing else.
         each = np.arange(len(self.ids))
-        itself = [[YES if name in ITSELF else NO] for name in names]
+        itself = [[YES if name in ITSELF else NO] for name in names if name != "coupled"]
         tables[:, each, each] = np.array(itself, dtype=np.int8).reshape(-1, 1)
-        self._codes.update(zip(names, tables, strict=True))
-        if "coupled" in names:
-            self._codes["coupled"] = self._coupled()
+        found = iter(tables)
+        self._codes |= {n: self._coupled() if n == "coupled" else next(found) for n in names}
 
     def _coupled(self) -> Codes:
         codes, row = self.pairs(NO), self.row

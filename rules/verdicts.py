@@ -80,10 +80,10 @@ class Ruled:
     rules: tuple[Rule, ...]
     compiler: Compiler
     places: tuple[tuple[Place, ...], ...]
-    _placed: dict[tuple[int, Scope], Place] = field(default_factory=dict, repr=False)
+    _placed: dict[Scope, dict[int, Place]] = field(default_factory=dict, repr=False)
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
     _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
-    _texts: dict[tuple[int, tuple[str, ...]], str] = field(default_factory=dict, repr=False)
+    _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
 
     @property
     def program(self) -> Program:
@@ -92,14 +92,14 @@ class Ruled:
 
     def place(self, node: Formula | Term, scope: Scope) -> Place:
         """Where the value of a part of these rules is found."""
-        key = (id(node), scope)
-        if key not in self._placed:
-            self._placed[key] = (
+        known = self._placed.setdefault(scope, {})
+        if id(node) not in known:
+            known[id(node)] = (
                 self.compiler.term(node, scope)
                 if isinstance(node, Term)
                 else self.compiler.formula(node, scope)
             )
-        return self._placed[key]
+        return known[id(node)]
 
     def related(self, rule: Rule) -> tuple[Predicate, ...]:
         """The relations between its objects that the `when` of one of these rules names."""
@@ -123,10 +123,10 @@ class Ruled:
 
     def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
         """The source of a part of these rules, with marks where its variables stand."""
-        key = (id(node), variables)
-        if key not in self._texts:
-            self._texts[key] = str(named(node, {v: mark(v) for v in variables}))
-        return self._texts[key]
+        known = self._texts.setdefault(variables, {})
+        if id(node) not in known:
+            known[id(node)] = str(named(node, {v: mark(v) for v in variables}))
+        return known[id(node)]
 
     @cached_property
     def relations(self) -> tuple[str, ...]:
