@@ -195,6 +195,9 @@ class Journal:
 
     def _write(self, statements: list[Statement]) -> None:
         try:
+            if len(statements) == 1:  # is a transaction by itself
+                self._db.execute(*statements[0])
+                return
             self._db.execute("BEGIN IMMEDIATE")
             for sql, row in statements:
                 self._db.execute(sql, row)

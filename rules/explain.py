@@ -23,10 +23,11 @@ from visup.rules.formula import (
 from visup.rules.intervals import UNKNOWN, Interval
 from visup.rules.monitor import verdict
 from visup.rules.program import Place, Scope
+from visup.rules.ruled import scope_of
 from visup.rules.sentences import short
 from visup.rules.terms import Measure, Term
 from visup.rules.units import TICKS, Number
-from visup.rules.verdicts import Values, scope_of
+from visup.rules.verdicts import Values
 from visup.rules.vocabulary import RULES
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import sqrt
+from math import log, sqrt
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -276,11 +276,17 @@ class Motion:
         Returns:
             At most what the ratio of both speeds allows; no bound below.
         """
-        rest = self.covariance + 0.5 * still**2 * np.eye(2)
-        free = self.covariance + moving**2 * np.eye(2)
-        v = self.velocity
-        near = v @ np.linalg.solve(rest, v) - v @ np.linalg.solve(free, v)
-        return float(0.5 * (np.log(np.linalg.det(free) / np.linalg.det(rest)) - near))
+        (xx, xy), (_, yy) = self.covariance.tolist()
+        vx, vy = self.velocity.tolist()
+
+        def told(variance: float) -> tuple[float, float]:
+            """Determinant of the covariance with more variance, and the velocity's distance by it."""
+            a, c = xx + variance, yy + variance
+            determinant = a * c - xy * xy
+            return determinant, (c * vx * vx - 2.0 * xy * vx * vy + a * vy * vy) / determinant
+
+        (rest, rests), (free, moves) = told(0.5 * still**2), told(moving**2)
+        return 0.5 * (log(free / rest) - (rests - moves))
 
 
 def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
@@ -318,7 +324,14 @@ def _motion(path: Floats, noise: Floats) -> Motion:
     if not len(flow):
         return Motion(slope, spread, span)
     independent = max(1.0, span / LASTS_S)
-    precision = np.linalg.inv(spread)
+    precision = _inverse(spread)
     certain = independent / flow[:, 2].mean() * np.eye(2)
-    spread = np.linalg.inv(precision + certain)
+    spread = _inverse(precision + certain)
     return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread, span)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Of a (2, 2) matrix, by hand: it is too small for a library."""
+    (a, b), (c, d) = matrix.tolist()
+    inverse: Floats = np.array(((d, -b), (-c, a))) / (a * d - b * c)
+    return inverse

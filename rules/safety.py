@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
-from visup.agent.changing import replace
 from visup.rules.explain import evidence
 from visup.rules.facts import Facts
 from visup.rules.formula import Rule
 from visup.rules.operators import SPACING
+from visup.rules.ruled import Ruled, ruled
 from visup.rules.sentences import sentence, with_names
 from visup.rules.units import ticks
-from visup.rules.verdicts import Ruled, States, Values, rerowed, ruled
+from visup.rules.verdicts import States, Values, rerowed
 
 SAFETY = "rules.safety"
 MOST_RETOLD = 3
@@ -115,13 +115,14 @@ def _concerns(
     held: dict[Key, Held] = {}
     cooling = {key: until for key, until in old.cooling.items() if until > now}
     found: dict[Key, tuple[Rule, tuple[int, ...]]] = {}
-    for rule, ids in values.true():
-        found.setdefault((rule.name, frozenset(ids)), (rule, ids))
+    for rule, ids, objects in values.found():
+        found.setdefault((rule.name, objects), (rule, ids))
     standing = [key for key in found if key in old.held]
     retold = sorted(standing, key=lambda key: old.held[key].told)[:MOST_RETOLD]
     for key, (rule, ids) in found.items():
         if key in old.held and key not in retold:
-            held[key] = replace(old.held[key], until=_until(rule, now))
+            before = old.held[key]
+            held[key] = Held(before.concern, _until(rule, now), before.told)
         elif key not in cooling:
             held[key] = _raised(rule, ids, values, old.held.get(key))
     rests = {rule.name: rule.cooldown.base for rule in rules if rule.cooldown is not None}
