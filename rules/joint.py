@@ -160,7 +160,7 @@ def laid_upon(kept: Kept, target: Target) -> Kept | None:
             at, nearest, normals = at[found], nearest[found], normals[found]
         if len(at) < max(LEAST_POINTS, 0.5 * len(kept.points)):
             return None
-        step = _step(normals, target.points[nearest] - at)
+        step = step_across(normals, target.points[nearest] - at)
         if step is None:
             return None
         x, y = x + step[0], y + step[1]
@@ -169,7 +169,7 @@ def laid_upon(kept: Kept, target: Target) -> Kept | None:
     return replace(kept, shift=(x, y))
 
 
-def _step(normals: Floats, off: Floats) -> tuple[float, float] | None:
+def step_across(normals: Floats, off: Floats) -> tuple[float, float] | None:
     """The move that brings points onto an outline, by weighted least squares across it.
 
     Args:
