@@ -201,7 +201,7 @@ class Arrays:
 def _widened(v: Box) -> Box:
     """What is no number becomes unknown."""
     unknown = v != v  # NaN is not equal to itself
-    if unknown.any():
+    if np.count_nonzero(unknown):
         v[0][unknown[0]] = -inf
         v[1][unknown[1]] = inf
     return v

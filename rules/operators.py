@@ -180,7 +180,7 @@ class Lasting:
             return until, now
         if broken is not state.broken:
             over = state.broken & ~broken
-            if over.any():
+            if np.count_nonzero(over):
                 return np.where(over, now, state.until), now
         return state.until, state.latest
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
+from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief
 from visup.rules.explain import evidence
-from visup.rules.facts import Facts
+from visup.rules.facts import YES, Facts
 from visup.rules.formula import Rule
 from visup.rules.operators import SPACING
 from visup.rules.ruled import Ruled, ruled
@@ -152,11 +152,11 @@ def _until(rule: Rule, now: float) -> float:
 
 def confidence(rule: Rule, ids: tuple[int, ...], values: Values) -> float:
     """The least confidence of the relations that `when` names of these objects and that are true."""
-    objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
+    objects, facts = dict(zip(rule.variables, ids, strict=True)), values.facts
     found = []
     for call in values.prepared.related(rule):
-        pair = [objects[w] for w in call.words]
-        if mind.truth(call.name, *pair) is Truth.TRUE:
-            relation = mind.relation(call.name, *pair)
+        a, b = (objects[w] for w in call.words)
+        if facts.related(call.name)[facts.row[a], facts.row[b]] == YES:
+            relation = facts.mind.relation(call.name, a, b)
             found += [relation.confidence] if relation else []
     return min(found, default=1.0)

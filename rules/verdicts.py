@@ -136,7 +136,8 @@ class Values:
             holds = values[places[0].step][0] > 0
             if len(places) > 1:
                 holds = holds & ~(values[places[1].step][0] > 0)
-            choices = self._choices(rule, holds, apart) if holds.any() else ()
+            # The quickest way to ask whether any of a few holds.
+            choices = self._choices(rule, holds, apart) if np.count_nonzero(holds) else ()
             found.append(tuple([(ids, frozenset(ids)) for ids in choices]))
         return found
 
