@@ -180,7 +180,7 @@ class Couple:
         s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
         found = motion(joint, mind.time, s.window_s)
         if found is None:
-            return 0.0
+            return odds
         diagonal = scale(mind.frame_size)
         told = found.rest_odds(s.relations.still_speed * diagonal, s.moving * diagonal)
         told *= min(1.0, waited / found.span)

@@ -304,9 +304,10 @@ def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
         return None
     path = np.array(joint.path)
     inside = int(np.count_nonzero(path[:, 0] > now - window_s - 1e-6))
-    recent = path[-max(inside, LEAST_PLACES) :]
+    long = int(np.count_nonzero(path[:, 0] > path[-1, 0] - 0.6 * window_s + 1e-6)) + 1
+    recent = path[-max(inside, long, LEAST_PLACES) :]
     span = float(recent[-1, 0] - recent[0, 0])
-    if span < 0.6 * window_s:
+    if span < 0.6 * window_s - 1e-6:
         return None
     # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
     # longer, and is believed to be as large.

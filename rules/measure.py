@@ -36,6 +36,7 @@ class RelationSettings:
         rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
         rate_exit: Trend below which they end, image diagonals per second.
         sigmas: How many standard deviations of the slope a trend must exceed to enter.
+        pending_sigmas: The same while a trend waits to be believed.
         trend_minimum_s: Least duration of a trend before it is believed.
         hold_s: How long the last gap stands for bodies that flicker out of sight.
         depth_rate: Relative depth change that counts, share of the depth per second.
@@ -65,6 +66,7 @@ class RelationSettings:
     rate_enter: float = 0.002
     rate_exit: float = 0.001
     sigmas: float = 3.0
+    pending_sigmas: float = 2.0
     trend_minimum_s: float = 0.3
     hold_s: float = 0.3
     depth_rate: float = 0.02

@@ -198,7 +198,7 @@ class Relations:
         history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
         now = Measuring(s)(history, objects, mind, kept.measured)
         smooth = self._smooth(before.smooth, now, objects, mind)
-        wants = self._wanted(before.latch.state, history, now, smooth, mind)
+        wants = self._wanted(before.latch, history, now, smooth, mind)
         latch = step(before.latch, wants, mind.time, self._lasts)
         rcc8 = before.rcc8
         if latch is not before.latch:  # else these follow from what is as it was
@@ -218,30 +218,31 @@ class Relations:
 
     def _wanted(
         self,
-        before: Codes,
+        before: Latch,
         h: History,
         now: Measured,
         smooth: Smooth,
         mind: Mind,
     ) -> Codes:
         s, diagonal = self.settings, scale(mind.frame_size)
-        codes = np.empty(before.shape, dtype=np.int8)
+        codes = np.empty(before.state.shape, dtype=np.int8)
         q = quantities(smooth.boxes, now.velocity, now.velocity_sigma, s.judge.noise_px)
-        codes[:JUDGED] = wanted(before[:JUDGED], q, s.judge, diagonal)
+        codes[:JUDGED] = wanted(before.state[:JUDGED], q, s.judge, diagonal)
         image = wanted_trend(
             of_pairs(now.rate),
             of_pairs(now.rate_sigma),
-            before[TREND],
+            before.state[TREND],
+            before.pending[TREND],
             s.rate_enter * diagonal,
             s.rate_exit * diagonal,
-            s.sigmas,
+            (s.sigmas, s.pending_sigmas),
         )
         codes[DEPTH] = self._depth_trend(h)
         codes[TREND] = with_depth(image, codes[DEPTH])
-        codes[TOUCH] = self._wanted_touch(now, smooth.gap, before[TOUCH], diagonal)
-        codes[TOGETHER] = self._wanted_together(now, before[TOGETHER], diagonal)
+        codes[TOUCH] = self._wanted_touch(now, smooth.gap, before.state[TOUCH], diagonal)
+        codes[TOGETHER] = self._wanted_together(now, before.state[TOGETHER], diagonal)
         level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
-        codes[OUTLINE] = hold_sign(smooth.outlines, before[OUTLINE], *level)
+        codes[OUTLINE] = hold_sign(smooth.outlines, before.state[OUTLINE], *level)
         for k in _numbers(h.ids, (c.objects for c in mind.couplings)):
             # One body that turns changes its outline; it comes apart when its parts no longer touch.
             if codes[TOUCH, k] == 1 and codes[TREND, k] == DIVERGING:

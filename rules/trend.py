@@ -12,7 +12,13 @@ TREND_NAMES = ("converging", "keeping_distance", "diverging")
 
 
 def wanted_trend(
-    rate: Floats, sigma: Floats, before: Codes, enter: float, leave: float, sigmas: float
+    rate: Floats,
+    sigma: Floats,
+    before: Codes,
+    pending: Codes,
+    enter: float,
+    leave: float,
+    sigmas: tuple[float, float],
 ) -> Codes:
     """Which trend a rate of change stands for, with hysteresis.
 
@@ -20,22 +26,25 @@ def wanted_trend(
         rate: (P,) pixels per second; NaN unknown.
         sigma: (P,) its standard deviation.
         before: (P,) the trend believed so far.
+        pending: (P,) the trend that wanted to be believed so far.
         enter: Rate that must be exceeded to enter a trend, pixels per second.
         leave: Rate below which it ends.
-        sigmas: How many deviations the rate must also exceed to enter.
+        sigmas: How many deviations the rate must also exceed to want to enter, and how many to go
+            on wanting it. Deviations are themselves estimates and jump; one wide one in a row does
+            not take back what was seen.
 
     Returns:
         (P,) codes; a rate between the thresholds leaves things as they are.
     """
-    strong = np.abs(rate) > np.maximum(enter, sigmas * sigma)
+    sign = np.where(rate < 0, np.int8(CONVERGING), np.int8(DIVERGING))
+    least = np.where(pending == sign, sigmas[1], sigmas[0]) * sigma
+    strong = np.abs(rate) > np.maximum(enter, least)
     weak = np.abs(rate) < leave
     # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
     goes_on = (before == CONVERGING) & (rate <= 0)
     goes_on |= (before == DIVERGING) & (rate >= 0)
     weakly = np.where(goes_on & ~weak, before, np.int8(KEEPING))
-    wanted: Codes = np.where(
-        strong, np.where(rate < 0, np.int8(CONVERGING), np.int8(DIVERGING)), weakly
-    )
+    wanted: Codes = np.where(strong, sign, weakly)
     wanted[~np.isfinite(rate)] = UNKNOWN
     return wanted
 

@@ -23,7 +23,8 @@ class TaskSettings:
         stalled_s: A begun stage without progress for so long is stalled.
         unseen_s: A stage whose actors were not observed for so long is unknown.
         gap_s: A break of a `for` shorter than this is forgiven.
-        failed_s: A stage that has been failing for so long has failed.
+        failed_s: A stage that has been failing for so long has failed; it must then make progress for
+            as long to count as recovered.
         regret_s: A task that is done may be undone by contrary evidence for so long.
         unexplained_s: An object that no actor explains must be there so long to be named.
         familiar: An object whose best identity has at least this share is taken to be identified.

@@ -222,7 +222,9 @@ def _long_failing(watch: Watch, now: float, settings: TaskSettings) -> bool:
 
 
 def _recovered(watch: Watch, now: float, settings: TaskSettings) -> bool:
-    return watch.better_since is not None and now - watch.better_since >= settings.recover_s
+    """What failed for good goes on only when it has gone well for as long as that took."""
+    must = settings.failed_s if watch.status is Status.FAILED else settings.recover_s
+    return watch.better_since is not None and now - watch.better_since >= must
 
 
 def _first(earlier: float | None, now: float) -> float:

@@ -14,6 +14,7 @@ from visup.agent.errors import OutputError
 from visup.agent.journal import Limits
 from visup.percepts.video import Source
 from visup.percepts.video.live import LiveSource
+from visup.percepts.video.realtime import in_real_time
 from visup.recorder import Recorder, kept_of
 from visup.resume import Past, caught_up
 from visup.settings import WatchSettings
@@ -161,11 +162,16 @@ def supervise(
         if recorder:
             troubles.ask(recorder.troubles)
         troubles.ask(sinks.troubles)
-        steady = Steady(frames, source.fps, agent.mind.time if past and past.steps else None)
-        troubles.ask(steady.troubles)
         if isinstance(source, LiveSource):
             source.notify = notify(sinks, notice)
             troubles.ask(source.troubles)
+        pace = in_real_time(source, frames) if _keeps_pace(settings, source) else None
+        if pace:
+            stack.callback(pace.close)
+            troubles.ask(pace.troubles)
+        begin = agent.mind.time if past and past.steps else None
+        steady = Steady(pace or frames, source.fps, begin)
+        troubles.ask(steady.troubles)
         steps = past.steps if past else 0
         try:
             for step in agent.steps(steady):
@@ -181,6 +187,8 @@ def supervise(
             notes += (states.note,) if states.note else ()
         verdict = final_verdict(agent.mind) if agent.mind.tasks else tally.verdict
         problem = "stopped by the user" if tally.stopped else source.problem
+        if pace and (dropped := pace.note()):
+            notes += (dropped,)
         notes += sinks.end(verdict, steps)
         if recorder is None:
             return RunResult(verdict, steps, problem, notes=notes)
@@ -242,6 +250,10 @@ def _caught_up(
         recorder.collector.load(past.state.kept)
     tell = recorder.catch_up if recorder else lambda step, frame: None
     return caught_up(agent, source, past, tell)
+
+
+def _keeps_pace(settings: WatchSettings, source: Source) -> bool:
+    return source.live if settings.realtime is None else settings.realtime
 
 
 def _steps_of(source: Source, settings: WatchSettings) -> int | None:

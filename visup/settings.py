@@ -25,6 +25,7 @@ class WatchSettings:
         plugin_settings: Name of such a behaviour -> values for its settings.
         isolate: Names of behaviours that run in processes of their own.
         budgets: Whether behaviours are held to the budgets that they declare; for live sources.
+        realtime: Whether frames for which visup is too slow are dropped; None for live sources alone.
         every: Use every n-th frame.
         fps: Frame rate to assume where the source has none, or None.
         fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
@@ -43,6 +44,7 @@ class WatchSettings:
     plugin_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     isolate: tuple[str, ...] = ()
     budgets: bool = False
+    realtime: bool | None = None
     every: int = 1
     fps: float | None = None
     fov_vertical_deg: float | None = None

@@ -94,6 +94,10 @@ class Source(ABC, Iterator[Frame]):
         """Let go of the file or camera; a source closed before its end has been stopped."""
         self._end(Ending.STOPPED)
 
+    def abandon(self) -> None:
+        """Count it as stopped without letting go of it: a thread that cannot be stopped is in it."""
+        self.ended = self.ended or Ending.STOPPED
+
     def _end(self, how: Ending, problem: str | None = None) -> None:
         """Note how it ended, the first time, and let go of what is held."""
         if self.ended is None:

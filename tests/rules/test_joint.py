@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
@@ -104,6 +104,16 @@ def test_after_a_gap_the_way_gone_in_it_tells() -> None:
     assert found is not None
     assert found.span > 0.6
     assert found.velocity[0] == pytest.approx(8.0, abs=2.0)
+
+
+@given(st.sets(st.integers(0, 24)))
+@example(set(range(5, 20)))
+def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
+    path = [p for k, p in enumerate(places(0.0)) if k not in missing]
+    known = len(path) > 5 and path[-1][0] - path[0][0] >= 0.6 * 0.3
+    found = motion(joint(path), path[-1][0], 0.3) if path else None
+    assert (found is not None) == known
+    assert found is None or found.span >= 0.6 * 0.3 - 1e-6
 
 
 @pytest.mark.parametrize("count", range(6))

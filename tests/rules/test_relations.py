@@ -171,8 +171,22 @@ def test_time_runs_out_of_a_bounded_memory() -> None:
 def test_trend_thresholds_have_hysteresis() -> None:
     before = np.array([[KEEPING, CONVERGING, CONVERGING, DIVERGING, KEEPING]], dtype=np.int8)
     rate = np.array([[-1.2, -1.2, -0.5, 1.2, np.nan]])
-    wanted = wanted_trend(rate, np.full((1, 5), 0.1), before, 1.6, 0.8, 3.0)
+    wanted = wanted_trend(rate, np.full((1, 5), 0.1), before, before, 1.6, 0.8, (3.0, 2.0))
     assert wanted.tolist() == [[KEEPING, CONVERGING, KEEPING, DIVERGING, -1]]
+
+
+def test_a_trend_that_waits_is_not_taken_back_by_one_wide_deviation() -> None:
+    rate, keeping = np.full((1, 2), 5.0), np.full((1, 2), KEEPING, dtype=np.int8)
+    pending = np.array([[KEEPING, DIVERGING]], dtype=np.int8)
+    for sigma, expected in (
+        (1.0, [DIVERGING, DIVERGING]),
+        (2.0, [KEEPING, DIVERGING]),
+        (3.0, [KEEPING, KEEPING]),
+    ):
+        found = wanted_trend(rate, np.full((1, 2), sigma), keeping, pending, 1.6, 0.8, (3.0, 2.0))
+        assert found.tolist() == [expected]
+    other = wanted_trend(-rate, np.full((1, 2), 2.0), keeping, pending, 1.6, 0.8, (3.0, 2.0))
+    assert other.tolist() == [[KEEPING, KEEPING]]
 
 
 def test_depth_joins_the_image() -> None:

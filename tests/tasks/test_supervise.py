@@ -165,6 +165,15 @@ def test_a_short_contrary_is_no_failure_and_a_recovery_ends_one() -> None:
     assert finish(task_of(played)) is Verdict.IN_PROGRESS
 
 
+def test_what_has_failed_goes_on_only_when_it_went_well_for_as_long() -> None:
+    spells = (Spell("converging", 0, 5), Spell("diverging", 5, 15), Spell("converging", 15, 30))
+    played = watch(Script(spells), 25.0)
+    assert task_of(played, 14.5).verdict is Verdict.FAILED
+    assert task_of(played, 22.0).verdict is Verdict.FAILED
+    assert status(played, "approach") is Status.PROGRESSING
+    assert task_of(played).verdict is Verdict.IN_PROGRESS
+
+
 def test_a_capture_that_is_lost_at_once_is_no_success() -> None:
     lost = (
         Spell("converging", 0, 12),

@@ -57,6 +57,13 @@ Isolate = Annotated[
 Budgets = Annotated[
     bool, typer.Option("--budgets", help="Give up what exceeds its budget; for live sources.")
 ]
+Realtime = Annotated[
+    bool | None,
+    typer.Option(
+        "--realtime/--no-realtime",
+        help="Drop the frames that visup is too slow for, and say so (default: of live sources).",
+    ),
+]
 Attention = Annotated[
     bool, typer.Option("--attention", help="Match what is known well less often: cheaper.")
 ]
@@ -86,6 +93,7 @@ def settings_of(
     isolate: list[str] | None = None,
     budgets: bool = False,
     attention: bool = False,
+    realtime: bool | None = None,
 ) -> WatchSettings:
     """The settings of a run, from the command's options."""
     from visup.agent.plugin_settings import merged, parse_settings, read_settings
@@ -105,6 +113,7 @@ def settings_of(
         isolate=tuple(isolate or ()),
         budgets=budgets,
         attention=attention,
+        realtime=realtime,
         every=every,
         fps=fps,
         fov_vertical_deg=fov,
@@ -134,6 +143,7 @@ def watch(
     isolate: Isolate = None,
     budgets: Budgets = False,
     attention: Attention = False,
+    realtime: Realtime = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only the verdict.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Events as JSON, one a line.")] = False,
     video: Annotated[bool, typer.Option(help="Write the annotated video.")] = True,
@@ -177,7 +187,15 @@ def watch(
     )
     if resume:
         given = (source, task, models, rules, out, actor, behaviour, plugin, fps, fov, zones)
-        more = (setting, settings_file, isolate, budgets, attention, every != 1)
+        more = (
+            setting,
+            settings_file,
+            isolate,
+            budgets,
+            attention,
+            realtime is not None,
+            every != 1,
+        )
         settings, past = _past(resume, *given, *more)
     elif source is None:
         raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
@@ -200,6 +218,7 @@ def watch(
             isolate,
             budgets,
             attention,
+            realtime,
         )
     result = run_and_tell(
         settings,

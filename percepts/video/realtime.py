@@ -1,0 +1,194 @@
+"""Keeping pace with the clock: whoever is late gets the newest frame, and what lies between is dropped.
+
+The policy, in one place: *the newest frame that is due*. A frame is due when it was received, or, of
+a recording that is played as a camera would deliver it, when its time has come. Frames that were due
+while the one before was still being thought about are dropped, all but the newest; frames keep their
+numbers and times, so that what follows knows how long nobody looked. What was dropped is counted and
+told (`troubles`, `dropped`).
+
+A recording needs no thread, and with an injected clock the same frames are dropped each time. A live
+source is read in a thread, since a capture whose frames nobody takes hands out old ones later.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
+
+from visup.agent import Concern, Frame, Severity
+from visup.percepts.video.base import Source
+
+NAME = "frames_dropped"
+WINDOW_S = 5.0
+SHARE = 0.1
+"""From this share of the frames of the window on, it is told that frames are dropped."""
+
+LONG_S = 1.0
+"""From so long without a look on, it is told as a warning."""
+
+PATIENCE_S = 5.0
+"""How long a reader may take to end; one that is stuck in its capture is left alone."""
+
+
+class RealTime(Iterator[Frame], ABC):
+    """Frames as time brings them.
+
+    Args:
+        name: What their source is called.
+
+    Attributes:
+        dropped: Frames that were dropped so far.
+        given: Frames that were given so far.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.dropped = 0
+        self.given = 0
+        self._recent: deque[tuple[float, int]] = deque()
+
+    def __next__(self) -> Frame:
+        frame, missed = self._newest()
+        self.dropped += missed
+        self.given += 1
+        self._recent.append((frame.time, missed))
+        while frame.time - self._recent[0][0] > WINDOW_S:
+            self._recent.popleft()
+        return frame
+
+    def troubles(self) -> Iterable[Concern]:
+        """That frames are dropped, while more than a tenth of those of late were."""
+        lost = sum(missed for _, missed in self._recent)
+        if lost < SHARE * (lost + len(self._recent)):
+            return
+        times = [at for at, missed in self._recent]
+        longest = max((b - a for a, b in pairwise(times)), default=0.0)
+        text = (
+            f"Frames come faster than they can be watched: {lost} of the last "
+            f"{lost + len(times)} were dropped; for up to {longest:.1f} s nobody looked."
+        )
+        severity = Severity.WARNING if longest >= LONG_S else Severity.INFO
+        yield Concern(NAME, (), severity, text, key=self.name, needs=())
+
+    def note(self) -> str | None:
+        """One sentence for the end of a run; None when nothing was dropped."""
+        if not self.dropped:
+            return None
+        whole = self.dropped + self.given
+        return f"To keep pace with the clock, {self.dropped} of {whole} frames were dropped."
+
+    def close(self) -> None:
+        """Read no more."""
+
+    @abstractmethod
+    def _newest(self) -> tuple[Frame, int]:
+        """The newest frame that is due, waited for if none is, and how many before it are dropped.
+
+        Raises:
+            StopIteration: There are no more.
+        """
+
+
+class Played(RealTime):
+    """A recording, played as a camera would deliver it.
+
+    Args:
+        frames: The recording, or what is left of it.
+        name: What it is called.
+        clock: Seconds from any start.
+        wait: Waits so many seconds.
+    """
+
+    def __init__(
+        self,
+        frames: Iterator[Frame],
+        name: str,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        wait: Callable[[float], None] = time.sleep,
+    ) -> None:
+        super().__init__(name)
+        self._frames = frames
+        self._clock, self._wait = clock, wait
+        self._start: float | None = None
+        self._ahead: Frame | None = None
+
+    def _newest(self) -> tuple[Frame, int]:
+        frame, missed = self._ahead or next(self._frames), 0
+        if self._start is None:
+            self._start = self._clock() - frame.time
+        now = self._clock() - self._start
+        if frame.time > now:
+            self._wait(frame.time - now)
+        self._ahead = next(self._frames, None)
+        while self._ahead is not None and self._ahead.time <= now:
+            frame, missed = self._ahead, missed + 1
+            self._ahead = next(self._frames, None)
+        return frame, missed
+
+
+class Newest(RealTime):
+    """A live source, read as fast as it delivers.
+
+    Args:
+        frames: Its frames; only this reads them from now on.
+        source: The source itself.
+    """
+
+    def __init__(self, frames: Iterator[Frame], source: Source) -> None:
+        super().__init__(source.name)
+        self._frames, self._source = frames, source
+        self._changed = threading.Condition()
+        self._slot: Frame | None = None
+        self._missed = 0
+        self._fault: BaseException | None = None
+        self._ended = self._stop = False
+        self._reader = threading.Thread(target=self._read, name="video reader", daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        try:
+            for frame in self._frames:
+                with self._changed:
+                    self._missed += self._slot is not None
+                    self._slot = frame
+                    self._changed.notify()
+                    if self._stop:
+                        break
+        except Exception as fault:
+            self._fault = fault  # it is raised where frames are asked for
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+
+    def _newest(self) -> tuple[Frame, int]:
+        with self._changed:
+            self._changed.wait_for(lambda: self._slot is not None or self._ended)
+            frame, missed = self._slot, self._missed
+            self._slot, self._missed = None, 0
+        if frame is not None:
+            return frame, missed
+        if self._fault is not None:
+            raise self._fault
+        raise StopIteration
+
+    def close(self) -> None:
+        """Read no more; a source in which the reader is stuck is left to the end of the process."""
+        self._stop = True
+        self._reader.join(PATIENCE_S)
+        if self._reader.is_alive():
+            self._source.abandon()
+
+
+def in_real_time(source: Source, frames: Iterator[Frame]) -> RealTime:
+    """Frames of a source as time brings them, whatever the source.
+
+    Args:
+        source: The source.
+        frames: Its frames, from any of them on.
+    """
+    return Newest(frames, source) if source.live else Played(frames, source.name)
