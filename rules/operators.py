@@ -79,6 +79,7 @@ class Sliding:
         unknown = self.algebra.constant(UNKNOWN)
         pair = self.kind in ("since", "until")
         object.__setattr__(self, "_pair", pair)
+        object.__setattr__(self, "_copies", isinstance(self.algebra, Arrays))
         object.__setattr__(self, "_unknown", (unknown, unknown) if pair else unknown)
 
     def fold(self) -> Fold:
@@ -96,6 +97,10 @@ class Sliding:
     def step(self, state: Slide | None, now: int, *values: Any) -> tuple[Slide, Any]:
         """See `Operator`."""
         fold, unknown = self._fold, self._unknown  # type: ignore[attr-defined]
+        if self._copies:  # type: ignore[attr-defined]
+            # Values may be those of another step (see `Program.step`). Which ones are must not show in
+            # what is kept: going back and forth gives the same states byte for byte.
+            values = tuple([v.copy() for v in values])
         if state is None:
             state = Slide(now, unknown)
         elif now - state[0] > REACH:

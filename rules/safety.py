@@ -115,8 +115,8 @@ def _concerns(
     held: dict[Key, Held] = {}
     cooling = {key: until for key, until in old.cooling.items() if until > now}
     found: dict[Key, tuple[Rule, tuple[int, ...]]] = {}
-    for rule, ids, objects in values.found():
-        found.setdefault((rule.name, objects), (rule, ids))
+    for rule, ids in values.true():
+        found.setdefault((rule.name, frozenset(ids)), (rule, ids))
     standing = [key for key in found if key in old.held]
     retold = sorted(standing, key=lambda key: old.held[key].told)[:MOST_RETOLD]
     for key, (rule, ids) in found.items():
@@ -139,7 +139,8 @@ def _concerns(
 def _raised(rule: Rule, ids: tuple[int, ...], values: Values, before: Held | None) -> Held:
     """One concern for each set of objects; its order stays as it was when it was raised."""
     mind = values.facts.mind
-    objects = ids if before is None else before.concern.objects
+    # Made anew, as the ids may be shared with another step (see `Sliding.step`).
+    objects = tuple([*ids]) if before is None else before.concern.objects
     words = with_names(rule.say, rule.variables)
     cause = sentence(mind, words, *objects, confidence=confidence(rule, ids, values))
     concern = Concern(rule.name, objects, rule.severity, cause, evidence(rule, ids, values))

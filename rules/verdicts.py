@@ -20,8 +20,6 @@ from visup.rules.terms import Measure
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
 """Intervals of what is false, unknown, true; by code + 1."""
 States = tuple[Any, ...]
-Chosen = tuple[tuple[tuple[int, ...], frozenset[int]], ...]
-"""Choices of objects, each in the order of a rule's variables and in none."""
 
 
 class Values:
@@ -118,15 +116,11 @@ class Values:
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
-        return ((rule, ids) for rule, ids, _ in self.found())
-
-    def found(self) -> Iterator[tuple[Rule, tuple[int, ...], frozenset[int]]]:
-        """The same, and with each choice its objects in no order."""
         for (rule, _, _), chosen in zip(self.prepared.verdicts, self._true, strict=True):
-            for ids, objects in chosen:
-                yield rule, ids, objects
+            for ids in chosen:
+                yield rule, ids
 
-    def _judged(self, known: Values | None) -> list[Chosen]:
+    def _judged(self, known: Values | None) -> list[tuple[tuple[int, ...], ...]]:
         """For each rule the choices of objects for which it is true and not suspended."""
         values, found = self._values, []
         for k, (rule, places, apart) in enumerate(self.prepared.verdicts):
@@ -138,7 +132,7 @@ class Values:
                 holds = holds & ~(values[places[1].step][0] > 0)
             # The quickest way to ask whether any of a few holds.
             choices = self._choices(rule, holds, apart) if np.count_nonzero(holds) else ()
-            found.append(tuple([(ids, frozenset(ids)) for ids in choices]))
+            found.append(tuple(choices))
         return found
 
     def _choices(
