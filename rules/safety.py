@@ -140,7 +140,7 @@ def _raised(rule: Rule, ids: tuple[int, ...], values: Values, before: Held | Non
     """One concern for each set of objects; its order stays as it was when it was raised."""
     mind = values.facts.mind
     # Made anew, as the ids may be shared with another step (see `Sliding.step`).
-    objects = tuple([*ids]) if before is None else before.concern.objects
+    objects = (*ids,) if before is None else before.concern.objects
     words = with_names(rule.say, rule.variables)
     cause = sentence(mind, words, *objects, confidence=confidence(rule, ids, values))
     concern = Concern(rule.name, objects, rule.severity, cause, evidence(rule, ids, values))
