@@ -23,6 +23,7 @@ from visup.agent import (
 from visup.agent.state import held
 from visup.percepts.health.arrivals import Arrivals
 from visup.percepts.health.cells import Cells
+from visup.percepts.health.grain import Grain
 from visup.percepts.health.picture import Picture, measure
 from visup.percepts.health.repeats import Repeats
 from visup.percepts.health.settings import HealthSettings
@@ -48,6 +49,7 @@ class HealthBehaviour:
         self._cells = Cells(self._settings.covered)
         self._arrivals = Arrivals(self._settings.lost, self._settings.gap, self._settings.same_s)
         self._repeats = Repeats()
+        self._grain = Grain()
         self._same_since: float | None = None
         self._fault_since: float | None = None
         self._harmed = False
@@ -82,13 +84,18 @@ class HealthBehaviour:
         frozen = self._frozen(frame.time, same)
         health = _of_picture(picture, self._usual, self._settings)
         self._harmed = health is not OK
+        noise_alone = False
         if not self._harmed:
             health = self._of_cells(picture, frame.time)
+            noise_alone = self._grain.see(picture, frame.time)
             if self._cells.halt is None:
                 self._usual.append(picture)
         else:
             self._cells.forget()
+            self._grain.forget()
         health = self._lasting(health, frame.time)
+        if health is OK and noise_alone:
+            return Health(HealthStatus.FROZEN, "Nothing changes any more but noise.")
         if health is OK and frozen:
             return Health(HealthStatus.FROZEN, "The image does not change at all.")
         if health is OK and missing:

@@ -16,12 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.motion.image import Floats, WorkImage
+from visup.percepts.motion.point_loops import strongest, tensors
 
 Ints = NDArray[np.int64]
 WINDOW = 11
+MARGIN = 3  # pixels at the border of the image where no point is taken
 CORNER = 0.1  # least ratio of the eigenvalues of a corner's structure tensor
 STEPS_NEAR = 10, 0.03  # most steps of a search, and the step, in pixels, at which it is done: well
 STEPS_FAR = 30, 0.01  # below FLOOR; slow things, seen over long baselines, ask for more
+AGREED = 0.25  # pixels up to which dense flow and the search for a point say the same
 FLOOR = 0.12  # pixels: what sampling and compression leave, however strong the gradient
 
 
@@ -96,32 +99,16 @@ def find_points(image: WorkImage, cell: int, noise: float, most: int = 2500) -> 
     Returns:
         Points, in scan order.
     """
-    strength = image.gx * image.gx
-    strength += image.gy * image.gy
-    margin = 3
-    strength[:margin] = strength[-margin:] = 0
-    strength[:, :margin] = strength[:, -margin:] = 0
-    rows, cols = image.shape[0] // cell, image.shape[1] // cell
-    cells = strength[: rows * cell, : cols * cell].reshape(rows, cell, cols, cell)
-    flat = cells.transpose(0, 2, 1, 3).reshape(rows * cols, cell * cell)
-    best = flat.argmax(axis=1)
-    value = flat[np.arange(len(flat)), best]
+    xs, ys, value = strongest(image.gx, image.gy, cell, MARGIN)
     keep = np.flatnonzero(value > (1.5 * noise) ** 2)
     if len(keep) > most:
         keep = np.sort(keep[np.argsort(-value[keep], kind="stable")[:most]])
-    y = (keep // cols) * cell + best[keep] // cell
-    x = (keep % cols) * cell + best[keep] % cell
-    size = (WINDOW, WINDOW)
-    pairs = ((image.gx, image.gx), (image.gx, image.gy), (image.gy, image.gy))
-    product = np.empty_like(strength)
-    sums = [
-        cv2.boxFilter(np.multiply(a, b, out=product), -1, size, normalize=False)[y, x]
-        for a, b in pairs
-    ]
+    x, y = xs[keep], ys[keep]
     gradient = np.stack([image.gx[y, x], image.gy[y, x]], axis=1)
     normal = gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-6)
     xy = np.stack([x, y], axis=1).astype(np.float32)
-    return Points(xy, np.stack(sums, axis=1).astype(np.float32), normal.astype(np.float32))
+    tensor = tensors(image.gx, image.gy, x, y, WINDOW)
+    return Points(xy, tensor, normal.astype(np.float32))
 
 
 def information_of(tensor: Floats, sigma: Floats, floor: float) -> Floats:
@@ -180,11 +167,7 @@ def track(
     # From one frame to the next dense flow tells where to begin: coarse images would only mislead.
     near = lag == 1
     there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 1 if near else 2, near)
-    # The way back is nearly known: it needs no coarse images. It begins as far beside as the guess
-    # was off, for a search that begins where it should end proves little; over a long baseline,
-    # where guesses are poor, no more than that can be asked.
-    aside = there - begin if near else np.float32(0)
-    home, back, _ = _follow(old.grey, new.grey, there, start + aside, 0, near)
+    home, back = _back(points, begin, there, found, old, new, near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # What is said of points that were lost is not even finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
@@ -199,6 +182,36 @@ def track(
     keep = np.flatnonzero(ok)
     moved = points.xy[keep] - there[keep, 0]
     return Constraints(lag, new.time - old.time, keep, points.xy[keep], moved, information[keep])
+
+
+def _back(
+    points: Points,
+    begin: Floats,
+    there: Floats,
+    found: NDArray[np.uint8],
+    old: WorkImage,
+    new: WorkImage,
+    near: bool,
+) -> tuple[Floats, NDArray[np.uint8]]:
+    """Where points come out when they are followed back: (N, 1, 2), (N, 1).
+
+    The way back is nearly known: it needs no coarse images. It begins as far beside as the guess
+    was off, for a search that begins where it should end proves little. So nothing is asked where
+    dense flow had told the same before: two ways to find a point agree. Over a long baseline, where
+    guesses are poor, the search begins at home, and no more than that can be asked.
+    """
+    start = points.xy.reshape(-1, 1, 2)
+    aside = there - begin if near else np.zeros_like(there)
+    home, back = start.copy(), found.copy()
+    off = np.hypot(aside[..., 0], aside[..., 1]).ravel()
+    asked = np.flatnonzero((found.ravel() > 0) & ~(near & (off < AGREED)))
+    if len(asked):
+        first = np.ascontiguousarray((start + aside)[asked])
+        ends, sound, _ = _follow(
+            old.grey, new.grey, np.ascontiguousarray(there[asked]), first, 0, near
+        )
+        home[asked], back[asked] = ends, sound
+    return home, back
 
 
 def _follow(

@@ -14,6 +14,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from visup.percepts.motion.appearance import appearance
+from visup.percepts.motion.cell_loops import beside_points
 from visup.percepts.motion.constraints import Points
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.settings import MotionSettings
@@ -49,16 +50,9 @@ def gather(
     Returns:
         (count, K) float32 label shares, and (count,) float32 the weight of the evidence, 0 to 1.
     """
-    height, width = cells.labels.shape
-    totals = np.zeros((cells.count, likelihood.shape[1]), dtype=np.float64)
-    number = np.zeros(cells.count)
-    for side in (-REACH, REACH):
-        at = np.rint(points.xy[has] + side * points.normal[has]).astype(np.int64)
-        x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
-        where = cells.labels[y, x]
-        number += np.bincount(where, minlength=cells.count)
-        for k in range(likelihood.shape[1]):
-            totals[:, k] += np.bincount(where, weights=likelihood[has, k], minlength=cells.count)
+    totals, number = beside_points(
+        cells.labels, points.xy[has], points.normal[has], likelihood[has], REACH, cells.count
+    )
     totals /= np.maximum(np.sqrt(number), 1)[:, None]
     totals += more
     totals -= totals.max(axis=1, keepdims=True)

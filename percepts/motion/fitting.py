@@ -9,13 +9,17 @@ sides look alike nothing changes.
 
 from __future__ import annotations
 
+from math import exp, log
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.motion.compiled import compiled
 from visup.percepts.motion.image import Floats
 
 WINDOW = 21  # pixels: side of the window whose tones are compared
+SAMPLED = (WINDOW // 2 + 1, WINDOW // 2 + 1)  # the same of every other pixel
 BAND = 5  # pixels from the outline within which pixels may change sides
 LEAST = 0.08  # share of the window that each side must fill
 NOISE = 6.0  # least standard deviation of tones
@@ -35,56 +39,92 @@ def fitted(share: Floats, tone: NDArray[np.uint8]) -> Floats:
     Returns:
         (h, w) float32, on the sides of a half on which pixels are.
     """
+    odds = odds_of(share, tone)
+    if not odds.any():
+        return share
+    return _given(share, odds, np.asarray(cv2.GaussianBlur(odds, (3, 3), 0.8), dtype=np.float32))
+
+
+def odds_of(share: Floats, tone: NDArray[np.uint8]) -> Floats:
+    """Log odds of the pixels near an outline to be inside, by their tone.
+
+    Args:
+        share: (h, w) float32 probability of an object.
+        tone: (h, w, 3) uint8.
+
+    Returns:
+        (h, w) float32; 0 where nothing is told.
+    """
     inside = (share > 0.5).view(np.uint8)
-    full = np.asarray(cv2.boxFilter(inside, cv2.CV_32F, (WINDOW, WINDOW)), dtype=np.float32)
     kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
     beside = cv2.dilate(inside, kernel) != cv2.erode(inside, kernel)
-    beside &= (full > LEAST) & (full < 1 - LEAST)
-    at = np.flatnonzero(beside)
-    if not len(at):
-        return share
-    odds = np.zeros(share.shape, dtype=np.float32)
-    odds.ravel()[at] = _odds(inside, full.ravel()[at][:, None], tone, at)
-    smooth = np.asarray(cv2.GaussianBlur(odds, (3, 3), 0.8), dtype=np.float32)
-    known = np.clip(share.ravel()[at], 0.02, 0.98)
-    both = smooth.ravel()[at] + STEEP * np.log(known / (1 - known))
-    out = share.copy()
-    out.ravel()[at] = 1 / (1 + np.exp(-both))
+    # What is told by the means of a window every other pixel of it tells as well.
+    some = np.ascontiguousarray(inside[::2, ::2])
+    full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
+    tones = np.ascontiguousarray(tone[::2, ::2])
+    mine = np.asarray(cv2.bitwise_and(tones, tones, mask=some), dtype=np.uint8)
+    return _odds(beside, full, tone, *_means(mine), *_means(tones))
+
+
+def _means(tones: NDArray[np.uint8]) -> tuple[Floats, Floats]:
+    """Means of tones, and of their squares, in the window around each pixel."""
+    return (
+        np.asarray(cv2.boxFilter(tones, cv2.CV_32F, SAMPLED), dtype=np.float32),
+        np.asarray(cv2.sqrBoxFilter(tones, cv2.CV_32F, SAMPLED), dtype=np.float32),
+    )
+
+
+@compiled
+def _odds(
+    beside: NDArray[np.bool_],
+    full: Floats,
+    tone: NDArray[np.uint8],
+    mine: Floats,
+    mine_squared: Floats,
+    all_: Floats,
+    all_squared: Floats,
+) -> Floats:
+    """Log odds of pixels beside an outline to be inside, by their tone, (h, w) float32; 0 elsewhere.
+
+    Args:
+        beside: (h, w) which pixels.
+        full: (h / 2, w / 2) share of the window around each that is inside.
+        tone: (h, w, 3).
+        mine: (h / 2, w / 2, 3) mean over the window of the tones inside, 0 taken for others.
+        mine_squared: The same of their squares.
+        all_: The same of all tones.
+        all_squared: The same of their squares.
+    """
+    out = np.zeros(beside.shape, np.float32)
+    for y in range(beside.shape[0]):
+        for x in range(beside.shape[1]):
+            v, u = y // 2, x // 2
+            part = float(full[v, u])
+            if not beside[y, x] or part <= LEAST or part >= 1 - LEAST:
+                continue
+            away, wide = 0.0, 1.0
+            for i in range(3):
+                one, two = mine[v, u, i] / part, mine_squared[v, u, i] / part
+                within = max(two - one * one, 0.0) + NOISE**2
+                gap = tone[y, x, i] - one
+                one = (all_[v, u, i] - mine[v, u, i]) / (1 - part)
+                two = (all_squared[v, u, i] - mine_squared[v, u, i]) / (1 - part)
+                beyond = max(two - one * one, 0.0) + NOISE**2
+                far = tone[y, x, i] - one
+                away += far * far / beyond - gap * gap / within
+                wide *= beyond / within
+            # The three planes of a grey world tell the same.
+            out[y, x] = max(-MOST, min(MOST, 0.5 * (away + log(wide)) / 3))
     return out
 
 
-def _odds(
-    inside: NDArray[np.uint8], full: Floats, tone: NDArray[np.uint8], at: NDArray[np.int64]
-) -> Floats:
-    """Log odds of some pixels to be inside, by their tone.
-
-    Args:
-        inside: (h, w), 1 inside of the object.
-        full: (N, 1) float32, share of the window around each pixel that is inside.
-        tone: (h, w, 3).
-        at: (N,) places of the pixels in scan order.
-
-    Returns:
-        (N,) float32.
-    """
-    mine = cv2.bitwise_and(tone, tone, mask=inside)
-    sums = [
-        f(image, cv2.CV_32F, (WINDOW, WINDOW)).reshape(-1, 3)[at]
-        for image in (mine, tone)
-        for f in (cv2.boxFilter, cv2.sqrBoxFilter)
-    ]
-    own = tone.reshape(-1, 3)[at].astype(np.float32)
-    away_in, wide_in = _away(own, sums[0] / full, sums[1] / full)
-    rest = 1 - full
-    away_out, wide_out = _away(own, (sums[2] - sums[0]) / rest, (sums[3] - sums[1]) / rest)
-    width = np.log(np.prod(wide_out / wide_in, axis=1))
-    # The three planes of a grey world tell the same.
-    odds = 0.5 * ((away_out - away_in).sum(axis=1) + width) / 3
-    return np.asarray(np.clip(odds, -MOST, MOST), dtype=np.float32)
-
-
-def _away(own: Floats, mean: Floats, square: Floats) -> tuple[Floats, Floats]:
-    """Squared distance of tones from a mean in standard deviations, and the variance, (N, 3)."""
-    variance = np.asarray(np.maximum(square - mean * mean, 0) + NOISE**2, dtype=np.float32)
-    gap = own - mean
-    return np.asarray(gap * gap / variance, dtype=np.float32), variance
+@compiled
+def _given(share: Floats, told: Floats, odds: Floats) -> Floats:
+    """Shares after the (smoothed) odds of the pixels of which something is told."""
+    out = share.copy()
+    for y in range(share.shape[0]):
+        for x in range(share.shape[1]):
+            if told[y, x]:
+                known = max(0.02, min(0.98, share[y, x]))
+                out[y, x] = 1 / (1 + exp(-odds[y, x] - STEEP * log(known / (1 - known))))
+    return out

@@ -156,16 +156,14 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
     around = ring.astype(np.float32).T @ members.astype(np.float32)
     inside = around > SURROUNDED * ring.sum(axis=0)[:, None]
     grown = _grown_together(scene, winner, len(tracks))
-    out = list(tracks)
+    seen = members.any(axis=0)
+    touch = (touch | touch.T) & seen & seen[:, None]
+    moving = _moving(scene, members)
+    out = _kept_apart(tracks, (seen & seen[:, None]) & ~touch, scene.seconds)
     for j in range(len(tracks) - 1, 0, -1):
-        for i in range(j):
+        for i in np.flatnonzero(touch[:j, j]):
             a, b = out[i], out[j]
-            if a.id < 0 or not (members[:, i].any() and members[:, j].any()):
-                continue
             apart = a.apart.get(b.key, 0.0)
-            if not touch[i, j] and not touch[j, i]:
-                out[i] = replace(a, apart=_with(a.apart, b.key, apart + scene.seconds))
-                continue
             if apart > APART_S or not _may_join(a, b, members[:, i], members[:, j], scene):
                 continue
             votes = a.alike.get(b.key, 0.0)
@@ -173,7 +171,8 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
             if grown[i, j] or inside[i, j] or inside[j, i]:
                 votes += 1.0
             else:
-                votes += _vote(scene, a, members[:, i], members[:, j])
+                both = tuple(bool(m[i] and m[j]) for m in moving)
+                votes += _vote(scene, a, members[:, i], members[:, j], both)
             votes = max(votes, -VOTES)
             out[i] = replace(a, alike=_with(a.alike, b.key, votes))
             if votes >= VOTES:
@@ -200,16 +199,32 @@ def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, f
     return MappingProxyType({**values, key: value})
 
 
-def _vote(scene: Scene, a: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_]) -> float:
+def _kept_apart(tracks: Tracks, apart: NDArray[np.bool_], seconds: float) -> list[Track]:
+    """The tracks with the time for which each was seen apart from those behind it."""
+    out = []
+    for i, t in enumerate(tracks):
+        others = [tracks[j].key for j in np.flatnonzero(apart[i]) if j > i]
+        longer = {key: t.apart.get(key, 0.0) + seconds for key in others}
+        out.append(replace(t, apart=MappingProxyType({**t.apart, **longer})) if longer else t)
+    return out
+
+
+def _vote(
+    scene: Scene,
+    a: Track,
+    in_a: NDArray[np.bool_],
+    in_b: NDArray[np.bool_],
+    moving: tuple[bool, ...],
+) -> float:
     votes = 0.0
-    for m in scene.measured:
+    for m, both in zip(scene.measured, moving, strict=True):
         c = m.constraints
         if c.lag == 1 and len(scene.measured) > 1:
             continue
         at = scene.cell_of(c)
         start = a.predicted(c.lag, c.span_s)[0]
         mine, other = in_a[at], in_b[at]
-        if not (_moves(m, mine) and _moves(m, other)):
+        if not both:
             continue
         same = same_motion(c, mine, other, start, slack_of(start, a.centre))
         votes += 0.0 if same is None else (1.0 if same else -1.0)
@@ -226,6 +241,14 @@ def _grown_together(scene: Scene, winner: Indices, count: int) -> NDArray[np.boo
     out = np.zeros((count, count), dtype=bool)
     out[a[both], b[both]] = True
     return out
+
+
+def _moving(scene: Scene, members: NDArray[np.bool_]) -> list[list[bool]]:
+    """Which of K tracks with (count, K) members are told to move, over each baseline."""
+    return [
+        [_moves(m, mine) for mine in members[scene.cell_of(m.constraints)].T]
+        for m in scene.measured
+    ]
 
 
 def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:

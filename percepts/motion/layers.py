@@ -11,13 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dposv
 
-from visup.percepts.motion.constraints import Constraints, mahalanobis
+from visup.percepts.motion.constraints import Constraints
 from visup.percepts.motion.image import Floats
+from visup.percepts.motion.layer_loops import displaced, likelihoods, misfits, reweighted
 
 Doubles = NDArray[np.float64]
-SETTLED = 0.003  # pixels, far below what is measured: a fit that moves by less is done
 STILL: Doubles = np.zeros((2, 3))
 
 
@@ -40,17 +39,15 @@ class Affine:
 
     def at(self, xy: Floats) -> Floats:
         """Displacements of (N, 2) positions, (N, 2) float32."""
-        x, y = np.ascontiguousarray(xy.T, dtype=np.float32)
-        out = np.empty((len(xy), 2), dtype=np.float32)
-        bend = np.zeros((2, 3)) if self.bend is None else self.bend / 1000.0
-        for i, ((a, b, c), (d, e, f)) in enumerate(
-            zip(self.matrix.tolist(), bend.tolist(), strict=True)
-        ):
-            if self.bend is None:
-                out[:, i] = a * x + b * y + c
-            else:
-                out[:, i] = (a + d * x + e * y) * x + (b + f * y) * y + c
-        return out
+        there = np.ascontiguousarray(xy, dtype=np.float32)
+        return displaced(there, *self._coefficients)
+
+    @property
+    def _coefficients(self) -> tuple[Doubles, Doubles]:
+        """(2, 3) and (2, 3) float64, as the compiled loops take them."""
+        matrix = np.ascontiguousarray(self.matrix, dtype=np.float64)
+        bend = STILL if self.bend is None else np.ascontiguousarray(self.bend, dtype=np.float64)
+        return matrix, bend
 
     def shift(self, where: tuple[float, float]) -> tuple[float, float]:
         """(x, y) displacement of one position; what `at` says, without arrays."""
@@ -87,9 +84,12 @@ def fit_bent(c: Constraints, weight: Floats, start: Affine, slack: float = 0.15)
     xy, share = c.xy[use], weight[use]
     centre, spread = xy.mean(axis=0), float(xy.std()) + 1.0
     x, y = ((xy - centre) / spread).T.astype(np.float64)
-    phi = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)])
-    hold = np.diag([1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-3] * 2) / slack**2
-    model, w = _reweighted(_System(c, use, phi, slack), share, start.at(xy), hold, 3.0, 5)
+    phi = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
+    hold = np.array([1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-3]) / slack**2
+    moved, information = c.moved[use], c.information[use]
+    model, w, _ = reweighted(
+        phi, moved, information, share.astype(np.float64), start.at(xy), hold, slack, 3.0, 5
+    )
     return _unscaled(model, centre, spread, float(w.sum()))
 
 
@@ -116,7 +116,7 @@ def distances(model: Affine, c: Constraints, slack: float = 0.0) -> Floats:
     Returns:
         (N,) float32.
     """
-    return mahalanobis(model.at(c.xy) - c.moved, widened(c.information, slack))
+    return misfits(c.xy, c.moved, c.information, *model._coefficients, max(slack, 0.0))
 
 
 def log_likelihood(model: Affine, c: Constraints, slack: float) -> Floats:
@@ -132,13 +132,7 @@ def log_likelihood(model: Affine, c: Constraints, slack: float) -> Floats:
     Returns:
         (N,) float32, 0 at best.
     """
-    wide = widened(c.information, slack)
-    width = np.log(
-        np.maximum(wide[:, 0] + wide[:, 2], 1e-9)
-        / (c.information[:, 0] + c.information[:, 2] + 1e-9)
-    )
-    m2 = mahalanobis(model.at(c.xy) - c.moved, wide)
-    return np.asarray(0.5 * width - 0.5 * m2, dtype=np.float32)
+    return likelihoods(c.xy, c.moved, c.information, *model._coefficients, max(slack, 0.0))
 
 
 def widened(information: Floats, sigma: float) -> Floats:
@@ -189,61 +183,21 @@ def fit_affine(
     xy, share = c.xy[use], weight[use]
     centre = (share @ xy) / total
     spread = float(np.sqrt((share @ ((xy - centre) ** 2).sum(1)) / total)) + 1.0
-    phi = np.ones((3, len(use)))
-    phi[:2] = ((xy - centre) / spread).T
+    phi = np.ones((len(use), 3))
+    phi[:, :2] = (xy - centre) / spread
     # Along an edge nothing is known: the least motion is taken there, not a drifting guess.
-    hold = np.diag([rigidity, rigidity, 0.01] * 2) / slack**2
-    system = _System(c, use, phi, slack)
-    model, w = _reweighted(system, share, guess.at(xy), hold, cutoff, rounds)
+    hold = np.array([rigidity, rigidity, 0.01]) / slack**2
+    model, w, mean = reweighted(
+        phi,
+        c.moved[use],
+        c.information[use],
+        share.astype(np.float64),
+        guess.at(xy),
+        hold,
+        slack,
+        cutoff,
+        rounds,
+    )
     linear = model[:, :2] / spread
     matrix = np.concatenate([linear, (model[:, 2] - linear @ centre)[:, None]], axis=1)
-    mean_info = float(w @ (system.info[0] + system.info[2])) / 2 + 1e-9
-    return Affine(matrix, float(1 / np.sqrt(mean_info)), float(w.sum()))
-
-
-class _System:
-    """Least squares for a displacement field that is linear in `phi` (K, N)."""
-
-    def __init__(self, c: Constraints, use: NDArray[np.int64], phi: Doubles, slack: float) -> None:
-        self.phi = phi
-        self.info = widened(c.information[use], slack).T.astype(np.float64)
-        self.moved = c.moved[use].T.astype(np.float64)
-        a, b, d = self.info
-        dx, dy = self.moved
-        self._pull = np.stack([a * dx + b * dy, b * dx + d * dy])
-        # Products of coordinates do not change from round to round.
-        self._pairs = (phi[:, None] * phi).reshape(len(phi) ** 2, -1).T
-
-    def solve(self, w: Doubles, hold: Doubles) -> Doubles:
-        """(2, K) coefficients for (N,) weights."""
-        k = len(self.phi)
-        xx, xy, yy = ((self.info * w) @ self._pairs).reshape(3, k, k)
-        normal = hold.copy()
-        normal[:k, :k] += xx
-        normal[:k, k:] += xy
-        normal[k:, :k] += xy
-        normal[k:, k:] += yy
-        right = (self._pull * w) @ self.phi.T
-        # What is held is held by more than nothing: the matrix is positive definite.
-        _, found, _ = dposv(normal, right.ravel())
-        return np.asarray(found.reshape(2, k))
-
-    def squared(self, fitted: Doubles) -> Doubles:
-        """Squared Mahalanobis distance of each constraint to (2, N) displacements, (N,)."""
-        ex, ey = self.moved - fitted
-        a, b, d = self.info
-        return np.asarray((a * ex + 2 * b * ey) * ex + d * ey * ey)
-
-
-def _reweighted(
-    system: _System, weight: Floats, fitted: Floats, hold: Doubles, cutoff: float, rounds: int
-) -> tuple[Doubles, Doubles]:
-    """Iteratively reweighted least squares: (2, K) coefficients and the last (N,) weights."""
-    displaced = fitted.T.astype(np.float64)
-    for _ in range(rounds):
-        w = weight / (1 + system.squared(displaced) / cutoff**2) ** 2
-        model = system.solve(w, hold)
-        before, displaced = displaced, model @ system.phi
-        if np.abs(displaced - before).max() < SETTLED:
-            break
-    return model, w
+    return Affine(matrix, float(1 / np.sqrt(mean / 2 + 1e-9)), float(w.sum()))

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from visup.percepts.motion.image import Floats
+from visup.percepts.motion.picture import edges
 from visup.percepts.motion.silhouette import Silhouette, Silhouettes, cut
 
 LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
@@ -107,14 +108,19 @@ def is_deep_shadow(s: Silhouette, image: Floats, rest: Floats) -> bool:
 def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
     """Whether an outline has its edges in the picture of the rest: it shows where something left.
 
+    A shadow dims the edges of what it falls on, and nothing has left; what is so thin that it has
+    no inside is not surely one.
+
     Args:
         s: The object.
-        now: (h, w) float32 strength of edges in the image.
-        rest: The same in the picture of the rest.
+        now: (h, w, 3) float32 image.
+        rest: (h, w, 3) float32 picture of the rest.
     """
     if s.now is None or s.crowded:
         return False
     box, shape = s.now
     inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
+    if s.shadow and inner.any():
+        return False
     rim = shape & (inner == 0)
-    return float(cut(now, box)[rim].mean()) < GHOST * float(cut(rest, box)[rim].mean())
+    return float(edges(now, box)[rim].mean()) < GHOST * float(edges(rest, box)[rim].mean())

@@ -9,13 +9,23 @@ after Horprasert, Harwood, Davis, A statistical approach for robust background s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.motion.image import Floats
+from visup.percepts.motion.picture_loops import (
+    Pace,
+    Planes,
+    Shade,
+    dimmed,
+    offsets,
+    renewed,
+    standing_out,
+    surely,
+)
 
 Mask = NDArray[np.bool_]
 NOISE = 4.0  # least standard deviation that is assumed, grey levels
@@ -23,11 +33,12 @@ FAR = 3.0  # standard deviations at which a pixel surely shows something else
 NEAR = 2.2  # the same for one beside a sure one
 SETTLE_S = 8.0  # time constant of what is learnt, seconds
 RESTLESS_S = 8.0  # the same of the variance
-SHADE = (0.6, 0.97)  # brightness in a shadow, as a share of that at rest
+SHADE = 0.6  # least brightness in a shadow, as a share of that at rest
 HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
 RARE = 10.0  # squared distance beyond which a pixel tells no more of how restless it is
 EVEN = 0.03  # change of exposure that is none
 LIT = 1.12  # brightness in reflected light
+CAST = Shade(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,42 +77,25 @@ def filled(picture: Picture, image: Floats, bare: Mask) -> Picture:
     if not new.any():
         return picture
     fresh = first_picture(image)
-    return Picture(
-        np.where(new[..., None], fresh.mean, picture.mean),
-        np.where(new, fresh.variance, picture.variance),
-        np.where(new, fresh.seen_s, picture.seen_s),
-        np.where(new[..., None], fresh.other, picture.other),
-        np.where(new, fresh.other_s, picture.other_s),
-    )
-
-
-def offset(picture: Picture, image: Floats) -> Floats:
-    """Squared distance of each pixel to the picture, (h, w) float32; 1 is one standard deviation."""
-    gap = image - picture.mean
-    return np.asarray(np.einsum("ijk,ijk->ij", gap, gap) / (3 * picture.variance), np.float32)
+    planes = [getattr(picture, f.name).copy() for f in fields(picture)]
+    for plane, f in zip(planes, fields(picture), strict=True):
+        plane[new] = getattr(fresh, f.name)[new]
+    return Picture(*planes)
 
 
 def shaded(picture: Picture, image: Floats) -> Mask:
     """Where an image differs as a shadow or a reflection does: in brightness, not in hue."""
-    m = picture.mean
-    power = np.einsum("ijk,ijk->ij", m, m) + 1.0
-    bright = np.einsum("ijk,ijk->ij", image, m) / power
-    gap = image - bright[..., None] * m
-    hue = np.einsum("ijk,ijk->ij", gap, gap)
-    same = hue < (HUE * HUE) * power + 3 * NOISE**2 / 4
-    return np.asarray(same & (bright > SHADE[0]) & (bright < LIT) & (power > 60.0**2))
+    return dimmed(image, picture.mean, CAST)
 
 
 def changed(picture: Picture, image: Floats) -> Mask:
     """Which pixels show something else than what rests, (h, w) bool; where that is unknown, none."""
-    off = cv2.GaussianBlur(np.minimum(offset(picture, image), 100.0), (3, 3), 0.8)
-    off = np.where(shaded(picture, image) | (picture.seen_s <= 0), 0, off)
-    near = cv2.medianBlur((off > NEAR**2).astype(np.uint8), 5)
-    _, labels = cv2.connectedComponents(near, connectivity=8)
-    sure = np.zeros(labels.max() + 1, bool)
-    sure[np.unique(labels[(off > (FAR * 1.5) ** 2) & (near > 0)])] = True
-    sure[0] = False
-    return np.asarray(sure[labels], dtype=bool)
+    far = offsets(image, picture.mean, picture.variance, 100.0)
+    off = np.asarray(cv2.GaussianBlur(far, (3, 3), 0.8), dtype=np.float32)
+    out = standing_out(off, image, picture.mean, picture.seen_s, CAST, NEAR**2)
+    near = cv2.medianBlur(out.view(np.uint8), 5)
+    count, labels = cv2.connectedComponents(near, connectivity=8)
+    return surely(np.asarray(labels, np.int32), off, out, count, (FAR * 1.5) ** 2)
 
 
 def learnt(
@@ -119,43 +113,28 @@ def learnt(
     Returns:
         The new picture.
     """
-    off = offset(picture, image)
-    known = picture.seen_s > 0
-    fits = (off < FAR**2) & ~moving & known
-    weight = np.maximum(seconds / (picture.seen_s + seconds), 1 - np.exp(-seconds / SETTLE_S))
-    weight = np.where(fits, weight, 0).astype(np.float32)
-    mean = picture.mean + weight[..., None] * (image - picture.mean)
-    spread = np.float32(1 - np.exp(-seconds / RESTLESS_S))
-    # Leaves and water go far and come back; one object that passes weighs little.
-    wide = (
-        picture.variance
-        + np.where(moving, 0, spread) * (np.minimum(off, RARE) - 1) * picture.variance
+    pace = Pace(
+        seconds,
+        1 - float(np.exp(-seconds / SETTLE_S)),
+        1 - float(np.exp(-seconds / RESTLESS_S)),
+        FAR**2,
+        RARE,
+        NOISE**2,
+        (8 * NOISE) ** 2,
+        3 * (FAR * NOISE) ** 2,
     )
-    variance = np.clip(wide, NOISE**2, (8 * NOISE) ** 2)
-    seen = np.minimum(picture.seen_s + fits * np.float32(seconds), 60.0)
-    gap = image - picture.other
-    alike = np.einsum("ijk,ijk->ij", gap, gap) < 3 * (FAR * NOISE) ** 2
-    away = ~fits & known
-    other_s = np.where(away, np.where(alike, picture.other_s + seconds, seconds), picture.other_s)
-    step = np.where(away, np.where(alike, 0.3, 1.0), 0)[..., None]
-    other = picture.other + step * gap
-    enough = np.where(moving, 3 * picture.seen_s, np.minimum(picture.seen_s, 20.0)) + 0.2
-    swap = other_s > enough
-    if gone is not None:
-        other = np.where(gone[..., None], image, other)
-        swap |= gone & known
-    mean = np.where(swap[..., None], other, mean)
-    variance = np.where(swap, NOISE**2 * 2, variance)
-    seen, other_s = np.where(swap, other_s, seen), np.where(swap, 0, other_s)
-    return Picture(*(np.asarray(a, np.float32) for a in (mean, variance, seen, other, other_s)))
+    known = Planes(*(getattr(picture, f.name) for f in fields(picture)))
+    nowhere = np.zeros(moving.shape, dtype=bool)
+    return Picture(*renewed(known, image, moving, nowhere if gone is None else gone, pace))
 
 
-def edges(image: Floats) -> Floats:
-    """(h, w) float32 strength of the edges of a (h, w, 3) image."""
-    grey = image.mean(axis=2)
-    return np.asarray(
-        np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)), np.float32
-    )
+def edges(image: Floats, box: tuple[int, int, int, int]) -> Floats:
+    """Strength of the edges of a (h, w, 3) image in a box (x0, y0, x1, y1), (y, x) float32."""
+    x, y = max(box[0] - 1, 0), max(box[1] - 1, 0)
+    grey = image[y : box[3] + 1, x : box[2] + 1].mean(axis=2)
+    strength = np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1))
+    inner = strength[box[1] - y : box[3] - y, box[0] - x : box[2] - x]
+    return np.asarray(inner, np.float32)
 
 
 def exposed(picture: Picture, image: Floats) -> Picture:

@@ -20,7 +20,6 @@ from visup.percepts.motion.objecthood import is_deep_shadow, is_ghost, joined
 from visup.percepts.motion.picture import (
     Picture,
     changed,
-    edges,
     exposed,
     filled,
     first_picture,
@@ -151,8 +150,7 @@ class RestingView:
         known = tuple(
             s if s.id else replace(s, shadow=is_deep_shadow(s, image, picture.mean)) for s in known
         )
-        now_edges, rest_edges = edges(image), edges(picture.mean)
-        ghosts = [s for s in known if is_ghost(s, now_edges, rest_edges)]
+        ghosts = [s for s in known if is_ghost(s, image, picture.mean)]
         known = tuple(s for s in known if s not in ghosts)
         told = painted([s for s in known if s.id], change.shape)
         held = (cv2.dilate(told.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change

@@ -41,6 +41,7 @@ RING_STEPS = 5  # cells around a track in which its surroundings are looked for
 FEWEST_AROUND = 8
 MOST_BORDER = 0.2  # share of the image border that an object may take up when it is first told
 LITTLE_BORDER = 0.04  # the same for one told at first sight: there parallax is greatest
+FOOT = 0.15  # share of the height of a region that is its foot
 AHEAD = 0.4  # how much faster than the background, the same way, a near thing that rests may go
 
 
@@ -102,10 +103,13 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
 
 def _weighed(t: Track, k: int, scene: Scene, winner: Indices, ring: NDArray[np.bool_]) -> Track:
     explained, borne = dict(t.explained), dict(t.borne)
+    foot = foot_of(winner == k, scene.cells)
     for m in scene.measured:
         at = scene.cell_of(m.constraints)
         mine, around = winner[at] == k, ring[at]
-        local = surroundings(m, around)
+        local = tuple(
+            model for model in (surroundings(m, around), standing(m, foot)) if model is not None
+        )
         if np.count_nonzero(mine) >= FEWEST:
             _note(explained, m, _misfit(m, local)[mine])
         if m is scene.measured[0]:
@@ -114,7 +118,7 @@ def _weighed(t: Track, k: int, scene: Scene, winner: Indices, ring: NDArray[np.b
     return replace(t, explained=MappingProxyType(explained), borne=MappingProxyType(borne))
 
 
-def _gone_on(t: Track, m: Measured, local: Affine | None, scene: Scene) -> Track:
+def _gone_on(t: Track, m: Measured, local: Sequence[Affine], scene: Scene) -> Track:
     """Add the step of a frame, if it was seen: what was not measured again has gone nowhere."""
     if not any(rate.time == scene.time for rate in t.motions[0].rates.values()):
         return t
@@ -124,7 +128,7 @@ def _gone_on(t: Track, m: Measured, local: Affine | None, scene: Scene) -> Track
 
 
 def _note_course(
-    borne: dict[int, float], t: Track, m: Measured, local: Affine | None, scene: Scene
+    borne: dict[int, float], t: Track, m: Measured, local: Sequence[Affine], scene: Scene
 ) -> None:
     """Note how much of the way gone step by step shows over a baseline longer than a swing."""
     rate = t.motions[0].rates.get(m.constraints.lag)
@@ -165,12 +169,41 @@ def surroundings(m: Measured, around: NDArray[np.bool_]) -> Affine | None:
     return fit_affine(c, around.astype(np.float32), middle(c, index), rigidity=1.0, slack=0.2)
 
 
-def _misfit(m: Measured, local: Affine | None) -> NDArray[np.float32]:
+def foot_of(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, float] | None:
+    """(x, y) of the lowest part of a region; None when it is empty or the image cuts it there.
+
+    Args:
+        mine: (count,) bool, its cells.
+        cells: The superpixels.
+    """
+    if not mine.any():
+        return None
+    bottom = int(cells.corners[mine, 3].max())
+    if bottom >= cells.labels.shape[0]:
+        return None
+    top = int(cells.corners[mine, 1].min())
+    low = mine & (cells.corners[:, 3] > bottom - FOOT * (bottom - top))
+    return float(np.average(cells.centre[low, 0], weights=cells.area[low])), float(bottom)
+
+
+def standing(m: Measured, foot: tuple[float, float] | None) -> Affine | None:
+    """The motion of a thing at rest that stands upright on the ground, seen by a camera that travels.
+
+    It is as far away as the ground at its foot, so all of it goes as the background does there:
+    it has parallax against all that is behind it, and none against that place.
+    """
+    if foot is None:
+        return None
+    matrix = np.zeros((2, 3))
+    matrix[:, 2] = m.background.models[-1].shift(foot)
+    return Affine(matrix)
+
+
+def _misfit(m: Measured, local: Sequence[Affine]) -> NDArray[np.float32]:
     """Squared distance of each constraint to the background or the surroundings, what fits best."""
-    out = m.background.distances(m.constraints)
-    if local is not None:
-        c = m.constraints
-        out = np.minimum(out, distances(local, c, slack_of(local, c)))
+    out, c = m.background.distances(m.constraints), m.constraints
+    for model in local:
+        out = np.minimum(out, distances(model, c, slack_of(model, c)))
     return out
 
 
@@ -230,8 +263,8 @@ def _runs_ahead(t: Track, scene: Scene) -> bool:
     return along > 0 and across < along + AHEAD
 
 
-def _apart(moved: Doubles, t: Track, m: Measured, local: Affine | None) -> Doubles:
+def _apart(moved: Doubles, t: Track, m: Measured, local: Sequence[Affine]) -> Doubles:
     """(x, y) pixels that a track moved against the background nearest to its motion."""
-    models = m.background.models if local is None else (*m.background.models, local)
+    models = (*m.background.models, *local)
     ways = [moved - np.asarray(b.shift(t.centre)) for b in models]
     return min(ways, key=lambda way: float(np.hypot(*way)))

@@ -45,7 +45,7 @@ from visup.percepts.motion.scene import (
 )
 from visup.percepts.motion.settings import MotionSettings
 from visup.percepts.motion.superpixels import Superpixels, superpixels
-from visup.percepts.motion.tracking import Rate, Tracks, carry, priors, transition
+from visup.percepts.motion.tracking import Rate, Tracks, carry, priors
 from visup.percepts.motion.warping import flow_back, warped
 
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
@@ -164,8 +164,7 @@ class MotionSegmenter:
         flow = flow_back(image.grey, old.grey, self._engine)
         first = self._follow(points, flow, old, image)
         cells = coming.result()
-        step = transition(before, cells, flow)
-        tracks = carry(self._tracks, step, before, cells, seconds)
+        tracks = carry(self._tracks, flow, before, cells, seconds)
         owner = priors(tracks, cells).argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         later = [self._later(scene, tracks, lag) for lag in self._turn(image)]

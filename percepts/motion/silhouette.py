@@ -129,8 +129,8 @@ def cut(a: NDArray, box: Box) -> NDArray:  # type: ignore[type-arg]
 
 def cropped(mask: Mask) -> tuple[Box, Mask]:
     """The box (x0, y0, x1, y1) around a mask that is not empty, and the mask within it."""
-    ys, xs = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
-    box = (int(xs[0]), int(ys[0]), int(xs[-1]) + 1, int(ys[-1]) + 1)
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
+    box = (x, y, x + w, y + h)
     return box, cut(mask, box)
 
 

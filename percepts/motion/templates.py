@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.silhouette import Mask, Silhouette, View, cut, window_of
+from visup.percepts.motion.template_loops import best_shift
 
 SEARCH = 3  # pixels around the prediction in which a template is sought
 ENOUGH = 1200  # pixels of a template that are compared, about
@@ -73,23 +74,12 @@ def sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
     Returns:
         The cost, grey levels, and the shift (x, y), whole pixels.
     """
-    best, at = np.inf, (0, 0)
     # A large template says enough by some of its pixels.
     step = max(1, int(np.sqrt(np.count_nonzero(s.shape) / ENOUGH)))
-    some = np.s_[::step, ::step]
     reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            where, own = window_of(s, blob.shape, dx, dy)
-            shape = cut(s.shape, own)[some]
-            if not shape.any():
-                continue
-            gap = np.abs(cut(view.image, where)[some] - cut(s.tone, own)[some]).mean(axis=2)
-            gap = 60.0 - (60.0 - np.minimum(gap, 60.0)) * cut(blob, where)[some]
-            cost = float(gap[shape].mean()) + 0.5 * float(np.hypot(dx, dy))
-            if cost < best:
-                best, at = cost, (dx, dy)
-    return best, *at
+    corner = round(s.corner[0]), round(s.corner[1])
+    tone = np.ascontiguousarray(s.tone)
+    return best_shift(view.image, blob, s.shape, tone, corner, reach, step)
 
 
 def _cost(

@@ -15,11 +15,11 @@ from types import MappingProxyType
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from visup.percepts.motion.cell_loops import brought
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, Doubles
-from visup.percepts.motion.superpixels import Superpixels, overlap
+from visup.percepts.motion.superpixels import Superpixels
 
 Indices = NDArray[np.int64]
 BRISK_S = 0.25  # baselines up to which a velocity is that of the moment, seconds
@@ -232,33 +232,8 @@ class Track:
 Tracks = tuple[Track, ...]
 
 
-def transition(old: Superpixels, new: Superpixels, flow: Floats) -> sparse.csr_matrix:
-    """Which superpixels of the last frame each new one comes from, following the flow.
-
-    Args:
-        old: Superpixels of the last frame.
-        new: Superpixels of the newest frame.
-        flow: (h, w, 2) float32, from the newest image back to the last.
-
-    Returns:
-        (new count, old count) sparse shares; rows sum to 1, or less where the image came into view.
-    """
-    height, width = old.labels.shape
-    places, ends = new.samples(EVERY)
-    # Both components as one number: rows of two are gathered slowly.
-    back = flow.view(np.float64).ravel()[places].view(np.float32)
-    back_x, back_y = np.rint(back).astype(np.int32).reshape(-1, 2).T
-    y = places // np.int32(width)
-    x = places - y * np.int32(width) + back_x
-    y += back_y
-    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-    source = old.labels.ravel()[np.where(inside, y * np.int32(width) + x, 0)]
-    source[~inside] = -1
-    return overlap(old, new, source, ends)
-
-
 def carry(
-    tracks: Tracks, step: sparse.csr_matrix, old: Superpixels, new: Superpixels, seconds: float
+    tracks: Tracks, flow: Floats, old: Superpixels, new: Superpixels, seconds: float
 ) -> Tracks:
     """Bring tracks to the next frame.
 
@@ -268,7 +243,7 @@ def carry(
 
     Args:
         tracks: The tracks as of the frame before.
-        step: The transition between superpixels.
+        flow: (h, w, 2) float32, from the newest image back to the last.
         old: Superpixels of the frame before.
         new: Superpixels of the newest frame.
         seconds: Between the two frames.
@@ -280,7 +255,9 @@ def carry(
         return ()
     before = [t.share for t in tracks]
     before += [t.share if t.recent is None else t.recent for t in tracks]
-    moved = np.ascontiguousarray((step @ np.stack(before, axis=1)).T)
+    shares = np.stack(before, axis=1).astype(np.float32, copy=False)
+    found = brought(old.labels, new.labels, flow, np.ascontiguousarray(shares), new.count, EVERY)
+    moved = np.ascontiguousarray(found.T)
     return tuple(
         _carried(t, share, np.float32(FADE**seconds) * recent, old, new, seconds)
         for t, share, recent in zip(tracks, moved, moved[len(tracks) :], strict=False)

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.motion.cell_loops import means_of_half
 from visup.percepts.motion.image import Floats, WorkImage
 from visup.percepts.motion.layers import Affine
 from visup.percepts.motion.scene import Scene
@@ -154,8 +155,4 @@ def _halved(box: tuple[int, int, int, int], cells: Superpixels) -> tuple[int, in
 
 def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
     """Mean of a map of a box, at half the size, in each cell; 0 where none of its pixels is seen."""
-    x, y, w, h = box
-    where = cells.labels[2 * y : 2 * (y + h) : 2, 2 * x : 2 * (x + w) : 2].ravel().astype(np.int64)
-    total = np.bincount(where, weights=values.ravel(), minlength=cells.count)
-    number = np.bincount(where, minlength=cells.count)
-    return np.asarray(total / np.maximum(number, 1), dtype=np.float32)
+    return means_of_half(cells.labels, np.ascontiguousarray(values), box, cells.count)

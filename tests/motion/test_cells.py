@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from visup.agent import Frame
+from visup.percepts.motion.cell_loops import borders, brought
 from visup.percepts.motion.image import prepare
-from visup.percepts.motion.superpixels import Superpixels, overlap, superpixels
+from visup.percepts.motion.superpixels import Superpixels, superpixels
 
 
 def cells_of(seed: int) -> Superpixels:
@@ -64,24 +65,45 @@ def test_links_join_those_that_touch(seed: int) -> None:
     assert np.array_equal(link, link.T)
 
 
-@given(st.integers(0, 99), st.integers(-9, 9))
-@settings(deadline=None, max_examples=8)
-def test_overlap_carries_shares_with_their_pixels(seed: int, shift: int) -> None:
+@given(st.integers(0, 99), st.integers(-9, 9), st.integers(1, 5))
+@settings(deadline=None, max_examples=12)
+def test_shares_come_with_every_nth_pixel_of_a_cell(seed: int, shift: int, every: int) -> None:
     old, new = cells_of(seed), cells_of(seed + 1)
-    source = np.roll(old.labels, shift, axis=1)
-    source[:, : max(shift, 0)] = -1
-    share = np.random.default_rng(seed).random(old.count).astype(np.float32)
-    carried = np.where(source >= 0, share[source], 0).astype(np.float32)
-    places, ends = new.samples(1)
-    step = overlap(old, new, source.ravel()[places], ends)
-    assert np.allclose(step @ share, new.mean(carried), atol=1e-5)
+    shares = np.random.default_rng(seed).random((old.count, 3)).astype(np.float32)
+    flow = np.zeros((*old.labels.shape, 2), np.float32)
+    flow[..., 0] = shift + 0.3
+    found = brought(old.labels, new.labels, flow, shares, new.count, every)
+    width = old.labels.shape[1]
+    for k in range(new.count):
+        ys, xs = np.nonzero(new.labels == k)
+        ys, xs = ys[::every], xs[::every] + shift
+        seen = (xs >= 0) & (xs < width)
+        come = np.zeros((len(xs), 3))
+        come[seen] = shares[old.labels[ys[seen], xs[seen]]]
+        assert np.allclose(found[k], come.mean(axis=0) if len(xs) else 0, atol=1e-5)
 
 
-@given(st.integers(0, 99), st.integers(1, 5))
-@settings(deadline=None, max_examples=8)
-def test_samples_are_every_nth_pixel_of_each_cell(seed: int, every: int) -> None:
+@given(st.integers(0, 99), st.integers(1, 70), st.integers(0, 4))
+@settings(deadline=None, max_examples=12)
+def test_reach_is_that_many_steps_along_links(seed: int, kinds: int, steps: int) -> None:
     cells = cells_of(seed)
-    places, ends = cells.samples(every)
-    for k in range(cells.count):
-        inside = np.flatnonzero(cells.labels.ravel() == k)
-        assert np.array_equal(places[ends[k] : ends[k + 1]], inside[::every])
+    members = np.random.default_rng(seed).random((cells.count, kinds)) < 0.1
+    near = members
+    for _ in range(steps):
+        near = (cells.link @ near.astype(float) > 0) | near
+    assert np.array_equal(cells.reach(members, steps), near)
+
+
+@given(st.integers(0, 99))
+@settings(deadline=None, max_examples=5)
+def test_borders_are_counted_pixel_by_pixel(seed: int) -> None:
+    labels = np.random.default_rng(seed).integers(0, 9, (7, 11)).astype(np.int32)
+    slow: dict[tuple[int, int], int] = {}
+    for y in range(7):
+        for x in range(11):
+            for v, u in ((y, x + 1), (y + 1, x)):
+                if v < 7 and u < 11 and labels[v, u] != labels[y, x]:
+                    a, b = sorted((int(labels[y, x]), int(labels[v, u])))
+                    slow[a, b] = slow.get((a, b), 0) + 1
+    found = [tuple(map(int, row)) for row in zip(*borders(labels, 9), strict=True)]
+    assert found == [(*pair, n) for pair, n in sorted(slow.items())]

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.motion.clips import texture
-from visup.percepts.motion.fitting import BAND, LEAST, NOISE, WINDOW, _odds, fitted
+from visup.percepts.motion.fitting import BAND, LEAST, NOISE, SAMPLED, fitted, odds_of
 
 SHAPE = (70, 90)
 
@@ -78,23 +78,25 @@ def test_what_has_no_outline_stays(mask: np.ndarray) -> None:
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 1000))
 def test_odds_are_those_of_two_gaussians_in_the_window(seed: int) -> None:
-    """Against sums over every window, pixel by pixel."""
+    """Against sums over every other pixel of every window, pixel by pixel."""
     rng = np.random.default_rng(seed)
-    inside = disc(45, 35, 20).astype(np.uint8)
+    share = shares(disc(45, 35, 20))
     tone = rng.integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
-    full = cv2.boxFilter(inside, cv2.CV_32F, (WINDOW, WINDOW))
-    both = np.flatnonzero((full > LEAST) & (full < 1 - LEAST))
-    at = np.sort(rng.choice(both, 12, replace=False))
-    found = _odds(inside, full.ravel()[at][:, None], tone, at)
-    half = WINDOW // 2
-    wide = cv2.copyMakeBorder(tone, half, half, half, half, cv2.BORDER_REFLECT_101).astype(float)
+    found = odds_of(share, tone)
+    some, inside = tone[::2, ::2], (share > 0.5).astype(np.uint8)[::2, ::2]
+    half = SAMPLED[0] // 2
+    wide = cv2.copyMakeBorder(some, half, half, half, half, cv2.BORDER_REFLECT_101).astype(float)
     mask = cv2.copyMakeBorder(inside, half, half, half, half, cv2.BORDER_REFLECT_101) > 0
-    for place, odds in zip(at, found, strict=True):
+    told = np.flatnonzero(found)
+    for place in rng.choice(told, 12, replace=False):
         y, x = divmod(int(place), SHAPE[1])
-        window, own = (a[y : y + WINDOW, x : x + WINDOW] for a in (wide, mask))
+        v, u = y // 2, x // 2
+        window, own = (a[v : v + SAMPLED[0], u : u + SAMPLED[0]] for a in (wide, mask))
+        assert LEAST < own.mean() < 1 - LEAST
         cost = []
         for side in (window[own], window[~own]):
             variance = side.var(axis=0) + NOISE**2
             gap = (tone[y, x] - side.mean(axis=0)) ** 2
             cost.append(0.5 * (gap / variance + np.log(variance)).sum() / 3)
-        assert odds == pytest.approx(float(np.clip(cost[1] - cost[0], -3, 3)), abs=0.02)
+        expected = float(np.clip(cost[1] - cost[0], -3, 3))
+        assert found[y, x] == pytest.approx(expected, abs=0.02)

@@ -14,7 +14,7 @@ from visup.percepts.motion.constraints import find_points
 from visup.percepts.motion.constraints import track as follow
 from visup.percepts.motion.image import prepare
 from visup.percepts.motion.layers import Affine
-from visup.percepts.motion.salience import is_salient
+from visup.percepts.motion.salience import foot_of, is_salient
 from visup.percepts.motion.scene import Measured, Scene
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.superpixels import superpixels
@@ -120,3 +120,39 @@ def test_leaves_that_sway_are_no_objects(seed: int) -> None:
     segmenter = MotionSegmenter()
     seen = [segmenter.step(swaying(n, rng, phase)) for n in range(60)]
     assert not any(seen)
+
+
+def travelling(n: int, own: float) -> Frame:
+    """A camera goes sideways over a ground that recedes to a wall; a post stands there, or goes."""
+    height, width = 240, 320
+    ys, xs = np.mgrid[:height, :width].astype(np.float32)
+    speed = np.maximum(ys - 90, 0) * np.float32(1.5 / 150)
+    ground = cv2.resize(texture(1, (240, 480)), (960, 240), interpolation=cv2.INTER_CUBIC)
+    image = cv2.remap(ground, xs + 300 + speed * n, ys, cv2.INTER_LINEAR)
+    post = cv2.resize(texture(7, (60, 30), 0, 255), (36, 110))
+    left = 200 - (float(speed[170, 0]) + own) * n
+    place = np.array([[1, 0, left], [0, 1, 60]])
+    shown = cv2.warpAffine(post, place, (width, height))
+    mask = cv2.warpAffine(np.full_like(post, 255), place, (width, height)) / 255.0
+    grey = np.clip(np.rint(image * (1 - mask) + shown * mask), 0, 255).astype(np.uint8)
+    return Frame(n, n / FPS, np.repeat(grey[..., None], 3, axis=2))
+
+
+@pytest.mark.parametrize(("own", "told"), [(0.0, False), (1.5, True), (-1.5, True)])
+def test_what_stands_on_the_ground_is_no_object_however_much_parallax_it_has(
+    own: float, told: bool
+) -> None:
+    segmenter = MotionSegmenter()
+    seen = [segmenter.step(travelling(n, own)) for n in range(50)]
+    assert any(seen) is told
+
+
+def test_the_foot_is_the_lowest_part_and_unknown_where_the_image_cuts_it() -> None:
+    cells = scene().cells
+    x, y = cells.centre.T
+    found = foot_of((np.abs(x - 60) < 20) & (y > 30) & (y < 80), cells)
+    assert found is not None
+    assert found[0] == pytest.approx(60, abs=8)
+    assert found[1] == pytest.approx(80, abs=10)
+    assert foot_of(y > 30, cells) is None
+    assert foot_of(y < 0, cells) is None

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.motion.test_cells import cells_of
 from visup.percepts.motion.layers import Affine
-from visup.percepts.motion.tracking import Motion, Rate, Track, carry, remember, transition
+from visup.percepts.motion.tracking import Motion, Rate, Track, carry, remember
 
 STEP_S = 0.04
 
@@ -36,7 +36,7 @@ def test_what_is_hidden_does_not_wear_away(seed: int) -> None:
         assert track.mostly_hidden
         hidden.append(track.hidden)
         new = cells_of(seed + 1 + n)
-        (track,) = carry((track,), transition(cells, new, still), cells, new, STEP_S)
+        (track,) = carry((track,), still, cells, new, STEP_S)
         cells = new
     assert np.minimum(hidden[0], hidden[-1]).sum() > 0.97 * np.maximum(hidden[0], hidden[-1]).sum()
 
@@ -51,7 +51,7 @@ def test_what_fades_before_an_occluder_is_hidden_all_the_same() -> None:
     for shares in ([0.1, 0.48, 0.42, 0.0], [0.1, 0.3, 0.6, 0.0]):
         posterior = np.tile(np.array(shares, np.float32), (cells.count, 1))
         track = remember(track, posterior, posterior.argmax(axis=1), 1, cells, STEP_S, 50.0)
-        (track,) = carry((track,), transition(cells, cells, still), cells, cells, STEP_S)
+        (track,) = carry((track,), still, cells, cells, STEP_S)
     assert track.hidden is not None
     assert track.hidden.mean() > 0.95
 
