@@ -21,6 +21,9 @@ def replace(record: Record, **changes: Any) -> Record:
         record: A dataclass all of whose fields are given when it is made, in their order.
         changes: Field -> value.
 
+    Returns:
+        A new record; the very same one where every field is to become what it is already.
+
     Raises:
         KeyError: There is no such field.
 
@@ -32,9 +35,12 @@ def replace(record: Record, **changes: Any) -> Record:
     kind = type(record)
     read, place = _LAYOUTS.get(kind) or _layout(kind)
     values = list(read(record))
+    alike = True
     for name, value in changes.items():
-        values[place[name]] = value
-    return kind(*values)
+        at = place[name]
+        if values[at] is not value:
+            values[at], alike = value, False
+    return record if alike else kind(*values)
 
 
 Layout = tuple[Callable[[Any], tuple[Any, ...]], Mapping[str, int]]

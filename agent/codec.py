@@ -240,15 +240,20 @@ _OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
 }
 
 
+_SHOWN = tuple(n for n in _FIELDS[Region] if n not in ("mask", "contour", "bbox"))
+
+
 def _region(r: Region) -> dict[str, Any]:
-    shown = {n: getattr(r, n) for n in _FIELDS[Region] if n not in ("mask", "contour", "bbox")}
-    return {
+    out: dict[str, Any] = {
         "$": "Region",
         "bbox": [int(n) for n in r.bbox],
         "mask": runs(r.mask),
         "contour": _chain(r.contour),
-        **{name: encoded(value) for name, value in shown.items()},
     }
+    for name in _SHOWN:
+        held = getattr(r, name)
+        out[name] = held if type(held) in _PLAIN else encoded(held)
+    return out
 
 
 def _told_region(told: Mapping[str, Any]) -> Region:
@@ -263,9 +268,10 @@ def _told_region(told: Mapping[str, Any]) -> Region:
 def runs(mask: NDArray[np.bool_]) -> list[int]:
     """Lengths of the runs of a mask in reading order, that of False first (0 when there is none)."""
     flat = np.ravel(mask)
-    turns = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    ends = [0, *turns.tolist(), flat.size] if flat.size else [0, 0]
-    lengths: list[int] = np.diff(ends).tolist()
+    turns = (flat[1:] != flat[:-1]).nonzero()[0]
+    ends = np.zeros(len(turns) + 2, np.int64)
+    ends[1:-1], ends[-1] = turns + 1, flat.size
+    lengths: list[int] = (ends[1:] - ends[:-1]).tolist()
     return [0, *lengths] if flat.size and flat[0] else lengths
 
 
@@ -282,9 +288,11 @@ def unrun(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
 
 
 _CHAIN = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
-_CODE = np.full((3, 3), ord("-"), np.uint8)
+_NO_DIGIT = "-"
+_CODE = np.full(9, ord(_NO_DIGIT), np.uint8)
+"""The digit of a move (dx, dy) at 3 (dx + 1) + dy + 1."""
 for _digit, (_dx, _dy) in enumerate(_CHAIN):
-    _CODE[_dx + 1, _dy + 1] = ord("0") + _digit
+    _CODE[3 * (_dx + 1) + _dy + 1] = ord("0") + _digit
 
 
 def _chain(contour: NDArray[np.float32]) -> Any:
@@ -296,13 +304,19 @@ def _chain(contour: NDArray[np.float32]) -> Any:
     points = np.asarray(contour)
     if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 2 or not len(points):
         return encoded(contour)
-    if not (np.abs(points) < _WHOLE).all() or np.signbit(points[points == 0]).any():
+    least, most = float(points.min()), float(points.max())
+    if not -_WHOLE < least <= most < _WHOLE:  # NaN is neither
         return encoded(contour)
-    whole = points.astype(np.int64)
-    moves = np.diff(whole, axis=0)
-    if (whole != points).any() or np.abs(moves).max(initial=0) > 1 or not moves.any(axis=1).all():
+    if least <= 0.0 and np.signbit(points[points == 0]).any():
         return encoded(contour)
-    digits = _CODE[moves[:, 0] + 1, moves[:, 1] + 1].tobytes().decode()
+    whole = points.astype(np.int32)
+    # Moves of one pixel are 0, 1 and 2 here; of a longer one either is something else, or larger.
+    moves = (whole[1:] - whole[:-1] + 1).view(np.uint32)
+    if (whole != points).any() or moves.max(initial=0) > 2:
+        return encoded(contour)
+    digits = _CODE[3 * moves[:, 0] + moves[:, 1]].tobytes().decode()
+    if _NO_DIGIT in digits:
+        return encoded(contour)
     return {"$": "chain", "from": whole[0].tolist(), "of": digits}
 
 

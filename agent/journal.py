@@ -195,6 +195,9 @@ class Journal:
 
     def _write(self, statements: list[Statement]) -> None:
         try:
+            if len(statements) == 1:  # is a transaction by itself
+                self._db.execute(*statements[0])
+                return
             self._db.execute("BEGIN IMMEDIATE")
             for sql, row in statements:
                 self._db.execute(sql, row)
@@ -285,7 +288,10 @@ def _alert_row(a: Alert) -> tuple[Any, ...]:
 
 def _text(value: Any) -> str:
     """Plain values as JSON, the same values as the same text."""
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+    return _TEXT.encode(value)
+
+
+_TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
 def _unwritable(path: Path, fault: sqlite3.Error) -> OutputError:

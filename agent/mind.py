@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.changing import replace
-from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, empty
+from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
 from visup.agent.relations import Relation, RelationTable
 
 if TYPE_CHECKING:
@@ -341,12 +341,21 @@ class Mind:
     answers: Mapping[int, str] = field(default_factory=lambda: NO_ANSWERS)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
-    def remember(self, thinker: str, value: object) -> Mind:
-        """The same mind with one thinker's memory replaced; `value` must be immutable."""
-        return replace(self, memory=MappingProxyType({**self.memory, thinker: value}))
+    def remember(self, thinker: str, value: object, **changes: Any) -> Mind:
+        """The same mind with one thinker's memory replaced, and other fields with it.
+
+        Args:
+            thinker: Its name.
+            value: What it remembers; must be immutable.
+            changes: Field -> value.
+        """
+        memory = MappingProxyType({**self.memory, thinker: value})
+        return replace(self, memory=memory, **changes)
 
     def with_objects(self, *beliefs: ObjectBelief) -> Mind:
         """The same mind with beliefs about some objects added or replaced."""
+        if all(self.objects.get(b.id) is b for b in beliefs):
+            return self
         updated = {**self.objects, **{b.id: b for b in beliefs}}
         return replace(self, objects=MappingProxyType(updated))
 
@@ -368,6 +377,10 @@ class Mind:
         The order of the objects matters only for relations that are not symmetric.
         """
         return self._table.find(name, *objects)
+
+    def truth(self, name: str, a: int, b: int) -> Truth | None:
+        """Whether the relation of that name holds from a to b, or None when it is not judged."""
+        return self._table.truth(name, a, b)
 
     def holding(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""

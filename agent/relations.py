@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 UNKNOWN_CODE = -1
 _CODES = {Truth.TRUE: 1, Truth.UNKNOWN: 0, Truth.FALSE: -1}
+_TRUTHS = {code: truth for truth, code in _CODES.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +132,19 @@ class RelationTable(Sequence[Relation]):
                 column, code = at
                 return self.columns[column].relation(code, (objects[0], objects[1]), row, k)
         return self._given.get((name, frozenset(objects))) if self.extra else None
+
+    def truth(self, name: str, a: int, b: int) -> Truth | None:
+        """Whether the relation of that name holds from a to b, or None when it is not judged."""
+        at = self._named.get(name)
+        if at is not None:
+            k, row = self.pair(a, b)
+            if k >= 0:
+                column, code = at
+                state = self.columns[column].state
+                held = int(state[row if len(state) > 1 else 0, k])
+                return _TRUTHS[1 if held == code else 0 if held == UNKNOWN_CODE else -1]
+        found = self._given.get((name, frozenset((a, b)))) if self.extra else None
+        return None if found is None else found.truth
 
     def true(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from math import isfinite
 
 from visup.agent.behaviour import Outcome
@@ -51,9 +50,9 @@ def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
 def _all_are(parts: object, kind: type) -> None:
     if not isinstance(parts, tuple):
         raise TypeError(f"{kind.__name__}s are a {type(parts).__name__}, expected a tuple")
-    wrong: Iterable[object] = (p for p in parts if not isinstance(p, kind))
-    for part in wrong:
-        _expect(part, kind, "a part is")
+    for part in parts:
+        if type(part) is not kind:
+            _expect(part, kind, "a part is")
 
 
 def _expect(value: object, kind: type, what: str) -> None:

@@ -14,8 +14,9 @@ from visup.rules.facts import Facts
 from visup.rules.formula import Rule
 from visup.rules.intervals import Box, Interval
 from visup.rules.monitor import verdict
+from visup.rules.ruled import ruled
 from visup.rules.safety import kept
-from visup.rules.verdicts import Values, ruled
+from visup.rules.verdicts import Values
 
 
 def explain(mind: Mind, rule: str, *ids: int) -> Explanation:

@@ -104,10 +104,10 @@ class Couple:
         objects = mind.present()
         pairs = [(a.id, b.id) for i, a in enumerate(objects) for b in objects[i + 1 :]]
         held: Held = {
-            (name, pair): r.truth
+            (name, pair): truth
             for pair in pairs
             for name in ("touching", "converging", "diverging")
-            if (r := mind.relation(name, *pair)) is not None
+            if (truth := mind.truth(name, *pair)) is not None
         }
         now = measured(mind)
         kept: dict[Pair, Pending] = {}
@@ -128,8 +128,9 @@ class Couple:
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
         told = tuple(self._relation(pair, coupled.get(pair), held, mind) for pair in pairs)
-        mind = replace(mind, couplings=alive, relations=mind.relations + told)
-        return Outcome(mind.remember(COUPLING, MappingProxyType(kept)), tuple(events))
+        memory = MappingProxyType(kept)
+        mind = mind.remember(COUPLING, memory, couplings=alive, relations=mind.relations + told)
+        return Outcome(mind, tuple(events))
 
     def _look(
         self,

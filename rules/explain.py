@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isinf
 
 import numpy as np
 
@@ -21,11 +22,12 @@ from visup.rules.formula import (
 )
 from visup.rules.intervals import UNKNOWN, Interval
 from visup.rules.monitor import verdict
-from visup.rules.program import Scope
+from visup.rules.program import Place, Scope
+from visup.rules.ruled import scope_of
 from visup.rules.sentences import short
 from visup.rules.terms import Measure, Term
 from visup.rules.units import TICKS, Number
-from visup.rules.verdicts import Values, scope_of
+from visup.rules.verdicts import Values
 from visup.rules.vocabulary import RULES
 
 
@@ -94,7 +96,7 @@ def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
 def evidence(rule: Rule, ids: tuple[int, ...], values: Values) -> tuple[str, ...]:
     """One sentence for each fact and comparison of `when`: what it says of these objects."""
     reader = _Reader(values, rule, ids)
-    return tuple(f"{e.line()}." for e in reader.facts(rule.when))
+    return tuple([f"{reader.told(f)}." for f in values.prepared.told(rule)])
 
 
 class _Reader:
@@ -107,47 +109,45 @@ class _Reader:
         self.rows = tuple(values.facts.row[i] for i in ids)
         self.names = {v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)}
 
-    def facts(self, formula: Formula) -> Iterator[Explanation]:
-        """Its facts and comparisons; those under a quantifier are told by the quantifier."""
-        if isinstance(formula, Predicate | Quantified):
-            yield self.node(formula, deep=False)
-        elif isinstance(formula, Comparison):
-            yield self._told(formula)
-        else:
-            for part in children(formula):
-                if not isinstance(part, Term):
-                    yield from self.facts(part)
+    def told(self, formula: Formula) -> str:
+        """One line on a fact, on a quantifier, or on a comparison with its quantities in its text.
 
-    def _told(self, formula: Comparison) -> Explanation:
-        """A comparison with its quantities in its text: `gap(the arm, the probe) = 3 px < 20 px`."""
+        The last is `gap(the arm, the probe) = 3 px < 20 px is true`.
+        """
+        if not isinstance(formula, Comparison):
+            return self.node(formula, deep=False).line()
         sides = [
             str(s) if isinstance(s, Number) else self.node(s, deep=False).line()
             for s in (formula.left, formula.right)
         ]
+        place, interval = self._value(formula)
         text = f"{sides[0]} {formula.operator} {sides[1]}"
-        whole = self.node(formula, deep=False)
-        return replace(whole, text=text, interval=(-np.inf, np.inf))
+        # By how much is told by the quantities.
+        return Explanation(text, UNKNOWN, verdict(interval), (), place.delay / TICKS).line()
 
     def node(self, node: Node, *, deep: bool = True) -> Explanation:
         """What a node came to; with what it is made of, if `deep`."""
-        place, term = self.values.prepared.place(node, self.scope), isinstance(node, Term)
-        value = self.values.at(place)
-        at = tuple(
-            [
-                self.rows[i] if n > 1 and i < len(self.rows) else 0
-                for i, n in enumerate(value.shape[1:])
-            ]
-        )
-        low, high = (float(bound[at]) for bound in value)
+        place, interval = self._value(node)
+        term = isinstance(node, Term)
         whole = deep and not isinstance(node, Predicate | Measure | Number)
         return Explanation(
             self._text(node),
-            (low, high),
-            None if term else verdict((low, high)),
+            interval,
+            None if term else verdict(interval),
             self._parts(node) if whole else (),
             place.delay / TICKS,
             _unit(node) if term else "",
         )
+
+    def _value(self, node: Node) -> tuple[Place, Interval]:
+        """Where a node stands, and what it came to for these objects."""
+        place = self.values.prepared.place(node, self.scope)
+        low, high = self.values.at(place)
+        for row in self.rows[: low.ndim]:
+            # Along the axis of an object on which it does not depend there is but one.
+            at = row if len(low) > 1 else 0
+            low, high = low[at], high[at]
+        return place, (low.item(0), high.item(0))
 
     def _text(self, node: Node) -> str:
         """Its source, with objects by name."""
@@ -188,7 +188,7 @@ def _unit(node: Node) -> str:
 
 def _margin(interval: Interval) -> str:
     low, high = interval
-    if np.isinf(low) and np.isinf(high):
+    if isinf(low) and isinf(high):
         return ""
     if low > 0 or high < 0:
         return f", by {low if low > 0 else -high:.3g}"

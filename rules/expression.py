@@ -27,8 +27,9 @@ from visup.rules.intervals import Interval
 from visup.rules.language import parse_rules
 from visup.rules.monitor import verdict
 from visup.rules.operators import SPACING
+from visup.rules.ruled import ruled, scope_of
 from visup.rules.units import ticks
-from visup.rules.verdicts import States, Values, rerowed, ruled, scope_of
+from visup.rules.verdicts import States, Values, rerowed
 from visup.rules.vocabulary import RULES
 
 _CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)\)")

@@ -57,6 +57,12 @@ class Facts:
         """(n, n) codes that are all the same."""
         return np.full((len(self.ids), len(self.ids)), code, dtype=np.int8)
 
+    def unknown(self, objects: int) -> Floats:
+        """(2, n) or (2, n, n) intervals of what is known of no object, or of no pair of objects."""
+        whole = np.full((2, *(len(self.ids),) * objects), np.inf)
+        whole[0] = -np.inf
+        return whole
+
     def related(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
         if name not in self._codes:
@@ -65,14 +71,14 @@ class Facts:
 
     def relate(self, names: tuple[str, ...]) -> None:
         """Look several relations up in one pass, before they are asked for."""
-        tables = self.mind.truths_of(names, self.ids)
+        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
+        tables = self.mind.truths_of(tuple([n for n in names if n != "coupled"]), self.ids)
         # An object is equal to itself, and nothing else.
         each = np.arange(len(self.ids))
-        itself = [[YES if name in ITSELF else NO] for name in names]
+        itself = [[YES if name in ITSELF else NO] for name in names if name != "coupled"]
         tables[:, each, each] = np.array(itself, dtype=np.int8).reshape(-1, 1)
-        self._codes.update(zip(names, tables, strict=True))
-        if "coupled" in names:
-            self._codes["coupled"] = self._coupled()
+        found = iter(tables)
+        self._codes |= {n: self._coupled() if n == "coupled" else next(found) for n in names}
 
     def _coupled(self) -> Codes:
         codes, row = self.pairs(NO), self.row
@@ -139,15 +145,13 @@ def code(value: bool) -> int:
 
 def exactly(values: Floats) -> Floats:
     """(2, ...) intervals of known values; NaN becomes unknown."""
-    both = np.array((values, values))
-    unknown = values != values
-    if unknown.any():
-        both[0, unknown], both[1, unknown] = -np.inf, np.inf
-    return both
+    return between(values, values)
 
 
 def between(low: Floats, high: Floats) -> Floats:
     """(2, ...) intervals; NaN becomes unknown."""
-    both = np.array((low, high))
-    both[0, low != low], both[1, high != high] = -np.inf, np.inf
+    both = np.empty((2, *low.shape))
+    # Of NaN and a number, these take the number.
+    np.fmax(low, -np.inf, out=both[0])
+    np.fmin(high, np.inf, out=both[1])
     return both

@@ -182,12 +182,9 @@ def slopes_of_spans(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """The same as `reach_slopes` of several spans of samples, one after another: (K M, 16) each."""
     good = np.isfinite(support) & free
-    moments = times[:, None, None]
-    if good.all():
-        fits = [_full_slopes(times[p], support[p]) for p in spans]
-    else:
-        values, t = np.where(good, support, 0.0), good * moments
-        fits = [_slopes(moments[p], t[p], values[p], good[p]) for p in spans]
+    if not good.all():
+        return _slopes(times, np.where(good, support, 0.0), good, spans)
+    fits = [_full_slopes(times[p], support[p]) for p in spans]
     if len(fits) == 1:
         return fits[0]
     return np.concatenate([s for s, _ in fits]), np.concatenate([u for _, u in fits])
@@ -205,16 +202,23 @@ def _full_slopes(times: Floats, support: Floats) -> tuple[Floats, NDArray[np.boo
 
 
 def _slopes(
-    moments: Floats, t: Floats, values: Floats, good: NDArray[np.bool_]
+    times: Floats, values: Floats, good: NDArray[np.bool_], spans: tuple[slice, ...]
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    count = good.sum(axis=0)
-    usable = count >= max(4.0, 0.5 * len(moments))
-    offset = moments - t.sum(axis=0) / np.maximum(count, 1)
+    """All spans in one pass: the samples outside of a span count as missing in it."""
+    inside = np.zeros((len(spans), len(times), 1, 1), dtype=bool)
+    for k, span in enumerate(spans):
+        inside[k, span] = True
+    good, moments = good & inside, times[:, None, None]
+    count = good.sum(axis=1)
+    usable = count >= np.maximum(4.0, 0.5 * inside.sum(axis=1))
+    middle = (good * moments).sum(axis=1) / np.maximum(count, 1)
+    offset = moments - middle[:, None]
     offset *= good
-    slopes = (offset * values).sum(axis=0)
+    slopes = (offset * values).sum(axis=1)
     offset *= offset
-    slopes /= np.maximum(offset.sum(axis=0), 1e-12)
-    return slopes, usable
+    slopes /= np.maximum(offset.sum(axis=1), 1e-12)
+    shape = (-1, values.shape[2])
+    return slopes.reshape(shape), usable.reshape(shape)
 
 
 _X, _Y = DIRECTIONS.T
@@ -237,16 +241,15 @@ def common_motion(slopes: Floats, usable: NDArray[np.bool_], misfit: float = np.
     used = usable.astype(float)
     weight = used
     count = usable.sum(axis=1)
-    found = np.empty((len(slopes), 2))
     for _ in range(5):
         # Normal equations of two unknowns, solved by hand for all bodies at once.
         xx, xy, yy = (weight @ _SQUARES + _RIDGE).T
-        bx, by = ((weight * slopes) @ DIRECTIONS).T
-        determinant = xx * yy - xy * xy
-        found[:, 0] = (yy * bx - xy * by) / determinant
-        found[:, 1] = (xx * by - xy * bx) / determinant
-        off = np.abs(slopes - found @ _ACROSS)
+        sides = ((weight * slopes) @ DIRECTIONS).T
+        found = np.array((yy, xx)) * sides
+        found -= xy * sides[::-1]
+        found /= xx * yy - xy * xy
+        off = np.abs(slopes - found.T @ _ACROSS)
         weight = used / np.maximum(off, 0.3)
     mean_off = (off * used).sum(axis=1) / np.maximum(count, 1)
-    as_one = mean_off <= np.maximum(misfit, np.hypot(found[:, 0], found[:, 1]) / 3.0)
-    return np.where(((count >= 3) & as_one)[:, None], found, np.nan)
+    as_one = mean_off <= np.maximum(misfit, np.hypot(*found) / 3.0)
+    return np.where((count >= 3) & as_one, found, np.nan).T

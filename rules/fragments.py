@@ -25,9 +25,9 @@ from visup.rules.geometry import (
     box_overlap,
     grow,
     outline,
-    outline_gap,
 )
 from visup.rules.measure import scale
+from visup.rules.outlines import outline_gap
 from visup.rules.tracks import Track, border_sides, expected_box
 
 FRAGMENTS = "rules.fragments"

@@ -10,10 +10,10 @@ without trusting the centroid of a body that the image border cuts off.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from visup.agent import Region
 
@@ -24,6 +24,8 @@ FAN = 16
 _ANGLES = 2.0 * np.pi * np.arange(FAN) / FAN
 DIRECTIONS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 """(16, 2) unit vectors, evenly round the circle; the opposite of row k is row k + 8 modulo 16."""
+
+_EACH = np.arange(FAN)
 
 OPPOSITE = (np.arange(FAN) + FAN // 2) % FAN
 """Row of the opposite of each of `DIRECTIONS`."""
@@ -82,12 +84,12 @@ def reach(region: Region, frame_size: tuple[int, int]) -> Reach:
         Its reach in each of `DIRECTIONS`.
     """
     points = outline(region)
-    along = points @ DIRECTIONS.T
-    furthest = along.argmax(axis=0)
+    along = DIRECTIONS @ points.T
+    furthest = along.argmax(axis=1)
     x, y = points[furthest].T
     width, height = frame_size
     free = (x > 1.5) & (y > 1.5) & (x < width - 2.5) & (y < height - 2.5)
-    return Reach(along[furthest, np.arange(FAN)], free)
+    return Reach(along[_EACH, furthest], free)
 
 
 def hull_separation(support: Floats) -> Floats:
@@ -104,39 +106,6 @@ def hull_separation(support: Floats) -> Floats:
     """
     least: Floats = (support[:, None, :] + support[:, OPPOSITE]).min(axis=2)
     return -least
-
-
-def outline_gap(a: Region, b: Region, near: float) -> float | None:
-    """Least distance between two outlines, when it is at most `near`.
-
-    Args:
-        a: One region.
-        b: Another.
-        near: Distance beyond which nobody cares, pixels.
-
-    Returns:
-        Pixels, 0 where the masks overlap or the outlines are neighbours (1 pixel apart or less),
-        or None when it is greater than `near`.
-    """
-    if box_gap(a.bbox, b.bbox) > near:
-        return None
-    inside_a = _within(outline(a), b.bbox, near)
-    inside_b = _within(outline(b), a.bbox, near)
-    if len(inside_a) == 0 or len(inside_b) == 0:
-        # One may still lie deep within the other.
-        return 0.0 if masks_overlap(a, b) else None
-    distance = float(cKDTree(inside_b).query(inside_a)[0].min())
-    if distance > 1.5 and masks_overlap(a, b):
-        return 0.0
-    gap = max(0.0, distance - 1.0)
-    return gap if gap <= near else None
-
-
-def _within(points: Floats, box: Box, margin: float) -> Floats:
-    x, y, w, h = box
-    low = np.array([x - margin - 1, y - margin - 1])
-    high = np.array([x + w + margin, y + h + margin])
-    return points[((points >= low) & (points <= high)).all(axis=1)]
 
 
 def masks_overlap(a: Region, b: Region) -> bool:
@@ -173,7 +142,7 @@ def box_gap(a: Box, b: Box) -> float:
     """Distance between two boxes, pixels; 0 where they meet or overlap."""
     dx = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]), 0)
     dy = max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3]), 0)
-    return float(np.hypot(dx, dy))
+    return hypot(dx, dy)
 
 
 def box_overlap(a: Box, b: Box) -> float:
@@ -225,29 +194,6 @@ def moved(region: Region, dx: float, dy: float) -> Region:
         cut=region.cut,
         confidence=region.confidence,
     )
-
-
-def signed_distances(a: Region, b: Region, most: int = 200) -> tuple[float, float]:
-    """How far the outline of one region lies outside another, nearest and farthest point.
-
-    Args:
-        a: A region; of its outline at most `most` points are looked at.
-        b: Another.
-        most: Bound on points.
-
-    Returns:
-        The least and the greatest distance of a's points to b's outline, pixels, negative within b.
-    """
-    points, other = outline(a), dense(outline(b))
-    points = dense(points)
-    points = points[:: -(-len(points) // most)]
-    distance = np.asarray(cKDTree(other).query(points)[0], dtype=float)
-    x, y, w, h = b.bbox
-    at = np.rint(points).astype(int) - (x, y)
-    within = (at >= 0).all(axis=1) & (at[:, 0] < w) & (at[:, 1] < h)
-    within[within] = b.mask[at[within, 1], at[within, 0]]
-    signed = np.where(within, -distance, distance)
-    return float(signed.min()), float(signed.max())
 
 
 def dense(points: Floats, step: float = 2.0) -> Floats:

@@ -59,7 +59,10 @@ class Algebra(Protocol):
         """Times a number that is not negative; also of what `held` gives."""
 
     def added(self, v: Any, w: Any) -> Any:
-        """The sum; also of what `held` gives."""
+        """The sum."""
+
+    def tallied(self, v: Any, w: Any) -> Any:
+        """The sum of what `held` gives, which is never without end."""
 
     def shifted(self, v: Any, by: float) -> Any:
         """A number added to both bounds."""
@@ -109,6 +112,10 @@ class Scalars:
         low, high = v[0] + w[0], v[1] + w[1]
         return (-inf if isnan(low) else low, inf if isnan(high) else high)
 
+    def tallied(self, v: Interval, w: Interval) -> Interval:
+        """See `Algebra`."""
+        return (v[0] + w[0], v[1] + w[1])
+
     def shifted(self, v: Interval, by: float) -> Interval:
         """See `Algebra`."""
         return (v[0] + by, v[1] + by)
@@ -149,6 +156,7 @@ class Arrays:
     choose: Callable[..., Box] = staticmethod(np.where)  # type: ignore[assignment]
     scaled: Callable[[Any, Box, float], Box] = staticmethod(np.multiply)  # type: ignore[assignment]
     shifted: Callable[[Any, Box, float], Box] = staticmethod(np.add)  # type: ignore[assignment]
+    tallied: Callable[[Any, Box, Box], Box] = staticmethod(np.add)  # type: ignore[assignment]
 
     def negated(self, v: Box) -> Box:
         """See `Algebra`."""
@@ -193,7 +201,7 @@ class Arrays:
 def _widened(v: Box) -> Box:
     """What is no number becomes unknown."""
     unknown = v != v  # NaN is not equal to itself
-    if unknown.any():
+    if np.count_nonzero(unknown):
         v[0][unknown[0]] = -inf
         v[1][unknown[1]] = inf
     return v

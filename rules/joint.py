@@ -15,13 +15,17 @@ other begins, have no say.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
+from math import log, sqrt
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from visup.agent import Region
+from visup.agent.changing import replace
 from visup.rules.geometry import Floats, outline
+from visup.rules.outlines import RECENT, ready
 
 POINTS = 96
 """Points of a kept outline."""
@@ -99,7 +103,7 @@ def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]
     x, y = points.T
     free = (x > 3) & (y > 3) & (x < size[0] - 4) & (y < size[1] - 4) & (length > 0)
     for other in others:
-        beside = cKDTree(outline(other)).query(points, distance_upper_bound=BESIDE)[0]
+        beside = ready(other).tree.query(points, distance_upper_bound=BESIDE)[0]
         free &= ~np.isfinite(beside)
     return Kept(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
 
@@ -113,36 +117,81 @@ def evenly(points: Floats, count: int) -> Floats:
     return np.stack([np.interp(at, along, closed[:, k]) for k in (0, 1)], axis=1)
 
 
-def laid_upon(kept: Kept, target: Floats) -> Kept | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """An outline upon which kept ones are laid.
+
+    Attributes:
+        points: (M, 2) pixels; points no further apart than a few pixels.
+        tree: Of these.
+    """
+
+    points: Floats
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, points: Floats) -> Target:
+        """The target with these points."""
+        return cls(points, cKDTree(points))
+
+
+@lru_cache(maxsize=RECENT)
+def target_of(region: Region) -> Target:
+    """The outline of a region as a target; one region is the target of several pairs."""
+    return Target.of(evenly(outline(region), max(POINTS, len(outline(region)))))
+
+
+def laid_upon(kept: Kept, target: Target) -> Kept | None:
     """A kept outline moved onto a later one.
 
     Args:
         kept: The outline, with its shift so far.
-        target: (M, 2) the later outline, pixels; points no further apart than a few pixels.
+        target: The later outline.
 
     Returns:
         The same with the new shift; None when too little of it finds its place.
     """
-    tree = cKDTree(target)
-    shift = np.array(kept.shift)
+    x, y = kept.shift
     for _ in range(4):
-        at = kept.points + shift
-        far, nearest = tree.query(at, distance_upper_bound=REACH)
-        found = np.isfinite(far)
-        if found.sum() < max(LEAST_POINTS, 0.5 * len(at)):
+        at = kept.points + np.array((x, y))
+        far, nearest = target.tree.query(at, distance_upper_bound=REACH)
+        normals, found = kept.normals, far < np.inf
+        if not found.all():
+            at, nearest, normals = at[found], nearest[found], normals[found]
+        if len(at) < max(LEAST_POINTS, 0.5 * len(kept.points)):
             return None
-        normals = kept.normals[found]
-        across = ((target[nearest[found]] - at[found]) * normals).sum(axis=1)
-        weight = 1.0 / np.maximum(np.abs(across), _WILD)
-        square = (normals * weight[:, None]).T @ normals
-        # An outline with but one direction says nothing of motion along it.
-        if np.linalg.cond(square) > 50.0:
+        step = step_across(normals, target.points[nearest] - at)
+        if step is None:
             return None
-        step = np.linalg.solve(square, (normals * (weight * across)[:, None]).sum(axis=0))
-        shift = shift + step
-        if np.abs(step).max() < 0.02:
+        x, y = x + step[0], y + step[1]
+        if max(abs(step[0]), abs(step[1])) < 0.02:
             break
-    return replace(kept, shift=(float(shift[0]), float(shift[1])))
+    return replace(kept, shift=(x, y))
+
+
+def step_across(normals: Floats, off: Floats) -> tuple[float, float] | None:
+    """The move that brings points onto an outline, by weighted least squares across it.
+
+    Args:
+        normals: (N, 2) unit vectors across the outline.
+        off: (N, 2) from each point to its place on the outline, pixels.
+
+    Returns:
+        (x, y) pixels; None where the outline has but one direction, so that nothing is known of
+        motion along it.
+    """
+    nx, ny = normals.T
+    across = off[:, 0] * nx + off[:, 1] * ny
+    weight = 1.0 / np.maximum(np.abs(across), _WILD)
+    wx, wy = weight * nx, weight * ny
+    # Normal equations of two unknowns, solved by hand: they are too small for a library.
+    xx, xy, yy = float(wx @ nx), float(wx @ ny), float(wy @ ny)
+    bx, by = float(wx @ across), float(wy @ across)
+    mean, half = 0.5 * (xx + yy), sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+    if mean + half > 50.0 * (mean - half):  # the ratio of the eigenvalues
+        return None
+    determinant = xx * yy - xy * xy
+    return (yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant
 
 
 def follow(
@@ -170,8 +219,8 @@ def follow(
     apart = regions[0] is not regions[1]
     if joint is None:
         return begun(regions, now, size) if apart else None
-    targets = [evenly(outline(r), max(POINTS, len(outline(r)))) for r in regions]
-    first, second = laid_upon(joint.first, targets[0]), laid_upon(joint.second, targets[1])
+    first = laid_upon(joint.first, target_of(regions[0]))
+    second = laid_upon(joint.second, target_of(regions[1]))
     if first is None or second is None:
         return begun(regions, now, size) if apart else replace(joint, path=())
     x, y = (b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True))
@@ -227,11 +276,17 @@ class Motion:
         Returns:
             At most what the ratio of both speeds allows; no bound below.
         """
-        rest = self.covariance + 0.5 * still**2 * np.eye(2)
-        free = self.covariance + moving**2 * np.eye(2)
-        v = self.velocity
-        near = v @ np.linalg.solve(rest, v) - v @ np.linalg.solve(free, v)
-        return float(0.5 * (np.log(np.linalg.det(free) / np.linalg.det(rest)) - near))
+        (xx, xy), (_, yy) = self.covariance.tolist()
+        vx, vy = self.velocity.tolist()
+
+        def told(variance: float) -> tuple[float, float]:
+            """Determinant of the covariance with more variance, and the velocity's distance by it."""
+            a, c = xx + variance, yy + variance
+            determinant = a * c - xy * xy
+            return determinant, (c * vx * vx - 2.0 * xy * vx * vy + a * vy * vy) / determinant
+
+        (rest, rests), (free, moves) = told(0.5 * still**2), told(moving**2)
+        return 0.5 * (log(free / rest) - (rests - moves))
 
 
 def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
@@ -270,7 +325,14 @@ def _motion(path: Floats, noise: Floats) -> Motion:
     if not len(flow):
         return Motion(slope, spread, span)
     independent = max(1.0, span / LASTS_S)
-    precision = np.linalg.inv(spread)
+    precision = _inverse(spread)
     certain = independent / flow[:, 2].mean() * np.eye(2)
-    spread = np.linalg.inv(precision + certain)
+    spread = _inverse(precision + certain)
     return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread, span)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Of a (2, 2) matrix, by hand: it is too small for a library."""
+    (a, b), (c, d) = matrix.tolist()
+    inverse: Floats = np.array(((d, -b), (-c, a))) / (a * d - b * c)
+    return inverse

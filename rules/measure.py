@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from visup.agent import Mind, ObjectBelief
 from visup.rules.distance import signed_gap
 from visup.rules.fit import binned, common_motion, slope_noise, slopes_of_spans, theil_sen
-from visup.rules.geometry import Floats, outline_gap
+from visup.rules.geometry import Floats
 from visup.rules.history import History, covered
 from visup.rules.judge import JudgeSettings
+from visup.rules.outlines import NEAR, outline_gap
 from visup.rules.pairs import pairs, square
 from visup.rules.parting import parting_speed
 from visup.rules.rcc8 import edge_differences
@@ -289,7 +290,7 @@ class Measuring:
         self, objects: tuple[ObjectBelief, ...], h: History, mind: Mind, before: Measured
     ) -> Floats:
         """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
-        m, near = len(objects), 0.05 * scale(mind.frame_size)
+        m, near = len(objects), NEAR * scale(mind.frame_size)
         i, j = pairs(m)
         unseen = np.array([mind.time - b.last_seen for b in objects])
         longest = np.maximum(unseen[i], unseen[j]) if m else np.zeros(0)

@@ -79,6 +79,7 @@ class Sliding:
         unknown = self.algebra.constant(UNKNOWN)
         pair = self.kind in ("since", "until")
         object.__setattr__(self, "_pair", pair)
+        object.__setattr__(self, "_copies", isinstance(self.algebra, Arrays))
         object.__setattr__(self, "_unknown", (unknown, unknown) if pair else unknown)
 
     def fold(self) -> Fold:
@@ -96,6 +97,10 @@ class Sliding:
     def step(self, state: Slide | None, now: int, *values: Any) -> tuple[Slide, Any]:
         """See `Operator`."""
         fold, unknown = self._fold, self._unknown  # type: ignore[attr-defined]
+        if self._copies:  # type: ignore[attr-defined]
+            # Values may be those of another step (see `Program.step`). Which ones are must not show in
+            # what is kept: going back and forth gives the same states byte for byte.
+            values = tuple([v.copy() for v in values])
         if state is None:
             state = Slide(now, unknown)
         elif now - state[0] > REACH:
@@ -127,14 +132,16 @@ class Ends(NamedTuple):
             as wanted now it is told once they are again.
         broken: (2, ...) whether it is not as wanted now.
         latest: Latest time of `until`.
-        lasting: The interval once that is before the window.
+        shown: (2, ...) where either bound was not as wanted within the window, and
+        result: the interval that follows, both as they were last.
     """
 
     then: int
     until: Any
     broken: Any
     latest: int
-    lasting: Any
+    shown: Any
+    result: Any
 
 
 @dataclass(frozen=True)
@@ -155,30 +162,32 @@ class Lasting:
         """See `Operator`."""
         value = values[0]
         broken = value < 0 if self.kind == "always" else (value > 0)[::-1]
-        state = self._after(state, now, broken)
-        if state.latest <= now - self.high:
-            return state, state.lasting
-        return state, self._result(state.broken | (state.until > now - self.high))
-
-    def _after(self, state: Ends | None, now: int, broken: Any) -> Ends:
         if state is None:
             until = np.full_like(broken, LONG_AGO, dtype=np.int64)
             until[0] = now  # before the first sample nothing is known: it may have been false
-            return Ends(now, until, broken, now, self._result(broken))
-        until, latest = state.until, state.latest
-        # Nearly always all is as it was, and the state but for its time can be shared.
-        same = broken.tobytes() == state.broken.tobytes()
-        if now - state.then > REACH:
-            until = np.where(state.broken, state.then + REACH, until)
-            until[0] = now
             latest = now
-        elif not same:
+        else:
+            # Nearly always all is as it was, and what is not the time can be shared.
+            broken = _shared(broken, state.broken)
+            until, latest = self._ends(state, now, broken)
+        shown = broken if latest <= now - self.high else broken | (until > now - self.high)
+        if state is not None and (shown := _shared(shown, state.shown)) is state.shown:
+            result = state.result
+        else:
+            result = self._result(shown)
+        return Ends(now, until, broken, latest, shown, result), result
+
+    def _ends(self, state: Ends, now: int, broken: Any) -> tuple[Any, int]:
+        """When what ends a run was last there, by the state before and what is so now."""
+        if now - state.then > REACH:
+            until = np.where(state.broken, state.then + REACH, state.until)
+            until[0] = now
+            return until, now
+        if broken is not state.broken:
             over = state.broken & ~broken
-            if over.any():
-                until, latest = np.where(over, now, until), now
-        if same:
-            return Ends(now, until, state.broken, latest, state.lasting)
-        return Ends(now, until, broken, latest, self._result(broken))
+            if np.count_nonzero(over):
+                return np.where(over, now, state.until), now
+        return state.until, state.latest
 
     def _result(self, broken: Any) -> Any:
         low, high = (-np.inf, np.inf) if self.kind == "always" else (np.inf, -np.inf)
@@ -188,14 +197,19 @@ class Lasting:
     @property
     def kept(self) -> int:
         """See `Operator`."""
-        return 3
+        return 4
 
     def rows(self, state: Ends, now: int, pick: Pick) -> Ends:
         """See `Operator`."""
         until = pick(state.until, (state.then + REACH, LONG_AGO))
         broken = pick(state.broken, (True, False))
         latest = int(until.max(initial=LONG_AGO))
-        return Ends(state.then, until, broken, latest, self._result(broken))
+        return Ends(state.then, until, broken, latest, broken, self._result(broken))
+
+
+def _shared(new: Any, old: Any) -> Any:
+    """The old one of two arrays that are the same, so that whoever kept it need not keep both."""
+    return old if new.shape == old.shape and new.tobytes() == old.tobytes() else new
 
 
 class SoFarState(NamedTuple):
@@ -306,8 +320,8 @@ class Counting:
         start = state.clock - self.span
         queue, begin = state.queue.advance(start, state.begin)
         moment, (total, rate) = begin
-        before = a.added(total, a.scaled(rate, float(start - moment)))
-        counted = a.added(state.total, a.scaled(before, -1.0))
+        before = a.tallied(total, a.scaled(rate, float(start - moment)))
+        counted = a.tallied(state.total, a.scaled(before, -1.0))
         # Counted in whole samples or microseconds, so that what just suffices is told exactly.
         over = a.shifted(counted, -self.least if self.samples else -round(self.least * self.span))
         share = over if self.samples else a.scaled(over, 1.0 / self.span)
@@ -317,10 +331,10 @@ class Counting:
         """The tally with a sample: of samples it counts at once, of time while it stands."""
         a = self.algebra
         if self.samples:
-            clock, total, rate = clock + 1, a.added(state.total, held), a.constant((0.0, 0.0))
+            clock, total, rate = clock + 1, a.tallied(state.total, held), a.constant((0.0, 0.0))
         else:
             passed = a.scaled(state.rate, float(clock - state.clock))
-            total, rate = a.added(state.total, passed), held
+            total, rate = a.tallied(state.total, passed), held
         queue = state.queue.push(clock, (total, rate))
         return Tally(now, clock, state.born, total, rate, state.begin, queue)
 

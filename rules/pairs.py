@@ -22,6 +22,18 @@ def pairs(m: int) -> tuple[Indices, Indices]:
     return first, second
 
 
+def of_pairs(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The values of all pairs of an (m, m) table as (P,), the first of each pair the row."""
+    return table.take(_places(len(table)))
+
+
+@lru_cache(maxsize=128)
+def _places(m: int) -> Indices:
+    """Where pairs stand in an (m, m) table; a lookup by one number is quicker than by two."""
+    first, second = pairs(m)
+    return first * m + second
+
+
 @lru_cache(maxsize=32)
 def carried(old: tuple[int, ...], new: tuple[int, ...]) -> tuple[Indices, Indices]:
     """Where objects, and pairs of them, stood among others.

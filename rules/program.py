@@ -105,22 +105,42 @@ class Program:
     Attributes:
         algebra: Of the intervals.
         runs: The steps.
+        reads: For each step the two steps (or twice the one) from which alone its value follows, or
+            None: it looks something up, or remembers.
         operators: What remembers, with the axes of its objects, in the order of their states.
         looks: What is looked up, each with its axes.
     """
 
     algebra: Any
     runs: list[Run] = field(default_factory=list)
+    reads: list[tuple[int, int] | None] = field(default_factory=list)
     operators: list[tuple[Operator, frozenset[int]]] = field(default_factory=list)
     looks: list[tuple[Predicate | Measure, tuple[int, ...]]] = field(default_factory=list)
     places: dict[Hashable, int] = field(default_factory=dict)
 
-    def step(self, moment: Moment) -> list[Any]:
-        """Run all steps at one sample; the states after it are left in `moment.after`."""
+    def step(self, moment: Moment, known: list[Any] | None = None) -> list[Any]:
+        """Run all steps at one sample; the states after it are left in `moment.after`.
+
+        Args:
+            moment: The sample.
+            known: Values of another sample of the same objects. What follows from the very same
+                arrays as there is what it was there, and is not worked out again.
+        """
         values: list[Any] = []
         put = values.append
-        for run in self.runs:
-            put(run(values, moment))
+        if known is None:
+            for run in self.runs:
+                put(run(values, moment))
+            return values
+        for run, reads, before in zip(self.runs, self.reads, known, strict=True):
+            if (
+                reads is not None
+                and values[reads[0]] is known[reads[0]]
+                and values[reads[1]] is known[reads[1]]
+            ):
+                put(before)
+            else:
+                put(run(values, moment))
         return values
 
     @property
@@ -128,10 +148,13 @@ class Program:
         """The states before the first sample."""
         return (None,) * len(self.operators)
 
-    def add(self, key: Hashable, run: Callable[[], Run]) -> int:
-        """The step of that key, made when there is none yet."""
+    def add(
+        self, key: Hashable, run: Callable[[], Run], reads: tuple[int, int] | None = None
+    ) -> int:
+        """The step of that key, made when there is none yet; see `reads`."""
         if key not in self.places:
             self.runs.append(run())
+            self.reads.append(reads)
             self.places[key] = len(self.runs) - 1
         return self.places[key]
 
@@ -242,7 +265,7 @@ class Compiler:
                 return lambda values, m: function(values[one])
             return lambda values, m: function(values[one], values[other])
 
-        step = self.program.add((key, *(p.step for p in at)), run)
+        step = self.program.add((key, *(p.step for p in at)), run, (one, other))
         axes = frozenset[int]().union(*(p.axes for p in at))
         return Place(step, at[0].delay, axes, all(p.certain for p in at))
 
@@ -368,7 +391,7 @@ class Compiler:
         at = self.formula(node.part, (*scope, (node.variable, node.may_repeat)))
         apart = () if node.may_repeat else tuple(i for i, (_, r) in enumerate(scope) if not r)
         empty = -inf if node.kind == "exists" else inf
-        reduce = np.max if node.kind == "exists" else np.min
+        reduce = (np.maximum if node.kind == "exists" else np.minimum).reduce
 
         def run() -> Run:
             source = at.step
@@ -384,6 +407,6 @@ class Compiler:
 
             return quantify
 
-        step = self.program.add((node.kind, at.step, axis, apart), run)
+        step = self.program.add((node.kind, at.step, axis, apart), run, (at.step, at.step))
         axes = (at.axes | frozenset(apart)) - {axis}
         return Place(step, at.delay, axes, at.certain)

@@ -79,8 +79,7 @@ class Ask:
             waiting += [question] if question else []
             if doubt != Doubtful():
                 doubts[belief.id] = doubt
-        mind = replace(mind, questions=tuple(waiting))
-        mind = mind.remember(QUESTIONS, MappingProxyType(doubts))
+        mind = mind.remember(QUESTIONS, MappingProxyType(doubts), questions=tuple(waiting))
         events = tuple(_event(q, observation) for q in asked)
         return Outcome(mind, events, directives=tuple(_directives(waiting)))
 

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Region
-from visup.rules.geometry import RCC8, Floats, signed_distances
+from visup.rules.geometry import RCC8, Floats
 from visup.rules.latch import ABOVE, BELOW, UNKNOWN, WITHIN, Codes
+from visup.rules.outlines import signed_distances
 from visup.rules.pairs import Indices, pairs
 
 DC, EC, PO, EQ, TPP, NTPP, TPPI, NTPPI = range(8)

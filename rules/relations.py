@@ -60,7 +60,7 @@ from visup.rules.judge import (
 )
 from visup.rules.latch import UNKNOWN, Codes, Latch, hold_sign, step, unknown_latch
 from visup.rules.measure import Measured, Measuring, RelationSettings, at_rest, scale
-from visup.rules.pairs import carried, pairs
+from visup.rules.pairs import carried, of_pairs, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import (
     CONVERSE,
@@ -207,7 +207,7 @@ class Relations:
             rcc8 = step(rcc8, held, mind.time, 0.0)
         kept = Kept(history, now, latch, rcc8, smooth)
         table = RelationTable(now.ids, self._columns(kept, mind))
-        return Outcome(replace(mind, relations=table).remember(RELATIONS, kept))
+        return Outcome(mind.remember(RELATIONS, kept, relations=table))
 
     def _durations(self) -> Floats:
         s = self.settings
@@ -225,13 +225,12 @@ class Relations:
         mind: Mind,
     ) -> Codes:
         s, diagonal = self.settings, scale(mind.frame_size)
-        i, j = pairs(len(now.ids))
-        codes = np.empty((ROWS, len(i)), dtype=np.int8)
+        codes = np.empty(before.state.shape, dtype=np.int8)
         q = quantities(smooth.boxes, now.velocity, now.velocity_sigma, s.judge.noise_px)
         codes[:JUDGED] = wanted(before.state[:JUDGED], q, s.judge, diagonal)
         image = wanted_trend(
-            now.rate[i, j],
-            now.rate_sigma[i, j],
+            of_pairs(now.rate),
+            of_pairs(now.rate_sigma),
             before.state[TREND],
             before.pending[TREND],
             s.rate_enter * diagonal,
@@ -260,8 +259,7 @@ class Relations:
         boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
         boxes[[mind.time - b.last_seen > s.hold_s for b in objects]] = np.nan
         jump = 6.0 * s.judge.noise_px
-        i, j = pairs(len(objects))
-        gap = smoothed(before.gap, now.gap[i, j], seconds, jump * np.sqrt(2.0))
+        gap = smoothed(before.gap, of_pairs(now.gap), seconds, jump * np.sqrt(2.0))
         diagonal = scale(mind.frame_size)
         near = gap <= 2.0 * s.judge.level_enter * diagonal
         regions = [b.region for b in objects]
@@ -279,7 +277,10 @@ class Relations:
         codes = np.full(len(i), UNKNOWN, dtype=np.int8)
         if len(i) == 0 or not covered(h, self.settings.window_s):
             return codes
-        known = np.isfinite(h.depth).mean(axis=0) >= 0.6
+        found_at = np.isfinite(h.depth)
+        if not found_at.any():
+            return codes
+        known = found_at.mean(axis=0) >= 0.6
         at = np.flatnonzero(known[i] & known[j])
         if len(at) == 0:
             return codes
@@ -311,10 +312,9 @@ class Relations:
         held = before == 1
         least = 2 * s.still_speed * diagonal * np.where(held, s.moving_exit, 1.0)
         moves = np.minimum(now.speed[i], now.speed[j]) > least
-        rest = at_rest(now, s, diagonal, diagonal * s.together_exit)
-        rest = rest[0][i, j] | (held & rest[1][i, j])
-        wanted: Codes = (rest & moves).astype(np.int8)
-        wanted[np.isnan(now.relative_speed[i, j])] = UNKNOWN
+        rest, nearly = at_rest(now, s, diagonal, diagonal * s.together_exit)[:, i, j]
+        wanted: Codes = ((rest | (held & nearly)) & moves).view(np.int8)
+        wanted[np.isnan(of_pairs(now.relative_speed))] = UNKNOWN
         return wanted
 
     def _columns(self, kept: Kept, mind: Mind) -> tuple[Column, ...]:
@@ -322,12 +322,13 @@ class Relations:
         i, j = pairs(len(now.ids))
         known = np.isfinite(now.depth)
         cap = np.where(known[i] & known[j], 1.0, self.settings.image_only_confidence)[None]
-        gap, rate = now.gap[i, j][None], now.rate[i, j][None]
-        sigma = now.rate_sigma[i, j][None]
-        relative = now.relative_speed[i, j][None]
+        gap, rate = of_pairs(now.gap)[None], of_pairs(now.rate)[None]
+        sigma = of_pairs(now.rate_sigma)[None]
+        relative = of_pairs(now.relative_speed)[None]
         sure, certain = np.ones((2, len(i))), np.minimum(cap, 0.9)
+        each = certain.repeat(2, axis=0)
         trend = np.minimum(cap, self._trend_confidence(rate, sigma, mind))
-        there = np.where(np.isnan(gap), UNKNOWN, 0).astype(np.int8)
+        there: Codes = np.where(np.isnan(gap), np.int8(UNKNOWN), np.int8(0))
 
         def column(
             names: tuple[str, ...],
@@ -342,29 +343,25 @@ class Relations:
                 names, latch.state[rows], latch.since[rows], confidence, value, sigma, listed
             )
 
-        def boxes(names: tuple[str, ...], row: int, listed: str) -> Column:
-            code, since = kept.rcc8.state[row], kept.rcc8.since[row]
-            state, since = np.stack([code, CONVERSE[code]]), np.stack([since, since])
+        def with_converse(
+            names: tuple[str, ...], of: Latch, row: int, converse: Codes, listed: str
+        ) -> Column:
+            code, since = of.state[row], of.since[row]
+            state, since = np.array((code, converse[code])), np.array((since, since))
             return Column(names, state, since, sure, listed=listed)
 
-        cardinal, since = latch.state[DIRECTION], latch.since[DIRECTION]
         return (
             column(TREND_NAMES, TREND, trend, rate, sigma, "each"),
             column(("", "touching"), TOUCH, certain, gap, listed="each"),
             column(("", "moving_together"), TOGETHER, certain, relative, listed="each"),
-            boxes(RCC8, 0, "one"),
+            with_converse(RCC8, kept.rcc8, 0, CONVERSE, "one"),
             Column(("distance",), there, np.full_like(gap, mind.time), sure, gap, listed="each"),
-            boxes(OUTLINE_NAMES, 1, "none"),
+            with_converse(OUTLINE_NAMES, kept.rcc8, 1, CONVERSE, "none"),
             column(DEPTH_NAMES, DEPTH, certain),
-            column(TOWARDS_NAMES, AWAY, np.repeat(certain, 2, axis=0)),
-            column(SIDE_NAMES, SIDE, np.repeat(certain, 2, axis=0)),
+            column(TOWARDS_NAMES, AWAY, each),
+            column(SIDE_NAMES, SIDE, each),
             column(CLASS_NAMES, DISTANCE, sure, gap),
-            Column(
-                DIRECTION_NAMES,
-                np.stack([cardinal, DIRECTION_CONVERSE[cardinal]]),
-                np.stack([since, since]),
-                sure,
-            ),
+            with_converse(DIRECTION_NAMES, latch, DIRECTION, DIRECTION_CONVERSE, "each"),
         )
 
     def _trend_confidence(self, rate: Floats, sigma: Floats, mind: Mind) -> Floats:

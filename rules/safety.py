@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
-from visup.agent.changing import replace
+from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief
 from visup.rules.explain import evidence
-from visup.rules.facts import Facts
+from visup.rules.facts import YES, Facts
 from visup.rules.formula import Rule
 from visup.rules.operators import SPACING
+from visup.rules.ruled import Ruled, ruled
 from visup.rules.sentences import sentence, with_names
 from visup.rules.units import ticks
-from visup.rules.verdicts import Ruled, States, Values, rerowed, ruled
+from visup.rules.verdicts import States, Values, rerowed
 
 SAFETY = "rules.safety"
 MOST_RETOLD = 3
@@ -72,10 +72,13 @@ class RuleThinker:
 
     rules: tuple[Rule, ...]
     _prepared: Ruled = field(init=False, repr=False, compare=False)
+    _latest: list[Values] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # Rules are long trees: to look up by them what was prepared costs as much as a rule.
         object.__setattr__(self, "_prepared", ruled(self.rules))
+        # The values of the latest step, whoever's it was, to save work: nothing else hangs on it.
+        object.__setattr__(self, "_latest", [])
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
@@ -88,7 +91,8 @@ class RuleThinker:
         before = prepared.program.fresh if old.now is None else old.after
         if old.now is not None and old.ids != facts.ids:
             before = rerowed(prepared, before, now, old.ids, facts.ids)
-        values = Values(prepared, facts, now, before)
+        values = Values(prepared, facts, now, before, self._latest[0] if self._latest else None)
+        self._latest[:] = [values]
         held, cooling = _concerns(self.rules, values, old)
         mind = mind.remember(
             SAFETY,
@@ -117,7 +121,8 @@ def _concerns(
     retold = sorted(standing, key=lambda key: old.held[key].told)[:MOST_RETOLD]
     for key, (rule, ids) in found.items():
         if key in old.held and key not in retold:
-            held[key] = replace(old.held[key], until=_until(rule, now))
+            before = old.held[key]
+            held[key] = Held(before.concern, _until(rule, now), before.told)
         elif key not in cooling:
             held[key] = _raised(rule, ids, values, old.held.get(key))
     rests = {rule.name: rule.cooldown.base for rule in rules if rule.cooldown is not None}
@@ -134,7 +139,8 @@ def _concerns(
 def _raised(rule: Rule, ids: tuple[int, ...], values: Values, before: Held | None) -> Held:
     """One concern for each set of objects; its order stays as it was when it was raised."""
     mind = values.facts.mind
-    objects = ids if before is None else before.concern.objects
+    # Made anew, as the ids may be shared with another step (see `Sliding.step`).
+    objects = (*ids,) if before is None else before.concern.objects
     words = with_names(rule.say, rule.variables)
     cause = sentence(mind, words, *objects, confidence=confidence(rule, ids, values))
     concern = Concern(rule.name, objects, rule.severity, cause, evidence(rule, ids, values))
@@ -147,11 +153,11 @@ def _until(rule: Rule, now: float) -> float:
 
 def confidence(rule: Rule, ids: tuple[int, ...], values: Values) -> float:
     """The least confidence of the relations that `when` names of these objects and that are true."""
-    objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
-    found = [
-        r.confidence
-        for call in values.prepared.related(rule)
-        if (r := mind.relation(call.name, *[objects[w] for w in call.words])) is not None
-        if r.truth is Truth.TRUE
-    ]
+    objects, facts = dict(zip(rule.variables, ids, strict=True)), values.facts
+    found = []
+    for call in values.prepared.related(rule):
+        a, b = (objects[w] for w in call.words)
+        if facts.related(call.name)[facts.row[a], facts.row[b]] == YES:
+            relation = facts.mind.relation(call.name, a, b)
+            found += [relation.confidence] if relation else []
     return min(found, default=1.0)

@@ -84,24 +84,28 @@ class Tracks:
     of: Mapping[int, Track] = field(default_factory=lambda: MappingProxyType({}))
 
 
+NO_TRACKS = Tracks()
+
+
 def tracks(mind: Mind) -> Tracks:
     """The tracks that the mind remembers."""
-    found: Tracks = mind.memory.get(TRACKS, Tracks())
+    found: Tracks = mind.memory.get(TRACKS, NO_TRACKS)
     return found
 
 
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
     """Pairs of objects that are seen as one region now."""
-    of = sorted(tracks(mind).of.items())
-    return tuple((i, t.merged_with) for i, t in of if t.merged_with is not None)
+    found = [(i, t.merged_with) for i, t in tracks(mind).of.items() if t.merged_with is not None]
+    return tuple(sorted(found))
 
 
 def visible_share(mind: Mind, object_id: int) -> float:
     """Share of an object in sight, 0 to 1; 1 while nothing is known, 0 while it is in a merged region."""
-    track = tracks(mind).of.get(object_id)
+    of = tracks(mind).of
+    track = of.get(object_id)
     if track is None:
         return 1.0
-    merged = any(object_id in pair for pair in merged_pairs(mind))
+    merged = track.merged_with is not None or any(t.merged_with == object_id for t in of.values())
     return 0.0 if merged else track.visible
 
 

@@ -36,16 +36,15 @@ def wanted_trend(
     Returns:
         (P,) codes; a rate between the thresholds leaves things as they are.
     """
-    sign = np.where(rate < 0, CONVERGING, DIVERGING)
+    sign = np.where(rate < 0, np.int8(CONVERGING), np.int8(DIVERGING))
     least = np.where(pending == sign, sigmas[1], sigmas[0]) * sigma
     strong = np.abs(rate) > np.maximum(enter, least)
     weak = np.abs(rate) < leave
-    wanted = before.copy()
-    moving = (before == CONVERGING) | (before == DIVERGING)
-    turned = ((before == CONVERGING) & (rate > 0)) | ((before == DIVERGING) & (rate < 0))
     # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
-    wanted[~strong & (weak | turned | ~moving)] = KEEPING
-    wanted[strong] = sign[strong].astype(np.int8)
+    goes_on = (before == CONVERGING) & (rate <= 0)
+    goes_on |= (before == DIVERGING) & (rate >= 0)
+    weakly = np.where(goes_on & ~weak, before, np.int8(KEEPING))
+    wanted: Codes = np.where(strong, sign, weakly)
     wanted[~np.isfinite(rate)] = UNKNOWN
     return wanted
 
@@ -61,6 +60,8 @@ def with_depth(image: Codes, depth: Codes) -> Codes:
         The image's trend where the depth agrees, keeps or is unknown; the depth's where the image
         keeps its distance; UNKNOWN where they contradict each other.
     """
+    if (depth == UNKNOWN).all():
+        return image
     joined = image.copy()
     by_depth = (image == KEEPING) & (depth != UNKNOWN)
     joined[by_depth] = depth[by_depth]

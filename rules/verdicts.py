@@ -2,146 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial
-from itertools import combinations
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.rules.bounds import variables_of
-from visup.rules.facts import RELATION_NAMES, Facts
-from visup.rules.formula import Formula, Predicate, Rule, calls, mark, named
+from visup.rules.facts import Facts
+from visup.rules.formula import Predicate, Rule
 from visup.rules.inputs import blind
-from visup.rules.intervals import Arrays, Box
+from visup.rules.intervals import Box
 from visup.rules.operators import Pick
-from visup.rules.program import Compiler, Moment, Place, Program, Scope
-from visup.rules.terms import Measure, Term
-from visup.rules.vocabulary import RULES, Quantity, Word
+from visup.rules.program import Moment, Place
+from visup.rules.ruled import FactKey, Ruled, asked
+from visup.rules.terms import Measure
 
 TRUTHS = np.array([[-np.inf, -np.inf, np.inf], [-np.inf, np.inf, np.inf]])
 """Intervals of what is false, unknown, true; by code + 1."""
 States = tuple[Any, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Fact:
-    """A fact that rules look up.
-
-    Attributes:
-        key: By which a step finds it.
-        codes: Of all objects.
-        axes: Axes of its objects.
-        name: Its word.
-    """
-
-    key: tuple[int, tuple[int, ...]]
-    codes: Callable[[Facts], Any]
-    axes: tuple[int, ...]
-    name: str
-
-
-def _asked(node: Predicate | Measure) -> Callable[[Facts], Any]:
-    """What a fact or quantity looks at, with those of its arguments that are no objects."""
-    fact = isinstance(node, Predicate)
-    word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
-    others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
-    return partial(_look, word.look, others) if others else word.look
-
-
-def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
-    return look(facts, *others)
-
-
-@dataclass(frozen=True, eq=False)
-class Ruled:
-    """Rules made ready to run.
-
-    Attributes:
-        rules: The rules.
-        compiler: Knows where the value of every formula is found.
-        places: Of each rule: `when`, and `unless` if there is one.
-    """
-
-    rules: tuple[Rule, ...]
-    compiler: Compiler
-    places: tuple[tuple[Place, ...], ...]
-    _placed: dict[tuple[int, Scope], Place] = field(default_factory=dict, repr=False)
-    _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
-    _texts: dict[tuple[int, tuple[str, ...]], str] = field(default_factory=dict, repr=False)
-
-    @property
-    def program(self) -> Program:
-        """All steps of all rules."""
-        return self.compiler.program
-
-    def place(self, node: Formula | Term, scope: Scope) -> Place:
-        """Where the value of a part of these rules is found."""
-        key = (id(node), scope)
-        if key not in self._placed:
-            self._placed[key] = (
-                self.compiler.term(node, scope)
-                if isinstance(node, Term)
-                else self.compiler.formula(node, scope)
-            )
-        return self._placed[key]
-
-    def related(self, rule: Rule) -> tuple[Predicate, ...]:
-        """The relations between its objects that the `when` of one of these rules names."""
-        if id(rule) not in self._related:
-            self._related[id(rule)] = tuple(
-                call
-                for call in calls(rule.when)
-                if isinstance(call, Predicate) and call.name in RELATION_NAMES
-                if set(call.words) <= set(rule.variables)
-            )
-        return self._related[id(rule)]
-
-    def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
-        """The source of a part of these rules, with marks where its variables stand."""
-        key = (id(node), variables)
-        if key not in self._texts:
-            self._texts[key] = str(named(node, {v: mark(v) for v in variables}))
-        return self._texts[key]
-
-    @cached_property
-    def relations(self) -> tuple[str, ...]:
-        """Relations that the rules name."""
-        named = {n.name for n, _ in self.program.looks if n.name in RELATION_NAMES}
-        return tuple(sorted(named))
-
-    @cached_property
-    def verdicts(self) -> tuple[tuple[Rule, tuple[Place, ...], tuple[tuple[int, int], ...]], ...]:
-        """Each rule with its places, and the pairs of its variables that must not be one object."""
-        return tuple(
-            (rule, places, tuple(_apart(rule)))
-            for rule, places in zip(self.rules, self.places, strict=True)
-        )
-
-    @cached_property
-    def facts(self) -> tuple[Fact, ...]:
-        """What the rules look up that is true, false or unknown."""
-        looks = ((node, axes) for node, axes in self.program.looks if isinstance(node, Predicate))
-        return tuple(Fact((id(node), axes), _asked(node), axes, node.name) for node, axes in looks)
-
-
-def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
-    once = [i for i, v in enumerate(rule.variables) if v not in rule.may_repeat]
-    return combinations(once, 2)
-
-
-@lru_cache(maxsize=16)
-def ruled(rules: tuple[Rule, ...]) -> Ruled:
-    """Rules made ready to run; the same object for the same rules."""
-    compiler = Compiler(Arrays(max(map(variables_of, rules), default=0)))
-    return Ruled(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
-
-
-def scope_of(rule: Rule) -> Scope:
-    """The variables of a rule by axis."""
-    return tuple((v, v in rule.may_repeat) for v in rule.variables)
 
 
 class Values:
@@ -152,38 +30,48 @@ class Values:
         facts: The mind.
         now: Microseconds.
         before: States of the operators before, for the objects of `facts`.
+        known: Values of another step, such as the last one. What is the same now as it was there
+            is not worked out again, whichever step it is.
 
     Attributes:
         after: States after.
     """
 
-    def __init__(self, prepared: Ruled, facts: Facts, now: int, before: States) -> None:
-        self.prepared = prepared
-        self.facts = facts
+    def __init__(
+        self, prepared: Ruled, facts: Facts, now: int, before: States, known: Values | None = None
+    ) -> None:
+        self.prepared: Ruled = prepared
+        self.facts: Facts = facts
         self.axes = prepared.compiler.algebra.axes
         self._same: dict[tuple[int, int], NDArray[np.bool_]] = {}
         self._shapes: dict[tuple[int, ...], tuple[int, ...]] = {}
-        facts.relate(prepared.relations)
-        self._found = self._truths()
+        self._codes: dict[FactKey, bytes | None] = {}
+        if known is not None and (known.prepared, known.facts.ids) != (prepared, facts.ids):
+            known = None
+        self._before: Mapping[FactKey, Box] = known._found if known else {}
+        self._found: dict[FactKey, Box] = self._truths(known)
         moment = Moment(now, before, self._look, self._same_object)
-        self._values: list[Box] = prepared.program.step(moment)
+        self._values: list[Box] = prepared.program.step(moment, known._values if known else None)
+        self._true = self._judged(known)
+        self._before = {}  # values of one step do not keep those of all steps before alive
         self.after: States = tuple(moment.after)
 
-    def _truths(self) -> dict[tuple[int, tuple[int, ...]], Box]:
-        """All facts at once, since there are dozens of small ones."""
-        facts, wanted = self.facts, self.prepared.facts
-        if not wanted:
-            return {}
+    def _truths(self, known: Values | None) -> dict[FactKey, Box]:
+        """All facts; there are dozens of them, of which few change in a step."""
+        facts = self.facts
         facts.relate(self.prepared.relations)
-        codes = [fact.codes(facts).ravel() for fact in wanted]
-        whole = TRUTHS.take(np.concatenate(codes) + 1, axis=1)
-        found, end = {}, 0
-        for fact, code in zip(wanted, codes, strict=True):
-            begin, end = end, end + len(code)
-            value = whole[:, begin:end]
-            if blind(facts.mind, fact.name):
-                value = _nothing_known(value)
-            found[fact.key] = self._laid(value, fact.axes)
+        found = {}
+        for fact in self.prepared.facts:
+            codes = fact.codes(facts)
+            told = None if blind(facts.mind, fact.name) else codes.tobytes()
+            self._codes[fact.key] = told
+            if known is not None and known._codes[fact.key] == told:
+                found[fact.key] = known._found[fact.key]
+                continue
+            value = TRUTHS.take(codes + 1, axis=1)
+            found[fact.key] = self._laid(
+                _nothing_known(value) if told is None else value, fact.axes
+            )
         return found
 
     def _look(self, node: Predicate | Measure, axes: tuple[int, ...]) -> Box:
@@ -191,10 +79,15 @@ class Values:
         found = self._found.get((id(node), axes))
         if found is not None:
             return found
-        value: Box = _asked(node)(self.facts)
-        return self._laid(
+        value: Box = asked(node)(self.facts)
+        value = self._laid(
             _nothing_known(value) if blind(self.facts.mind, node.name) else value, axes
         )
+        before = self._before.get((id(node), axes))
+        if before is not None and value.tobytes() == before.tobytes():
+            value = before  # what follows from it need not be worked out again
+        self._found[id(node), axes] = value
+        return value
 
     def _laid(self, value: Box, axes: tuple[int, ...]) -> Box:
         """(2, ...) values of one or two objects along the axes of these."""
@@ -223,14 +116,24 @@ class Values:
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
-        values = self._values
-        for rule, places, apart in self.prepared.verdicts:
-            holds = values[places[0].step][0] > 0
-            if not holds.any():
+        for (rule, _, _), chosen in zip(self.prepared.verdicts, self._true, strict=True):
+            for ids in chosen:
+                yield rule, ids
+
+    def _judged(self, known: Values | None) -> list[tuple[tuple[int, ...], ...]]:
+        """For each rule the choices of objects for which it is true and not suspended."""
+        values, found = self._values, []
+        for k, (rule, places, apart) in enumerate(self.prepared.verdicts):
+            if known is not None and all(values[p.step] is known._values[p.step] for p in places):
+                found.append(known._true[k])
                 continue
+            holds = values[places[0].step][0] > 0
             if len(places) > 1:
                 holds = holds & ~(values[places[1].step][0] > 0)
-            yield from ((rule, ids) for ids in self._choices(rule, holds, apart))
+            # The quickest way to ask whether any of a few holds.
+            choices = self._choices(rule, holds, apart) if np.count_nonzero(holds) else ()
+            found.append(tuple(choices))
+        return found
 
     def _choices(
         self, rule: Rule, holds: NDArray[np.bool_], apart: tuple[tuple[int, int], ...]

@@ -189,6 +189,8 @@ def healthy(facts: Facts) -> Codes:
 def depth_difference(facts: Facts) -> Floats:
     """Difference of depth as a share of the smaller one; both depths within their deviations."""
     depth = facts.one("depth")
+    if not (depth == depth).any():  # NaN is not equal to itself
+        return facts.unknown(2)
     spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
     apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
     least = np.minimum(depth[:, None], depth[None])
@@ -204,6 +206,8 @@ def spin(facts: Facts) -> Floats:
     """
     poses = (b.pose for b in facts.beliefs)
     found = [None if p is None or p.confidence < SURE_POSE else p.spin for p in poses]
+    if not any(found):
+        return facts.unknown(1)
     rate = np.array([np.nan if s is None else s.rate for s in found], dtype=float)
     sigma = np.array([0.0 if s is None else SIGMAS * s.sigma for s in found], dtype=float)
     return between(np.maximum(rate - sigma, 0.0), rate + sigma)

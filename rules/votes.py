@@ -184,7 +184,8 @@ def count(
     Returns:
         Votes after, most first.
     """
-    votes = {name: v * exp(-dt / tau) for name, v in tally}
+    fade = exp(-dt / tau)
+    votes = {name: v * fade for name, v in tally}
     for name, weight in new.items():
         votes[name] = votes.get(name, 0.0) + visible * weight
     ranked = sorted(votes.items(), key=lambda item: (-item[1], item[0]))

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Region
 from visup.agent.changing import replace
 from visup.rules.fragments import Doubt
-from visup.rules.geometry import box_gap, outline_gap
+from visup.rules.geometry import box_gap
+from visup.rules.measure import scale
+from visup.rules.outlines import NEAR, outline_gap
 from visup.rules.sentences import sentence
 from visup.rules.tracks import Track
 
@@ -103,6 +105,9 @@ class Work:
 
     def near(self, a: Region, b: Region) -> bool:
         """Whether two regions are so close that one may hide a part of the other."""
-        if box_gap(a.bbox, b.bbox) > self.settings.contact_px:
+        contact = self.settings.contact_px
+        if box_gap(a.bbox, b.bbox) > contact:
             return False
-        return outline_gap(a, b, self.settings.contact_px) is not None
+        # As far as relations look in the same step, so that the gap is worked out once.
+        gap = outline_gap(a, b, max(contact, NEAR * scale(self.mind.frame_size)))
+        return gap is not None and gap <= contact

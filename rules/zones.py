@@ -19,7 +19,7 @@ The mind's relations hold the same as `inside NAME`, `reaching NAME` and `wholly
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +117,7 @@ class SeeZones:
             for i in ids
             for question in QUESTIONS
         )
-        return Outcome(replace(mind, relations=mind.relations + told).remember(ZONES, kept))
+        return Outcome(mind.remember(ZONES, kept, relations=mind.relations + told))
 
     def _before(
         self, old: Kept, ids: tuple[int, ...], names: tuple[str, ...], now: float

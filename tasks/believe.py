@@ -245,21 +245,11 @@ def _expected(
     follower: Follower, scene: Scene, readings: tuple[Reading, ...]
 ) -> tuple[Expectation, ...]:
     """What is under way asks for, and the entry to what may come next; each told once."""
-    wanted: dict[Expectation, None] = {}
-    now = scene.mind.time
-    for reading in readings:
-        for leaf in leaves(reading.state):
-            meaning = follower.actions[leaf.step.action]
-            names = (meaning.name, *meaning.holds, *meaning.expects)
-            wanted.update(_asked(scene, leaf.step, names))
-        for way in follower.onward(reading, now):
-            for step in way.entered:
-                wanted.update(_asked(scene, step, follower.actions[step.action].begins))
-    return tuple(wanted)
-
-
-def _asked(scene: Scene, step: Step, names: tuple[str, ...]) -> dict[Expectation, None]:
-    if not scene.found(step.actors):
-        return {}
-    objects = scene.objects(step.actors)
-    return {Expectation(n, objects): None for n in names}
+    asked = dict.fromkeys(a for r in readings for a in follower.asked_for(r.node))
+    wanted = (
+        Expectation(name, scene.objects(actors))
+        for actors, names in asked
+        if scene.found(actors)
+        for name in names
+    )
+    return tuple(dict.fromkeys(wanted))

@@ -67,7 +67,7 @@ class Foresight:
             likely = chance * share
             if likely < SMALLEST or depth > 60:
                 continue
-            entered = [s.stage for s in _new(self._automaton, way)]
+            entered = [s.stage for s in begun_by(self._automaton, way)]
             fresh = dict.fromkeys(s for s in entered if s not in here)
             for stage in fresh:
                 found[stage] = found.get(stage, 0.0) + likely
@@ -100,11 +100,11 @@ class Foresight:
     def _after(self, way: Way, hopes: Mapping[int, float]) -> float:
         if way.target == END:
             return 1.0
-        fates = (self._process.fate(s, WAITING) for s in _new(self._automaton, way))
+        fates = (self._process.fate(s, WAITING) for s in begun_by(self._automaton, way))
         return hopes.get(way.target, 0.0) * math.prod(fates)
 
 
-def _new(automaton: Automaton, way: Way) -> list[Step]:
+def begun_by(automaton: Automaton, way: Way) -> list[Step]:
     """The steps that begin by a way."""
     steps = automaton.steps(way.target)
     return [s for s, c in zip(steps, way.carried, strict=True) if c < 0]

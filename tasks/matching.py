@@ -56,26 +56,44 @@ def match(
     objects = [b for _, b in sorted(mind.objects.items()) if _eligible(b, held)]
     if not actors or not objects:
         return tuple(Binding(a, m) for a, m in zip(actors, models, strict=True))
-    pure = np.array([[strength(o, m) for o in objects] for m in models])
-    weight = pure.copy()
-    for i, actor in enumerate(actors):
-        if actor in current:
-            weight[i] *= CURRENT_BONUS
-        for j, belief in enumerate(objects):
-            if held.get(actor) == belief.id:
-                weight[i, j] = _held_weight(weight[i, j], belief, settings)
-    weight[weight < settings.bind_at] = 0.0
-    chosen = {
-        i: j
-        for i, j in zip(*linear_sum_assignment(weight, maximize=True), strict=True)
-        if weight[i, j] > 0.0
-    }
+    pure = [[strength(o, m) for o in objects] for m in models]
+    weight = [
+        _weights(row, objects, held.get(actor), actor in current, settings)
+        for row, actor in zip(pure, actors, strict=True)
+    ]
+    chosen = best_matching(weight)
     return tuple(
-        Binding(a, m, objects[chosen[i]].id, float(pure[i, chosen[i]]))
-        if i in chosen
-        else Binding(a, m)
+        Binding(a, m, objects[chosen[i]].id, pure[i][chosen[i]]) if i in chosen else Binding(a, m)
         for i, (a, m) in enumerate(zip(actors, models, strict=True))
     )
+
+
+def best_matching(weight: Sequence[Sequence[float]]) -> dict[int, int]:
+    """Row -> column of the matching with the greatest total weight; what weighs nothing is left out."""
+    wanted = [[j for j, w in enumerate(row) if w > 0.0] for row in weight]
+    columns = [j for row in wanted for j in row]
+    if len(set(columns)) == len(columns) and all(len(row) <= 1 for row in wanted):
+        # Nobody has a choice and no two want the same, as nearly always.
+        return {i: row[0] for i, row in enumerate(wanted) if row}
+    rows, chosen = linear_sum_assignment(np.array(weight), maximize=True)
+    found = zip(rows.tolist(), chosen.tolist(), strict=True)
+    return {i: j for i, j in found if weight[i][j] > 0.0}
+
+
+def _weights(
+    strengths: Sequence[float],
+    objects: Sequence[ObjectBelief],
+    held: int | None,
+    current: bool,
+    settings: TaskSettings,
+) -> list[float]:
+    """The weight of each object for one actor; 0 where it is too weak to be bound."""
+    bonus = CURRENT_BONUS if current else 1.0
+    weight = [s * bonus for s in strengths]
+    for j, belief in enumerate(objects):
+        if held == belief.id:
+            weight[j] = _held_weight(weight[j], belief, settings)
+    return [w if w >= settings.bind_at else 0.0 for w in weight]
 
 
 def _eligible(belief: ObjectBelief, held: Mapping[str, int]) -> bool:

@@ -64,6 +64,7 @@ class Relations:
         self._looks = looks
         self._before = before
         self._looked: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self.after: dict[str, float] = {}
 
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
@@ -74,6 +75,12 @@ class Relations:
         """
         if name in self._looks:
             return self._look(name, objects)
+        found = self._found.get((name, objects))
+        if found is None:
+            found = self._found[name, objects] = self._given_or_derived(name, objects)
+        return found
+
+    def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
         if found is not None and found.truth is not Truth.UNKNOWN:
             return found

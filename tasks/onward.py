@@ -7,6 +7,7 @@ stage has its own time at which it runs out, so that ways on are worked out anew
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.tasks.automaton import END, NEW, Automaton, kept
@@ -65,10 +66,28 @@ class Paths:
         self._automaton = automaton
         self._timed = any(_within(task))
         self._known: dict[int, list[_Way]] = {}
+        self._starts: list[tuple[State[int], int]] = []
 
-    def begin(self, now: float) -> list[State[Watch] | None]:
-        """The states in which the task may begin now."""
-        return list(enter(self._task, begin(self._task), entered(now), now))
+    def begin(self, now: float) -> list[tuple[State[Watch], int]]:
+        """The states in which the task may begin now, each with its number."""
+        fresh = entered(now)
+        return [
+            (kept(state, [Leaf(x.step, fresh) for x in leaves(state)]), node)
+            for state, node in self._beginnings(now)
+        ]
+
+    def first_steps(self) -> Iterator[Step]:
+        """The steps with which the task may begin."""
+        return (x.step for state, _ in self._beginnings(0.0) for x in leaves(state))
+
+    def _beginnings(self, now: float) -> list[tuple[State[int], int]]:
+        if self._starts:
+            return self._starts
+        states = enter(self._task, begin(self._task), NEW, now)
+        found = [(s, self._automaton.node(s)) for s in states if s is not None]
+        if not self._timed:
+            self._starts = found
+        return found
 
     def onward(self, state: State[Watch], node: int, now: float) -> list[Onward]:
         """All ways on from a state.

@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from visup.agent import Relation, StageBelief, Status, Truth
+from visup.agent.changing import replace
 from visup.tasks.actions import Meaning
 from visup.tasks.automaton import END, Automaton
 from visup.tasks.course import Leaf, State, Step, leaves, with_leaves
-from visup.tasks.foresight import Foresight
+from visup.tasks.foresight import Foresight, begun_by
 from visup.tasks.forward import merged, settled
 from visup.tasks.observe import Sighting
 from visup.tasks.onward import Onward, Paths
@@ -114,8 +115,34 @@ class Follower:
 
     def start(self, now: float) -> tuple[Reading, ...]:
         """The readings in which the task begins now."""
-        found = [s for s in self._paths.begin(now) if s is not None]
-        return tuple(Reading(s, self.automaton.node(s), 1.0 / len(found)) for s in found)
+        found = self._paths.begin(now)
+        return tuple(Reading(state, node, 1.0 / len(found)) for state, node in found)
+
+    @cached_property
+    def first_steps(self) -> tuple[Step, ...]:
+        """The steps with which the task may begin, whenever that is."""
+        return tuple(self._paths.first_steps())
+
+    def asked_for(self, node: int) -> tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]:
+        """What is asked for at a node of the automaton: actors, and relations between these.
+
+        Of each step under way what it holds and expects, of each that may come next its beginning.
+        """
+        if node not in self._asked_for:
+            self._asked_for[node] = tuple(self._asking(node))
+        return self._asked_for[node]
+
+    @cached_property
+    def _asked_for(self) -> dict[int, tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]]:
+        return {}
+
+    def _asking(self, node: int) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+        for step in self.automaton.steps(node):
+            meaning = self.actions[step.action]
+            yield step.actors, (meaning.name, *meaning.holds, *meaning.expects)
+        for way in self.automaton.ways(node):
+            for step in begun_by(self.automaton, way):
+                yield step.actors, self.actions[step.action].begins
 
     def onward(self, reading: Reading, now: float) -> list[Onward]:
         """The ways on from a reading."""

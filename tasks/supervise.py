@@ -73,7 +73,7 @@ def task_thinker(
         before = _recall(mind, followers)
         seen = tuple(_follow(f, m, mind) for f, m in zip(followers, before, strict=True))
         new = _inferred(before, seen)
-        believed = replace(mind, tasks=tuple(m.belief for m in new)).remember(MEMORY, new)
+        believed = mind.remember(MEMORY, new, tasks=tuple(m.belief for m in new))
         steps = list(zip(followers, before, new, strict=True))
         events = tuple(e for step in steps for e in _events(*step, mind))
         return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))
@@ -254,9 +254,8 @@ def _refreshed(binding: Binding, mind: Mind) -> Binding:
 
 def _start(follower: Follower, scene: Scene) -> tuple[Reading, ...]:
     """The task begins once all actors of one of its first steps are found."""
-    readings = follower.start(scene.mind.time)
-    found = any(scene.found(x.step.actors) for r in readings for x in leaves(r.state))
-    return readings if found else ()
+    found = any(scene.found(step.actors) for step in follower.first_steps)
+    return follower.start(scene.mind.time) if found else ()
 
 
 def _strange(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[tuple[int, float], ...]:

@@ -45,10 +45,13 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
     Yields:
         Events of stages in the order of the task, then a change of the verdict.
     """
+    was = {s.stage: s.status for s in before.stages}
+    changed = [s for s in now.stages if was.get(s.stage, Status.PENDING) is not s.status]
+    if not changed and now.verdict is before.verdict:
+        return
     mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
     first = all(s.status is Status.PENDING for s in before.stages)
-    was = {s.stage: s.status for s in before.stages}
-    for stage in now.stages:
+    for stage in changed:
         for kind in _kinds(was.get(stage.stage, Status.PENDING), stage.status):
             event = _stage_event(kind, stage, now, mind)
             if first and kind == "stage_started" and event.objects:

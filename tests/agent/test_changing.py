@@ -39,3 +39,9 @@ def test_a_record_of_a_single_field_is_changed_too() -> None:
 def test_a_field_that_is_not_there_is_refused() -> None:
     with pytest.raises(KeyError):
         changing.replace(Record(1), four=4)
+
+
+def test_a_record_of_which_nothing_changes_stays_the_same_one() -> None:
+    record = Record(1, "b", (3,))
+    assert changing.replace(record, one=1, three=record.three) is record
+    assert changing.replace(record, one=2) is not record

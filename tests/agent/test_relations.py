@@ -94,3 +94,12 @@ def test_a_mind_finds_relations_in_a_table_and_in_a_tuple() -> None:
     assert given.holding("closing") == TABLE.true("closing")
     assert tuple(TABLE) == TABLE
     assert {r.name for r in TABLE.all()} >= {"seldom", "left_of", "closing"}
+
+
+@given(
+    st.sampled_from(("closing", "steady", "left_of", "right_of", "seldom", "coupled", "other")),
+    st.permutations((*IDS, 11)),
+)
+def test_a_truth_is_that_of_the_relation(name: str, ids: list[int]) -> None:
+    found = TABLE.find(name, *ids[:2])
+    assert TABLE.truth(name, *ids[:2]) is (None if found is None else found.truth)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.rules.fit import binned, nanmedian, theil_sen, velocity
+from visup.rules.fit import binned, nanmedian, slopes_of_spans, theil_sen, velocity
 from visup.rules.geometry import DIRECTIONS
 
 some = settings(max_examples=50, deadline=None)
@@ -86,3 +86,21 @@ def test_a_body_that_is_all_border_has_no_velocity() -> None:
     t = np.linspace(0.0, 1.0, 20)
     found = velocity(t, np.ones((20, 1, 16)), np.zeros((20, 1, 16), dtype=bool))
     assert np.isnan(found).all()
+
+
+@some
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.booleans())
+def test_spans_in_one_pass_are_as_each_by_itself(seed: int, missing: int, whole: bool) -> None:
+    rng = np.random.default_rng(seed)
+    times, support = np.arange(20) / 25, rng.normal(size=(20, 3, 16))
+    free = np.ones(support.shape, dtype=bool)
+    if not whole:
+        support[rng.integers(20, size=missing), rng.integers(3, size=missing)] = np.nan
+        free = rng.random(support.shape) < 0.9
+    spans = (slice(None), slice(None, 10), slice(10, None))
+    slopes, usable = slopes_of_spans(times, support, free, spans)
+    for k, p in enumerate(spans):
+        alone = slopes_of_spans(times[p], support[p], free[p], (slice(None),))
+        assert np.array_equal(usable[3 * k : 3 * k + 3], alone[1])
+        one, other = slopes[3 * k : 3 * k + 3], alone[0]
+        assert np.allclose(one[alone[1]], other[alone[1]], atol=1e-9)

@@ -14,12 +14,12 @@ from visup.rules.geometry import (
     RCC8,
     hull_separation,
     moved,
-    outline_gap,
     pixels_in,
     reach,
     shared_pixels,
 )
 from visup.rules.latch import UNKNOWN, hold_sign
+from visup.rules.outlines import outline_gap
 from visup.rules.rcc8 import from_outline_signs, outline_differences, rcc8
 
 some = settings(max_examples=80, deadline=None)
@@ -52,6 +52,21 @@ def test_gap_is_the_least_distance_of_pixels(
     assert gap is not None
     assert gap == pytest.approx(max(0.0, least - 1.0), abs=0.75)
     assert gap == outline_gap(two, one, 200.0)
+
+
+@some
+@given(rect, rect, st.sampled_from((0.0, 3.0, 17.0, 60.0)))
+def test_a_gap_is_told_when_it_is_near_and_is_that_of_all_points(
+    a: tuple[int, int, int, int], b: tuple[int, int, int, int], near: float
+) -> None:
+    one, two = box_region(1, a), box_region(2, b)
+    assert one is not None
+    assert two is not None
+    points = [r.contour.astype(float) for r in (one, two)]
+    least = float(np.sqrt(((points[0][:, None] - points[1][None]) ** 2).sum(2)).min())
+    overlap = least > 1.5 and shared_pixels(one, two) > 0
+    gap = 0.0 if overlap else max(0.0, least - 1.0)
+    assert outline_gap(one, two, near) == (pytest.approx(gap) if gap <= near else None)
 
 
 @some

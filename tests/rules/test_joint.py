@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
 
 from tests.rules.scenes import SIZE, box_region
 from visup.agent import Region
-from visup.rules.joint import Joint, Kept, Motion, begun, follow, motion
+from visup.rules.joint import Joint, Kept, Motion, begun, follow, motion, step_across
 
 STILL, MOVING = 2.0, 10.0
 speeds = st.floats(-40.0, 40.0)
@@ -43,6 +44,38 @@ def test_the_faster_it_moves_the_less_it_rests(speed: float, more: float, varian
     slow = at_speed(speed, 0.0, variance).rest_odds(STILL, MOVING)
     fast = at_speed(speed * more, 0.0, variance).rest_odds(STILL, MOVING)
     assert fast <= slow + 1e-9
+
+
+@given(speeds, speeds, st.floats(0.01, 50.0), st.floats(0.01, 50.0), st.floats(-0.9, 0.9))
+def test_odds_are_those_of_two_normal_distributions(
+    x: float, y: float, xx: float, yy: float, together: float
+) -> None:
+    xy = together * np.sqrt(xx * yy)
+    covariance = np.array([[xx, xy], [xy, yy]])
+    told = Motion(np.array([x, y]), covariance, 0.3).rest_odds(STILL, MOVING)
+    rest, free = (
+        multivariate_normal(cov=covariance + variance * np.eye(2)).logpdf([x, y])
+        for variance in (0.5 * STILL**2, MOVING**2)
+    )
+    assert told == pytest.approx(rest - free, rel=1e-9, abs=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 4.0))
+def test_a_step_onto_an_outline_is_that_of_weighted_least_squares(seed: int, wide: float) -> None:
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0.0, wide, 30)
+    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    off = rng.normal(0.0, 2.0, (30, 2))
+    across = (off * normals).sum(axis=1)
+    weight = 1.0 / np.maximum(np.abs(across), 1.5)
+    square = (normals * weight[:, None]).T @ normals
+    found = step_across(normals, off)
+    if found is None:
+        assert np.linalg.cond(square) > 49.0
+    else:
+        assert np.linalg.cond(square) < 51.0
+        expected = np.linalg.solve(square, normals.T @ (weight * across))
+        assert np.allclose(found, expected, atol=1e-9)
 
 
 @given(st.floats(0.01, 1e4))

@@ -22,9 +22,10 @@ from visup.rules.language import parse_formula
 from visup.rules.monitor import Monitor, verdict
 from visup.rules.operators import most_samples
 from visup.rules.program import Compiler, Moment
+from visup.rules.ruled import Ruled
 from visup.rules.terms import Measure
 from visup.rules.units import ticks
-from visup.rules.verdicts import Ruled, rerowed
+from visup.rules.verdicts import rerowed
 from visup.rules.vocabulary import signals
 
 History = list[tuple[float, dict[str, Interval]]]

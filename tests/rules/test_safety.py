@@ -71,6 +71,18 @@ def closing(seconds: float = 5.0, speed: float = 20.0) -> Iterator[Observation]:
         yield seen(i, boxes, names=NAMES)
 
 
+def test_rules_that_serve_two_agents_by_turns_tell_each_what_they_tell_it_alone() -> None:
+    """What is not worked out again is what would come out again, whoever asked before."""
+    rules = default_thinkers()
+    shared = (*rules.update, *rules.cogitate)
+    scripts = [list(closing()), list(closing(speed=35.0)), [seen(i, []) for i in range(125)]]
+    together = [think(shared, s) for s in scripts]
+    by_turns = list(zip(*together, strict=True))
+    for k, script in enumerate(scripts):
+        alone = run(script)
+        assert [t[k].concerns for t in by_turns] == [t.concerns for t in alone]
+
+
 def test_closing_in_is_a_collision_course_where_no_task_wants_it() -> None:
     thoughts = run(closing())
     assert raised(thoughts) == {("collision_course", frozenset({1, 2}))}

@@ -5,20 +5,30 @@ from dataclasses import replace
 from itertools import permutations
 from types import MappingProxyType
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
 
 from tests.tasks.scripted import belief
 from visup.agent import Binding, Mind, Presence
 from visup.tasks import load_task, parse_task
-from visup.tasks.matching import match, match_strength, rank_stages, rank_tasks, unexplained
+from visup.tasks.matching import (
+    best_matching,
+    match,
+    match_strength,
+    rank_stages,
+    rank_tasks,
+    unexplained,
+)
 from visup.tasks.settings import TaskSettings
 
 DOCK = load_task("dock")
 shares = st.dictionaries(
     st.sampled_from(["arm", "satellite", "guitar"]), st.floats(0.0, 0.33), max_size=3
 )
+weights = st.sampled_from((0.0, 0.0, 0.0, 0.2, 0.5, 0.9))
 
 
 def mind_of(*objects: Mapping[str, float], **others: Mapping[str, tuple[str, ...]]) -> Mind:
@@ -41,6 +51,17 @@ def test_the_matching_is_the_best_of_all(objects: list[dict[str, float]]) -> Non
     assert total == pytest.approx(best, abs=1e-5)
     ids = [b.object_id for b in found if b.object_id is not None]
     assert len(ids) == len(set(ids))
+
+
+@given(st.integers(1, 4).flatmap(lambda n: st.lists(st.lists(weights, min_size=n, max_size=n))))
+def test_a_matching_weighs_as_much_as_the_best_of_scipy(table: list[list[float]]) -> None:
+    found = best_matching(table)
+    assert len(set(found.values())) == len(found)
+    assert all(table[i][j] > 0.0 for i, j in found.items())
+    best = 0.0
+    if table:
+        best = np.array(table)[linear_sum_assignment(table, maximize=True)].sum()
+    assert sum(table[i][j] for i, j in found.items()) == pytest.approx(best)
 
 
 def test_an_actor_stands_for_the_users_models_then_the_tasks_then_its_own_name() -> None:

@@ -19,7 +19,7 @@ from visup.agent import Region
 from visup.agent.errors import SettingsError
 from visup.evaluation.mission_files import read_json
 from visup.rules.geometry import outline
-from visup.rules.joint import kept_outline, laid_upon
+from visup.rules.joint import Target, kept_outline, laid_upon
 
 MARGIN = 8
 """Pixels round a mask in which its outline may move."""
@@ -136,7 +136,7 @@ def _velocity(
     old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
 ) -> tuple[float, float] | None:
     kept = kept_outline(old, others, size)
-    laid = None if kept is None else laid_upon(kept, outline(new))
+    laid = None if kept is None else laid_upon(kept, Target.of(outline(new)))
     return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
 
 

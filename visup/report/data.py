@@ -37,7 +37,7 @@ from visup.report.records import (
     Sample,
     Subject,
 )
-from visup.rules.geometry import outline_gap
+from visup.rules.outlines import outline_gap
 from visup.tasks.outline import Branch
 from visup.wording import worded_once
 
