@@ -30,8 +30,9 @@ from visup.zones import load_zones
 if TYPE_CHECKING:
     from visup.tasks.tree import Task
 
-LIVE_HANG_S = 10.0
-"""How long a behaviour may take for a frame of a camera before it is given up."""
+LIVE_HANG_S = 20.0
+"""How long a behaviour may take for a frame of a camera before it is given up: no less than what
+compiling loops takes at the first frames after an installation."""
 
 __all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 

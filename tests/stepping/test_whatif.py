@@ -92,7 +92,7 @@ def test_a_branch_without_beliefs_is_the_very_course() -> None:
 
 
 def test_other_rules_and_tasks_say_something_else_on_a_branch() -> None:
-    it = at(20)
+    it = at(10)
     rules = it.branch(thinkers=with_rules(it.agent.thinkers, RULE))
     rules.step(20)
     changed = rules.compare()
