@@ -50,6 +50,9 @@ class PoseSettings:
         tree: Costs and bounds of the interpretation trees.
         spin: How spin is measured.
         every_s: Looks at one object are at least so far apart.
+        most_looks: Objects whose trees grow in one step at most; those that have waited longest come
+            first. The budget of the dearest part of thinking: it counts work, not time, so that what
+            is believed is the same on every machine.
         refit_s: Spin is measured so often.
         least_visible: Below this share in sight an object's hypotheses are not heeded.
         most_names: Models of an object that have trees.
@@ -69,6 +72,7 @@ class PoseSettings:
     tree: TreeSettings = field(default_factory=TreeSettings)
     spin: SpinSettings = field(default_factory=SpinSettings)
     every_s: float = 0.2
+    most_looks: int = 4
     refit_s: float = 1.0
     least_visible: float = 0.5
     most_names: int = 6
@@ -120,6 +124,7 @@ class Track:
     pose: Pose | None = None
 
 
+NO_TRACK = Track()
 NO_TRACKS: Mapping[int, Track] = MappingProxyType({})
 
 
@@ -155,11 +160,11 @@ class BelievePose:
         """Take in one step's view hypotheses; see `Thinker`."""
         said = hypotheses_by_object(mind, observation)
         known, kept, beliefs = tracks(mind), {}, []
+        due = self._due(mind, said, known)
         for object_id, belief in mind.objects.items():
-            track = known.get(object_id, Track())
-            looked = said.get(object_id, ())
-            if looked and self._in_sight(mind, belief):
-                track = self._looked(track, looked, belief.name, mind.time)
+            track = known.get(object_id, NO_TRACK)
+            if object_id in due:
+                track = self._looked(track, said[object_id], belief.name, mind.time)
             if track.trees:
                 kept[object_id] = track
             pose = self._now(track, belief.name, mind.time)
@@ -168,6 +173,24 @@ class BelievePose:
         mind = mind.with_objects(*beliefs) if beliefs else mind
         return Outcome(mind.remember(POSES, MappingProxyType(kept)))
 
+    def _due(
+        self,
+        mind: Mind,
+        said: Mapping[int, tuple[Hypothesis, ...]],
+        known: Mapping[int, Track],
+    ) -> frozenset[int]:
+        """Objects whose trees grow now: looked at anew, not too soon, and within the budget."""
+        s = self.settings
+        waiting = [
+            (track.time, object_id)
+            for object_id, hypotheses in said.items()
+            if (track := known.get(object_id, NO_TRACK)).said != _look(hypotheses)
+            and mind.time - track.time >= s.every_s - 1e-9
+            and (belief := mind.objects.get(object_id)) is not None
+            and self._in_sight(mind, belief)
+        ]
+        return frozenset(number for _, number in sorted(waiting)[: s.most_looks])
+
     def _in_sight(self, mind: Mind, belief: ObjectBelief) -> bool:
         seen = belief.presence is Presence.SEEN
         return seen and visible_share(mind, belief.id) >= self.settings.least_visible
@@ -175,10 +198,8 @@ class BelievePose:
     def _looked(
         self, track: Track, hypotheses: Sequence[Hypothesis], name: str, now: float
     ) -> Track:
-        """The track after a look, unless it is the same as before or comes too soon."""
-        said = tuple((h.name, h.view, h.similarity, h.rotation) for h in hypotheses)
-        if said == track.said or now - track.time < self.settings.every_s - 1e-9:
-            return track
+        """The track after a look."""
+        said = _look(hypotheses)
         levels = self._levels(hypotheses, now)
         track = self._settled(track, name)
         waited = now - track.time
@@ -297,6 +318,10 @@ class BelievePose:
 
     def _fading(self, age: float) -> float:
         return exp(-max(0.0, age) / self.settings.stale_s)
+
+
+def _look(hypotheses: Sequence[Hypothesis]) -> Look:
+    return tuple((h.name, h.view, h.similarity, h.rotation) for h in hypotheses)
 
 
 def _turning(rate: Rate | None, settings: PoseSettings) -> Turning:

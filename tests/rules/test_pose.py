@@ -9,6 +9,8 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tests.rules.percepts_from_truth import available, truth_of
@@ -28,7 +30,7 @@ from visup.agent import (
 from visup.evaluation.told_views import ToldViews, ViewNoise
 from visup.percepts.shape.views import half_sphere_directions
 from visup.rules.objects import OWNERS
-from visup.rules.pose import BelievePose, pose_support, tracks
+from visup.rules.pose import BelievePose, PoseSettings, pose_support, tracks
 
 REGION = Region(
     1, (0, 0, 4, 4), np.ones((4, 4), bool), np.zeros((4, 2), np.float32), (2.0, 2.0), 16.0
@@ -207,6 +209,35 @@ def test_a_hypothesis_told_again_is_no_new_look() -> None:
     assert len(tracks(mind)[1].levels) == 1
     assert pose is not None
     assert pose.direction == pytest.approx((1.0, 0.0, 0.0))
+
+
+def many_objects(count: int) -> Mind:
+    ids = range(1, count + 1)
+    regions = {i: replace(REGION, id=i) for i in ids}
+    beliefs = [ObjectBelief(i, regions[i], Presence.SEEN, 0.0, 0.0, True) for i in ids]
+    mind = Mind(memory=MappingProxyType({OWNERS: MappingProxyType({i: i for i in ids})}))
+    return mind.with_objects(*beliefs)
+
+
+@given(st.integers(1, 14), st.integers(1, 6), st.integers(0, 99))
+def test_whatever_the_budget_nobody_waits_longer_than_it_takes_to_serve_all(
+    count: int, most: int, seed: int
+) -> None:
+    rng, mind = np.random.default_rng(seed), many_objects(count)
+    think = BelievePose(PoseSettings(most_looks=most, every_s=0.0))
+    served: list[set[int]] = []
+    for k in range(30):
+        said = tuple(
+            Hypothesis(i, "sat", 0, float(rng.uniform(0.5, 0.9)), direction=(1.0, 0.0, 0.0))
+            for i in range(1, count + 1)
+        )
+        time = 0.04 * k
+        mind = think(replace(mind, time=time), observation(said, time)).mind
+        served.append({i for i, t in tracks(mind).items() if t.time == time})
+    rounds = -(-count // most)
+    assert all(len(ids) == min(count, most) for ids in served)
+    for k in range(30 - rounds + 1):
+        assert set().union(*served[k : k + rounds]) == set(range(1, count + 1))
 
 
 def test_an_object_without_known_directions_has_no_pose() -> None:
