@@ -80,7 +80,7 @@ class VoteSettings:
     least_similarity: float = 0.4
     tau_s: float = 6.0
     tau_hidden_s: float = 60.0
-    rank: float = 0.6
+    rank: float = 0.8
     least_visible: float = 0.5
     most_candidates: int = 5
     least_share: float = 0.03
