@@ -61,7 +61,7 @@ def test_weights_are_best_per_name_above_threshold_and_discounted_by_rank(
     """The dumb twin: sort the best similarity of each name and count places by hand."""
     best = {n: max(s for m, s in said if m == n) for n, _ in said}
     order = sorted((n for n in best if best[n] > 0.4), key=lambda n: (-best[n], n))
-    twin = {n: 0.6**k * (best[n] - 0.4) / 0.6 for k, n in enumerate(order)}
+    twin = {n: SET.rank**k * (best[n] - 0.4) / 0.6 for k, n in enumerate(order)}
     assert weights(tuple(Hypothesis(1, n, 0, s) for n, s in said), SET) == pytest.approx(twin)
 
 
