@@ -74,7 +74,6 @@ class Arrivals:
         missing = self._missing()
         if not missing:
             self._repeats.extend(past)
-        if not missing:
             self._steps.append(new.step)
             self._waits.append(new.wait)
         if len(self._repeats) < ENOUGH:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
 
 from visup.agent import Concern, Frame, Severity
@@ -52,7 +53,8 @@ class LiveSource(Source):
         rate, notes = frame_rate(capture, fps)
         self.notify: Callable[[str], None] | None = None
         self._reopen, self._patience_s, self._wait = reopen, patience_s, wait
-        self._came_back: str | None = None
+        # Written by whoever reads frames, which may be a thread of its own, and read by the cycle.
+        self._came_back: deque[str] = deque()
         self._capture = capture
         self._clock = clock
         self._received = 0
@@ -88,8 +90,8 @@ class LiveSource(Source):
 
     def troubles(self) -> Iterable[Concern]:
         """Once after it came back: how long nothing was delivered."""
-        said, self._came_back = self._came_back, None
-        if said:
+        while self._came_back:
+            said = self._came_back.popleft()
             yield Concern("source_dropped", (), Severity.WARNING, said, key=self.name, needs=())
 
     def _grab(self) -> bool:
@@ -109,7 +111,7 @@ class LiveSource(Source):
             self._capture = self._reopen()
             if self._capture.isOpened() and self._capture.grab():
                 gone = self._clock() - since
-                self._came_back = f"{self.name} delivered nothing for {gone:.1f} s."
+                self._came_back.append(f"{self.name} delivered nothing for {gone:.1f} s.")
                 return True
         return False
 
