@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from visup.percepts.motion.compiled import compiled
+from visup.compiled import compiled
 from visup.percepts.motion.layer_loops import likelihoods, misfits, reweighted
 from visup.percepts.motion.picture import FAR, NOISE, RARE, SETTLE_S, Picture, learnt
 from visup.percepts.motion.point_loops import strongest, tensors
