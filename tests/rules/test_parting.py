@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.rules.runs import Thought, think
 from tests.rules.scenes import SIZE, box_region, seen
 from visup.agent import ObjectBelief, Presence, Region, Truth
-from visup.rules.geometry import reach
+from visup.rules.outlines import reach
 from visup.rules.parting import parting_speed
 from visup.rules.thinkers import default_thinkers
 
