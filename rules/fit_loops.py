@@ -41,11 +41,11 @@ def median(values: Floats, count: int) -> float:
             break
     middle = values[at]
     if count % 2:
-        return middle
+        return float(middle)
     below = values[0]
     for k in range(1, at):
         below = max(below, values[k])
-    return 0.5 * (below + middle)
+    return float(0.5 * (below + middle))
 
 
 @compiled
@@ -152,7 +152,7 @@ def slope_noise(times: Floats, noise: float) -> float:
     middle /= count
     for k in range(count):
         lever += (times[k] - middle) ** 2
-    return noise / np.sqrt(lever)
+    return float(noise / np.sqrt(lever))
 
 
 @compiled

@@ -118,22 +118,22 @@ class Measured:
     @property
     def gap(self) -> Floats:
         """(M, M) distance of the outlines, pixels."""
-        return self.tables[GAP]
+        return self._table(GAP)
 
     @property
     def rate(self) -> Floats:
         """(M, M) trend of the distance, pixels per second, negative when closing."""
-        return self.tables[RATE]
+        return self._table(RATE)
 
     @property
     def rate_sigma(self) -> Floats:
         """(M, M) its standard deviation."""
-        return self.tables[SIGMA]
+        return self._table(SIGMA)
 
     @property
     def relative_speed(self) -> Floats:
         """(M, M) pixels per second."""
-        return self.tables[RELATIVE]
+        return self._table(RELATIVE)
 
     @property
     def time_to_contact(self) -> Floats:
@@ -141,12 +141,17 @@ class Measured:
 
         0 where they meet, infinite where they do not close in.
         """
-        return self.tables[CONTACT]
+        return self._table(CONTACT)
+
+    def _table(self, number: int) -> Floats:
+        found: Floats = self.tables[number]
+        return found
 
     @property
     def velocity(self) -> Floats:
         """(M, 2) pixels per second in the image."""
-        return self.motion[0]
+        found: Floats = self.motion[0]
+        return found
 
     @property
     def velocity_sigma(self) -> Floats:

@@ -67,7 +67,7 @@ def _parting(support: Floats, seen: Floats, i: int, j: int, directions: Floats) 
         if reach < least:
             least, at = reach, k
     x, y = seen[j, 1] - seen[i, 1], seen[j, 2] - seen[i, 2]
-    return x * directions[at, 0] + y * directions[at, 1]
+    return float(x * directions[at, 0] + y * directions[at, 1])
 
 
 @compiled

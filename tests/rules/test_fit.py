@@ -36,7 +36,8 @@ def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
     """Over all of the samples."""
     whole = np.array([[0, len(times)]])
-    return velocities(times, support, np.array(free), whole, DIRECTIONS, np.inf)[0]
+    found: Floats = velocities(times, support, np.array(free), whole, DIRECTIONS, np.inf)[0]
+    return found
 
 
 def by_medians(times: Floats, values: Floats) -> tuple[float, float]:
@@ -187,7 +188,8 @@ def by_least_squares(slopes: Floats, misfit: float) -> Floats:
         found = np.linalg.lstsq(root * n, root[:, 0] * v, rcond=None)[0]
         off = np.abs(v - n @ found)
         weight = 1.0 / np.maximum(off, 0.3)
-    return found if off.mean() <= max(misfit, np.hypot(*found) / 3) else np.full(2, np.nan)
+    as_one = off.mean() <= max(misfit, np.hypot(*found) / 3)
+    return np.asarray(found, float) if as_one else np.full(2, np.nan)
 
 
 @some
