@@ -46,7 +46,7 @@ from visup.agent.records import (
     Severity,
     Truth,
 )
-from visup.agent.relations import Cells, Column, Columns, Relation, RelationTable
+from visup.agent.relations import Column, Relation, RelationTable
 from visup.agent.shown import showing
 
 __all__ = [
@@ -54,9 +54,7 @@ __all__ = [
     "Behaviour",
     "Binding",
     "Candidate",
-    "Cells",
     "Column",
-    "Columns",
     "Concern",
     "Contract",
     "Coupling",

@@ -156,6 +156,10 @@ class RelationTable(Sequence[Relation]):
     parts: tuple[Cells, ...] = ()
     extra: tuple[Relation, ...] = field(default=())
 
+    def with_cells(self, cells: Cells) -> RelationTable:
+        """The same with more that holds between all pairs of its objects."""
+        return RelationTable(self.ids, (*self.parts, cells), self.extra)
+
     def find(self, name: str, *objects: int) -> Relation | None:
         """The relation of that name between exactly these objects, or None when it is not judged.
 

@@ -30,9 +30,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from visup.agent import (
-    Cells,
     Column,
-    Columns,
     Mind,
     ObjectBelief,
     Observation,
@@ -42,6 +40,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.changing import replace
+from visup.agent.relations import Cells, Columns
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES

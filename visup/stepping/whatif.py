@@ -15,8 +15,6 @@ import numpy as np
 
 from visup.agent import (
     Candidate,
-    Cells,
-    Columns,
     Coupling,
     Event,
     Mind,
@@ -30,7 +28,7 @@ from visup.agent import (
 )
 from visup.agent.agent import Thinkers
 from visup.agent.mind import UNKNOWN_OBJECT
-from visup.agent.relations import UNKNOWN_CODE
+from visup.agent.relations import UNKNOWN_CODE, Cells, Columns
 from visup.rules.formula import Rule
 from visup.rules.safety import RuleThinker
 from visup.tasks.supervise import MEMORY, task_thinker
