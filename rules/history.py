@@ -78,19 +78,14 @@ def sample(
     if not (due and observation.observed("region")):
         return without(history, old)
     joint = {i for pair in merged_pairs(mind) for i in pair}
-    seen = [
-        b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint
-        for b in objects
-    ]
     support = np.full((len(ids), FAN), np.nan)
     free = np.zeros((len(ids), FAN), dtype=bool)
-    for i, (b, s) in enumerate(zip(objects, seen, strict=True)):
-        if s:
-            now = reach(b.region, mind.frame_size)
-            support[i], free[i] = now.support, now.free
-    depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
+    depth = np.full(len(ids), np.nan)
+    for i, b in enumerate(objects):
+        if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
+            reach(b.region, mind.frame_size, support[i], free[i])
+            depth[i] = np.nan if b.depth is None else b.depth
     history = comparable(without(history, old), mind)
-    depth[[not s for s in seen]] = np.nan
     return extended(history, (mind.time, support, free, hull_separation(support), depth))
 
 
@@ -119,6 +114,8 @@ def comparable(history: History, mind: Mind) -> History:
     """A history without the samples of objects whose regions have changed their nature since."""
     of = tracks(mind).of
     changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
+    if not len(history.times) or not (changed > history.times[0] + 1e-9).any():
+        return history
     old = history.times[:, None] < changed[None, :] - 1e-9
     # Samples that are rid of them already stay the arrays that they are.
     if not (old[:, :, None] & (history.support == history.support)).any():

@@ -192,6 +192,16 @@ def evenly(points: Floats, count: int) -> Floats:
 
 
 @compiled
+def widest_step(points: Floats) -> float:
+    """Greatest distance of neighbouring points of a closed outline (N, 2), pixels."""
+    widest = 0.0
+    for n in range(len(points)):
+        dx, dy = points[n, 0] - points[n - 1, 0], points[n, 1] - points[n - 1, 1]
+        widest = max(widest, dx * dx + dy * dy)
+    return float(np.sqrt(widest))
+
+
+@compiled
 def step_across(normals: Floats, off: Floats, count: int, wild: float) -> tuple[bool, float, float]:
     """The move that brings points onto an outline, by weighted least squares across it.
 

@@ -104,12 +104,12 @@ def outline_differences(
     found = np.full((3, len(near)), far)
     found[:, ~known] = np.nan
     i, j = pairs(len(regions))
-    for k in np.flatnonzero(near & known):
+    for k in (near & known).nonzero()[0].tolist():
         a, b = regions[i[k]], regions[j[k]]
         least_a, most_a = signed_distances(a, b)
         least_b, most_b = signed_distances(b, a)
         # Outlines run through the centres of pixels: neighbours meet, though they are 1 px apart.
-        found[:, k] = min(least_a, least_b) - 1.0, most_a, most_b
+        found[0, k], found[1, k], found[2, k] = min(least_a, least_b) - 1.0, most_a, most_b
     return found
 
 

@@ -39,8 +39,8 @@ from visup.agent import (
     RelationTable,
     Truth,
 )
+from visup.agent.cells import Cells, Columns
 from visup.agent.changing import replace
-from visup.agent.relations import Cells, Columns
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES
