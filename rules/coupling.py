@@ -82,7 +82,7 @@ class CouplingSettings:
     part_s: float = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pending:
     """What is remembered of one pair: seconds since when each holds, or None.
 
@@ -160,16 +160,18 @@ class Couple:
     def _look(self, before: Pending, sight: Sight, mind: Mind) -> Pending:
         converging = sight.converging == YES and sight.touching != YES
         far = sight.diverging == YES or sight.gap > 0.02 * scale(mind.frame_size)
+        apart = sight.touching == NO and far
         joint = self._follow(before.joint, sight, mind)
         odds = before.rest_odds
         if joint is None or sight.touching != YES:
             odds = 0.0
         elif joint is not before.joint:
             odds = self._rest(odds, before.joint, joint, mind)
+        same = joint is before.joint and odds == before.rest_odds and not converging
+        if same and apart == (before.apart_since is not None):
+            return before  # as nearly always: most pairs are far from each other
         converged = mind.time if converging else before.converged_at
-        apart = _since(before.apart_since, sight.touching == NO and far, mind.time)
-        now = Pending(converged, odds, apart, joint)
-        return before if now == before else now
+        return Pending(converged, odds, _since(before.apart_since, apart, mind.time), joint)
 
     def _follow(self, before: Joint | None, sight: Sight, mind: Mind) -> Joint | None:
         """How the two move relative to each other; the same as before when they are not seen."""

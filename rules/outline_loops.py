@@ -15,7 +15,7 @@ from visup.compiled import compiled
 
 Floats = NDArray[np.float64]
 
-RUN = 8
+RUN = 16
 """Neighbouring points that share a box."""
 
 

@@ -300,10 +300,8 @@ class Relations:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
         i, j = pairs(len(h.ids))
         codes = np.full(len(i), UNKNOWN, dtype=np.int8)
-        if len(i) == 0 or not covered(h, self.settings.window_s):
-            return codes
-        found_at = np.isfinite(h.depth)
-        if not found_at.any():
+        found_at = h.depth == h.depth  # NaN is not equal to itself
+        if not found_at.any() or not covered(h, self.settings.window_s):
             return codes
         known = found_at.mean(axis=0) >= 0.6
         at = np.flatnonzero(known[i] & known[j])
