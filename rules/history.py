@@ -85,8 +85,8 @@ def sample(
         if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
             reach(b.region, mind.frame_size, support[i], free[i])
             depth[i] = np.nan if b.depth is None else b.depth
-    history = comparable(without(history, old), mind)
-    return extended(history, (mind.time, support, free, hull_separation(support), depth))
+    row = (mind.time, support, free, hull_separation(support), depth)
+    return extended(comparable(history, mind), row, old)
 
 
 def covered(history: History, window_s: float) -> bool:
@@ -136,20 +136,21 @@ def without(history: History, old: int) -> History:
     return History(history.ids, times, support, free, separation, depth, history.start + old)
 
 
-def extended(history: History, row: tuple[Any, ...]) -> History:
-    """A history with one more sample: time, support, free, separation, depth."""
+def extended(history: History, row: tuple[Any, ...], old: int = 0) -> History:
+    """A history with one more sample (time, support, free, separation, depth) and without old ones."""
     count = len(history.times)
     end = history.start + count
     memory: list[Any] = [a.base for a in history.arrays]
     # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
-    if any(m is None or len(m) <= end for m in memory) or not np.isnan(memory[0][end]):
-        history = _with_room(history, max(ROOM, count))
+    if any(m is None or len(m) <= end for m in memory) or memory[0][end] == memory[0][end]:
+        history = _with_room(without(history, old), max(ROOM, count))
+        count, old = count - old, 0
         end = count
         memory = [a.base for a in history.arrays]
     for values, new in zip(memory, row, strict=True):
         values[end] = new
-    start = history.start
-    times, support, free, separation, depth = (m[start : end + 1] for m in memory)
+    start = history.start + old
+    times, support, free, separation, depth = [m[start : end + 1] for m in memory]
     return History(history.ids, times, support, free, separation, depth, start)
 
 

@@ -155,7 +155,7 @@ def test_rcc8_of_outlines_is_that_of_masks(a: tuple[int, ...], b: tuple[int, ...
     regions = [box_region(n, rect) for n, rect in enumerate(rects)]
     one, two = (r for r in regions if r is not None)
     for first, second in ((one, two), (two, one)):
-        apart = outline_differences((first, second), np.ones(1, bool), np.ones(1, bool), 40.0)
+        apart = outline_differences((first, second), (0,))
         signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
         assert RCC8[from_outline_signs(signs)[0]] == by_masks(first, second, 2)
 
@@ -170,6 +170,6 @@ def test_outlines_of_an_l_hold_a_box_in_their_corner_that_their_boxes_do_not() -
     assert box is not None
     boxes = np.array([hook.bbox, box.bbox], dtype=float)
     assert RCC8[rcc8(boxes)[1, 0]] == "non_tangential_proper_part"
-    apart = outline_differences((hook, box), np.ones(1, bool), np.ones(1, bool), 40.0)
+    apart = outline_differences((hook, box), (0,))
     signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
     assert RCC8[from_outline_signs(signs)[0]] == "disconnected"
