@@ -63,7 +63,7 @@ class BelieveDepth:
         for i, belief in mind.objects.items():
             new = told.get((i, belief.name))
             before = old.get(i)
-            if new is before is None and belief.depth is None:
+            if new is None and before is None and belief.depth is None:
                 continue  # as nearly always where nobody measures depth
             if not self._clear(belief):
                 new = before = None
