@@ -142,12 +142,7 @@ class _Reader:
     def _value(self, node: Node) -> tuple[Place, Interval]:
         """Where a node stands, and what it came to for these objects."""
         place = self.values.prepared.place(node, self.scope)
-        low, high = self.values.at(place)
-        for row in self.rows[: low.ndim]:
-            # Along the axis of an object on which it does not depend there is but one.
-            at = row if len(low) > 1 else 0
-            low, high = low[at], high[at]
-        return place, (low.item(0), high.item(0))
+        return place, self.values.interval(place, self.rows)
 
     def _text(self, node: Node) -> str:
         """Its source, with objects by name."""

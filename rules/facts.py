@@ -66,19 +66,17 @@ class Facts:
     def related(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
         if name not in self._codes:
-            self.relate((name,))
+            self._codes[name] = self._coupled() if name == "coupled" else self.relations((name,))[0]
         return self._codes[name]
 
-    def relate(self, names: tuple[str, ...]) -> None:
-        """Look several relations up in one pass, before they are asked for."""
-        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
-        tables = self.mind.truths_of(tuple([n for n in names if n != "coupled"]), self.ids)
+    def relations(self, names: tuple[str, ...]) -> Codes:
+        """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
+        tables = self.mind.truths_of(names, self.ids)
         # An object is equal to itself, and nothing else.
         each = np.arange(len(self.ids))
-        itself = [[YES if name in ITSELF else NO] for name in names if name != "coupled"]
+        itself = [[YES if name in ITSELF else NO] for name in names]
         tables[:, each, each] = np.array(itself, dtype=np.int8).reshape(-1, 1)
-        found = iter(tables)
-        self._codes |= {n: self._coupled() if n == "coupled" else next(found) for n in names}
+        return tables
 
     def _coupled(self) -> Codes:
         codes, row = self.pairs(NO), self.row

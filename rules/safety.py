@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief
+from visup.agent import Concern, Mind, Observation, Outcome, TaskBelief, Truth
 from visup.rules.explain import evidence
-from visup.rules.facts import YES, Facts
+from visup.rules.facts import Facts
 from visup.rules.formula import Rule
 from visup.rules.operators import SPACING
 from visup.rules.ruled import Ruled, ruled
 from visup.rules.sentences import sentence, with_names
+from visup.rules.states import States
 from visup.rules.units import ticks
-from visup.rules.verdicts import States, Values, rerowed
+from visup.rules.verdicts import Values, rerowed
 
 SAFETY = "rules.safety"
 MOST_RETOLD = 3
@@ -56,8 +57,8 @@ class Kept:
     rules: tuple[Rule, ...] = ()
     now: int | None = None
     ids: tuple[int, ...] = ()
-    before: States = ()
-    after: States = ()
+    before: States | None = None
+    after: States | None = None
     tasks: tuple[TaskBelief, ...] = ()
     held: Mapping[Key, Held] = field(default_factory=lambda: MappingProxyType({}))
     cooling: Mapping[Key, float] = field(default_factory=lambda: MappingProxyType({}))
@@ -72,13 +73,10 @@ class RuleThinker:
 
     rules: tuple[Rule, ...]
     _prepared: Ruled = field(init=False, repr=False, compare=False)
-    _latest: list[Values] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # Rules are long trees: to look up by them what was prepared costs as much as a rule.
         object.__setattr__(self, "_prepared", ruled(self.rules))
-        # The values of the latest step, whoever's it was, to save work: nothing else hangs on it.
-        object.__setattr__(self, "_latest", [])
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Thinker`."""
@@ -88,11 +86,10 @@ class RuleThinker:
         if old.now is not None and now - old.now < SPACING:
             return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
         prepared, facts = self._prepared, Facts(mind)
-        before = prepared.program.fresh if old.now is None else old.after
-        if old.now is not None and old.ids != facts.ids:
-            before = rerowed(prepared, before, now, old.ids, facts.ids)
-        values = Values(prepared, facts, now, before, self._latest[0] if self._latest else None)
-        self._latest[:] = [values]
+        before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
+        if old.after is not None and old.ids != facts.ids:
+            before = rerowed(prepared, old.after, now, old.ids, facts.ids)
+        values = Values(prepared, facts, now, before)
         held, cooling = _concerns(self.rules, values, old)
         mind = mind.remember(
             SAFETY,
@@ -153,11 +150,11 @@ def _until(rule: Rule, now: float) -> float:
 
 def confidence(rule: Rule, ids: tuple[int, ...], values: Values) -> float:
     """The least confidence of the relations that `when` names of these objects and that are true."""
-    objects, facts = dict(zip(rule.variables, ids, strict=True)), values.facts
+    objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
     found = []
     for call in values.prepared.related(rule):
         a, b = (objects[w] for w in call.words)
-        if facts.related(call.name)[facts.row[a], facts.row[b]] == YES:
-            relation = facts.mind.relation(call.name, a, b)
+        if mind.truth(call.name, a, b) is Truth.TRUE:
+            relation = mind.relation(call.name, a, b)
             found += [relation.confidence] if relation else []
     return min(found, default=1.0)
