@@ -24,6 +24,8 @@ Codes = NDArray[np.int8]
 state stands; axes (bits) of what it reads and of what it makes; of a quantifier its axis, and axes
 whose objects it leaves out."""
 WIDTH = 10
+CHOICE_BITS = 32
+"""There are fewer choices of objects than 2 to that."""
 
 (FACT, SPREAD, NUMBER, NOT, ABS, LEAST, MOST, SHIFT, BELOW, COMPARE, PLUS, MINUS) = range(12)
 (TIMES, OVER, RATE, SOME, EVERY, ALWAYS, ONCE, SINCE, LASTS, HAPPENED, LATCH, RECALL) = range(
@@ -262,7 +264,7 @@ def choices(rules: Whole, n: int, arena: Floats, found: Whole) -> int:
             02, 12).
         n: Number of objects.
         arena: All intervals.
-        found: (F, 2) the number of the rule, and of the choice; written.
+        found: The number of the rule, times 2 to the `CHOICE_BITS`, and that of the choice; written.
 
     Returns:
         How many were found.
@@ -289,7 +291,7 @@ def choices(rules: Whole, n: int, arena: Floats, found: Whole) -> int:
                         and arena[unless + x * u_first + y * u_second + z * u_third] > 0.0
                     ):
                         continue
-                    found[count, 0], found[count, 1] = r, k - 1
+                    found[count] = (r << CHOICE_BITS) + k - 1
                     count += 1
     return count
 

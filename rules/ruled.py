@@ -23,12 +23,15 @@ from visup.rules.formula import (
     named,
 )
 from visup.rules.layout import Layout
-from visup.rules.machine import Whole, bits
+from visup.rules.machine import CHOICE_BITS, Whole, bits
 from visup.rules.program import Compiler, Place, Program, Scope
 from visup.rules.relations import NAMES
 from visup.rules.states import States
 from visup.rules.terms import Measure, Term
 from visup.rules.vocabulary import RULES, Quantity, Word
+
+MOST_KEYS = 16
+"""Of so many sets of objects it is remembered what may be found of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,23 @@ def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
     return look(facts, *others)
 
 
+class Keys(dict[int, tuple[str, frozenset[int]]]):
+    """What `machine.choices` finds -> name of the rule and set of objects, found once for each.
+
+    Args:
+        prepared: The rules.
+        ids: The objects.
+    """
+
+    def __init__(self, prepared: Ruled, ids: tuple[int, ...]) -> None:
+        super().__init__()
+        self._prepared, self._ids = prepared, ids
+
+    def __missing__(self, hit: int) -> tuple[str, frozenset[int]]:
+        rule, chosen = self._prepared.choice(hit, self._ids)
+        return self.setdefault(hit, (rule.name, frozenset(chosen)))
+
+
 @dataclass(frozen=True, eq=False)
 class Ruled:
     """Rules made ready to run.
@@ -81,6 +101,7 @@ class Ruled:
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
     _layouts: dict[int, Layout] = field(default_factory=dict, repr=False)
     _verdicts: dict[int, Whole] = field(default_factory=dict, repr=False)
+    _keys: dict[tuple[int, ...], Keys] = field(default_factory=dict, repr=False)
 
     @property
     def program(self) -> Program:
@@ -161,6 +182,33 @@ class Ruled:
                     places[step] = self.relations[node.name] * n * n
             self._layouts[n] = Layout(self.program, n, places, begin)
         return self._layouts[n]
+
+    def most_found(self, n: int) -> int:
+        """How many choices of a number of objects there are for all rules."""
+        return sum([n ** len(rule.variables) for rule in self.rules])
+
+    @cached_property
+    def rules_by_name(self) -> Mapping[str, Rule]:
+        """The rules by name."""
+        return {rule.name: rule for rule in self.rules}
+
+    def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
+        """The rule and the objects of something that `machine.choices` found of some objects."""
+        rule, rows = self.rules[hit >> CHOICE_BITS], hit & (1 << CHOICE_BITS) - 1
+        chosen = []
+        for _ in rule.variables:
+            rows, row = divmod(rows, len(ids))
+            chosen.append(ids[row])
+        return rule, tuple(chosen[::-1])
+
+    def keys(self, ids: tuple[int, ...]) -> Keys:
+        """Name of the rule and set of objects of all that may be found of some objects."""
+        known = self._keys.get(ids)
+        if known is None:
+            if len(self._keys) >= MOST_KEYS:
+                self._keys.clear()
+            known = self._keys.setdefault(ids, Keys(self, ids))
+        return known
 
     def fresh(self, n: int) -> States:
         """What is remembered before the first sample."""

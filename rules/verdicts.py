@@ -85,21 +85,14 @@ class Values:
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
-        rules, ids, n = self.prepared.rules, self.facts.ids, self._layout.n
-        for number, choice in self.found():
-            rule, rows = rules[number], []
-            for _ in rule.variables:
-                choice, row = divmod(choice, n)
-                rows.append(ids[row])
-            yield rule, tuple(rows[::-1])
+        return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
 
-    def found(self) -> list[list[int]]:
-        """The same by number of the rule and of the choice, the last object changing fastest."""
+    def found(self) -> list[int]:
+        """The same as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
         n = self._layout.n
-        most = sum(n ** len(rule.variables) for rule in self.prepared.rules)
-        found: Whole = np.empty((most, 2), dtype=np.int64)
+        found: Whole = np.empty(self.prepared.most_found(n), dtype=np.int64)
         count = choices(self.prepared.verdicts(n), n, self._arena, found)
-        told: list[list[int]] = found[:count].tolist()
+        told: list[int] = found[:count].tolist()
         return told
 
 
