@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Truth
 from visup.rules.measure import Measured
+from visup.rules.pair_loops import pair_quantities
 from visup.rules.relations import NAMES, measured
 
 Codes = NDArray[np.int8]
@@ -40,6 +41,7 @@ class Facts:
         beliefs: Objects that are believed present, by increasing id.
         ids: Their ids.
         row: Id -> place in `ids`, and so in all arrays.
+        measured: Quantities of all pairs.
     """
 
     def __init__(self, mind: Mind) -> None:
@@ -47,7 +49,9 @@ class Facts:
         self.beliefs = mind.present()
         self.ids = tuple(b.id for b in self.beliefs)
         self.row = {object_id: i for i, object_id in enumerate(self.ids)}
+        self.measured: Measured = measured(mind)
         self._codes: dict[str, Codes] = {}
+        self._paired: tuple[Floats, Codes] | None = None
 
     def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
         """(n,) codes from a look at each object."""
@@ -55,12 +59,14 @@ class Facts:
 
     def pairs(self, code: int) -> Codes:
         """(n, n) codes that are all the same."""
-        return np.full((len(self.ids), len(self.ids)), code, dtype=np.int8)
+        codes = np.empty((len(self.ids), len(self.ids)), dtype=np.int8)
+        codes.fill(code)
+        return codes
 
     def unknown(self, objects: int) -> Floats:
         """(2, n) or (2, n, n) intervals of what is known of no object, or of no pair of objects."""
-        whole = np.full((2, *(len(self.ids),) * objects), np.inf)
-        whole[0] = -np.inf
+        whole = np.empty((2, *(len(self.ids),) * objects))
+        whole[0], whole[1] = -np.inf, np.inf
         return whole
 
     def related(self, name: str) -> Codes:
@@ -84,11 +90,6 @@ class Facts:
             if a in row and b in row:
                 codes[row[a], row[b]] = codes[row[b], row[a]] = YES
         return codes
-
-    @cached_property
-    def measured(self) -> Measured:
-        """Quantities of all pairs."""
-        return measured(self.mind)
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
@@ -117,23 +118,30 @@ class Facts:
         values[np.ix_(known, known)] = table[inner]
         return values
 
-    @cached_property
-    def closing(self) -> Floats:
-        """(3, n, n) how fast distances shrink, px/s: the least, the most likely, the most."""
-        rate, sigma = -self.pair("rate"), self.pair("rate_sigma")
-        sigma = np.where(sigma == sigma, SIGMAS * sigma, 0.0)
-        return np.array((rate - sigma, rate, rate + sigma))
+    def between(self, quantity: int) -> Floats:
+        """(2, n, n) intervals of one of the quantities of `pair_loops`."""
+        whole: Floats = self._pairs[0][quantity]
+        return whole
 
-    @cached_property
-    def contact(self) -> Floats:
-        """(3, n, n) seconds until outlines meet: soonest, most likely, latest; NaN when unknown."""
-        gap, closing = self.pair("gap"), self.closing[::-1]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            times = np.where(closing > 0, gap / closing, np.inf)
-        known = closing[1] == closing[1]
-        times[:, (gap == 0.0) & known] = 0.0
-        times[:, ~known | (gap != gap)] = np.nan
-        return times
+    @property
+    def first_contact(self) -> Codes:
+        """(n, n) whether the second is what the first would meet first."""
+        return self._pairs[1]
+
+    @property
+    def _pairs(self) -> tuple[Floats, Codes]:
+        """All quantities of pairs, and what is met first."""
+        if self._paired is None:
+            n = len(self.ids)
+            out, first = np.empty((4, 2, n, n)), np.empty((n, n), np.int8)
+            # Of one layout, so that the loops are compiled once.
+            gap, rate, sigma, relative = (
+                np.ascontiguousarray(self.pair(name))
+                for name in ("gap", "rate", "rate_sigma", "relative_speed")
+            )
+            pair_quantities(gap, rate, sigma, relative, SIGMAS, out, first)
+            self._paired = out, first
+        return self._paired
 
 
 def code(value: bool) -> int:
