@@ -16,6 +16,7 @@ from visup.agent import Mind, ObjectBelief, Truth
 from visup.rules.measure import Measured
 from visup.rules.pair_loops import pair_quantities
 from visup.rules.relations import NAMES, measured
+from visup.rules.sentences import short
 
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
@@ -50,8 +51,15 @@ class Facts:
         self.ids = tuple(b.id for b in self.beliefs)
         self.row = {object_id: i for i, object_id in enumerate(self.ids)}
         self.measured: Measured = measured(mind)
+        self._names: dict[int, str] = {}
         self._codes: dict[str, Codes] = {}
         self._paired: tuple[Floats, Codes] | None = None
+
+    def short(self, object_id: int) -> str:
+        """An object in two words; see `sentences.short`."""
+        if object_id not in self._names:
+            self._names[object_id] = short(self.mind, object_id)
+        return self._names[object_id]
 
     def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
         """(n,) codes from a look at each object."""

@@ -67,6 +67,7 @@ class Layout:
 
     Attributes:
         places: Where the intervals of each step begin.
+        axes: Axes of the objects that each depends on, in order.
         size: Of all intervals, numbers.
         memory: Where states stand.
         fresh: The states before the first sample.
@@ -75,6 +76,7 @@ class Layout:
     def __init__(self, program: Program, n: int, facts: Mapping[int, int], codes: int) -> None:
         self.program, self.n, self.facts, self.codes = program, n, facts, codes
         self.places: list[int] = []
+        self.axes = [tuple(sorted(step.axes)) for step in program.steps]
         self.size = 0
         self._stages: list[_Stage] = []
         self._ready: list[int] = []  # the stage from which on each step's value is there
@@ -125,8 +127,7 @@ class Layout:
 
     def box(self, step: int, arena: Floats) -> Box:
         """(2, ...) the intervals of a step, along the axes that it depends on."""
-        axes = len(self.program.steps[step].axes)
-        at = self.places[step]
+        axes, at = len(self.axes[step]), self.places[step]
         return arena[at : at + 2 * self.n**axes].reshape(2, *(self.n,) * axes)
 
     def _lay(self, number: int, step: Step) -> None:

@@ -90,6 +90,7 @@ class Ruled:
         rules: The rules.
         compiler: Knows where the value of every formula is found.
         places: Of each rule: `when`, and `unless` if there is one.
+        lines: What `explain` remembers of the texts of evidence, by rule and names of objects.
     """
 
     rules: tuple[Rule, ...]
@@ -101,6 +102,9 @@ class Ruled:
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
     _layouts: dict[int, Layout] = field(default_factory=dict, repr=False)
     _verdicts: dict[int, Whole] = field(default_factory=dict, repr=False)
+    lines: dict[tuple[str, tuple[str, ...]], tuple[Any, ...]] = field(
+        default_factory=dict, repr=False
+    )
     _keys: dict[tuple[int, ...], Keys] = field(default_factory=dict, repr=False)
 
     @property

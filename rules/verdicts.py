@@ -77,11 +77,12 @@ class Values:
 
     def interval(self, place: Place, rows: tuple[int, ...]) -> Interval:
         """The interval of a formula for one choice of objects, by the rows of these along the axes."""
-        n, at = self._layout.n, 0
-        for axis in sorted(place.axes):
-            at = at * n + rows[axis]
-        begin = self._layout.places[place.step] + at
-        return self._arena.item(begin), self._arena.item(begin + n ** len(place.axes))
+        layout, at = self._layout, 0
+        axes = layout.axes[place.step]
+        for axis in axes:
+            at = at * layout.n + rows[axis]
+        at += layout.places[place.step]
+        return self._arena.item(at), self._arena.item(at + layout.n ** len(axes))
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
