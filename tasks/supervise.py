@@ -162,6 +162,8 @@ def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity) -> TaskMemo
     What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
     what interrupts it, which is no matter of the task.
     """
+    if memory.belief is told and memory.activity == activity:
+        return memory
     belief = replace(memory.belief, active=activity.chance)
     over = told.verdict in OVER or any(s.status in BAD for s in told.stages)
     if activity.audible or over or memory.interrupted:
