@@ -21,7 +21,7 @@ import numpy as np
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES, signed_gap
-from visup.rules.fit import binned, slope_noise, theil_sen
+from visup.rules.fit_loops import slope_noise, trends
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.judge import (
     AWAY,
@@ -208,7 +208,7 @@ def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats
     if len(times) < 6 or times[-1] - times[0] < 0.6 * s.window_s:
         unknown = np.full(samples.shape[1], np.nan)
         return unknown, unknown
-    return theil_sen(*binned(times, samples, s.bins))
+    return trends(times, samples, s.bins)
 
 
 def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:

@@ -7,7 +7,7 @@ relation of boxes whose edges are level in truth does not flicker.
 Two outlines relate by how far the points of each lie outside the other (negative: within it):
 nearest point and farthest point. Where boxes are apart by more than the threshold, or the gap of
 the outlines is, no such distance is looked up: the two are disconnected. Else it costs a nearest
-neighbour search of at most 200 points of each outline among the other's, about 0.5 ms for a pair.
+neighbour search of at most 200 points of each outline among the other's, about 15 us for a pair.
 Holes within an outline count as outside.
 """
 

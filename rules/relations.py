@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,7 @@ from visup.agent.changing import replace
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES
-from visup.rules.fit import binned, theil_sen
+from visup.rules.fit_loops import trends
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.history import History, covered, sample
 from visup.rules.judge import (
@@ -59,7 +60,7 @@ from visup.rules.judge import (
     wanted,
 )
 from visup.rules.latch import UNKNOWN, Codes, Latch, hold_sign, step, unknown_latch
-from visup.rules.measure import Measured, Measuring, RelationSettings, at_rest, scale
+from visup.rules.measure import Measured, Measuring, RelationSettings, scale
 from visup.rules.pairs import carried, of_pairs, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import (
@@ -285,7 +286,7 @@ class Relations:
         if len(at) == 0:
             return codes
         first, second = h.depth[:, i[at]], h.depth[:, j[at]]
-        slope, sigma = theil_sen(*binned(h.times, np.abs(first - second), self.settings.bins))
+        slope, sigma = trends(h.times, np.abs(first - second), self.settings.bins)
         typical = 0.5 * np.nanmean(first + second, axis=0)
         least = np.maximum(self.settings.depth_rate * typical, 3.0 * sigma)
         found = np.full(len(at), KEEPING, dtype=np.int8)
@@ -312,7 +313,7 @@ class Relations:
         held = before == 1
         least = 2 * s.still_speed * diagonal * np.where(held, s.moving_exit, 1.0)
         moves = np.minimum(now.speed[i], now.speed[j]) > least
-        rest, nearly = at_rest(now, s, diagonal, diagonal * s.together_exit)[:, i, j]
+        rest, nearly = _at_rest(now, s, diagonal, diagonal * s.together_exit)[:, i, j]
         wanted: Codes = ((rest | (held & nearly)) & moves).view(np.int8)
         wanted[np.isnan(of_pairs(now.relative_speed))] = UNKNOWN
         return wanted
@@ -395,3 +396,15 @@ def _numbers(ids: tuple[int, ...], of: Iterable[tuple[int, int]]) -> tuple[int, 
     """Numbers of pairs of object ids; pairs with an object that is not there are left out."""
     table = RelationTable(ids)
     return tuple(k for a, b in of if (k := table.pair(a, b)[0]) >= 0)
+
+
+def _at_rest(now: Measured, settings: RelationSettings, *diagonals: float) -> Any:
+    def distances(vectors: Floats) -> Any:
+        x, y = (vectors[:, None] - vectors[None]).transpose(2, 0, 1)
+        return np.sqrt(x * x + y * y)
+
+    halves = np.maximum(distances(now.motion[1]), distances(now.motion[2]))
+    wide = np.array(diagonals)[:, None, None]
+    rest = halves < settings.still_half * wide
+    rest &= now.relative_speed < settings.still_speed * wide
+    return rest
