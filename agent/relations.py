@@ -186,24 +186,29 @@ class RelationTable(Sequence[Relation]):
         """
         import numpy as np
 
-        codes = np.zeros((len(names), len(ids), len(ids)), dtype=np.int8)
-        which, code, rows, turned = _rows_of(self._names, self._heights, names)
-        if len(which):
-            state = np.concatenate([c.state for c in self.columns])
-            first, second = _pairs_of(len(self.ids))
-            if tuple(ids) != self.ids:
-                place = {object_id: i for i, object_id in enumerate(ids)}
-                where = np.array([place.get(i, -1) for i in self.ids], dtype=np.intp)
-                here = (where[first] >= 0) & (where[second] >= 0)
-                first, second, state = where[first[here]], where[second[here]], state[:, here]
-            codes[which, first, second] = _truth(state[rows], code)
-            codes[which, second, first] = _truth(state[turned], code)
+        places, code = _places_of(self._names, self._heights, names, len(self.ids))
+        states = [c.state.ravel() for c in self.columns]
+        codes = _truth(np.concatenate([*states, _nothing()]).take(places), code)
+        if tuple(ids) != self.ids:
+            codes = self._of(codes, ids)
         for r in self.extra:
             if r.name in names and len(r.objects) == 2 and set(r.objects) <= set(ids):
                 i, j = (list(ids).index(o) for o in r.objects)
                 k = names.index(r.name)
                 codes[k, i, j] = codes[k, j, i] = _CODES[r.truth]
         return codes
+
+    def _of(self, codes: NDArray[np.int8], ids: Sequence[int]) -> NDArray[np.int8]:
+        """(k, n, n) tables for other objects; what is not judged is unknown."""
+        import numpy as np
+
+        out = np.zeros((len(codes), len(ids), len(ids)), dtype=np.int8)
+        there = [n for n, i in enumerate(ids) if i in self._place]
+        here = [self._place[ids[n]] for n in there]
+        out[:, np.array(there, np.intp)[:, None], there] = codes[
+            :, np.array(here, np.intp)[:, None], here
+        ]
+        return out
 
     def all(self) -> Iterator[Relation]:
         """Everything that is judged, listed or not: of each question the relation that holds."""
@@ -295,36 +300,44 @@ def _codes_of(names: tuple[tuple[str, ...], ...]) -> Mapping[str, tuple[int, int
     return {n: (c, code) for c, told in enumerate(names) for code, n in enumerate(told) if n}
 
 
-@lru_cache(maxsize=16)
-def _rows_of(
-    names: tuple[tuple[str, ...], ...], heights: tuple[int, ...], wanted: tuple[str, ...]
-) -> tuple[NDArray[np.intp], NDArray[np.int8], NDArray[np.intp], NDArray[np.intp]]:
-    """Where some relations are found when the states of all columns stand upon each other.
+@lru_cache(maxsize=128)
+def _places_of(
+    names: tuple[tuple[str, ...], ...],
+    heights: tuple[int, ...],
+    wanted: tuple[str, ...],
+    m: int,
+) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
+    """Where some relations of all of m objects are found in the states of all columns, end to end.
 
     Returns:
-        Of those that are there: (W, 1) which of the wanted it is and its code, (W,) its row, and
-        its row for pairs turned round.
+        (k, m, m) places, of what is not judged that behind the last state, and (k, 1, 1) codes.
     """
     import numpy as np
 
-    named, begin = _codes_of(names), [sum(heights[:k]) for k in range(len(heights))]
-    there = [(k, *named[n]) for k, n in enumerate(wanted) if n in named]
-    which = np.array([[k] for k, _, _ in there], dtype=np.intp)
-    code = np.array([[code] for _, _, code in there], dtype=np.int8)
-    rows = np.array([begin[c] for _, c, _ in there], dtype=np.intp)
-    turned = np.array([begin[c] + heights[c] - 1 for _, c, _ in there], dtype=np.intp)
-    return which, code, rows, turned
+    named, first, second = _codes_of(names), *np.triu_indices(m, 1)
+    pairs, each = len(first), np.arange(len(first))
+    places = np.full((len(wanted), m, m), sum(heights) * pairs, dtype=np.intp)
+    codes = np.zeros((len(wanted), 1, 1), dtype=np.int8)
+    for k, name in enumerate(wanted):
+        if name in named:
+            column, codes[k] = named[name]
+            row = sum(heights[:column])
+            places[k, first, second] = row * pairs + each
+            places[k, second, first] = (row + heights[column] - 1) * pairs + each
+    return places, codes
 
 
-@lru_cache(maxsize=128)
-def _pairs_of(m: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First and second index of every pair of m objects."""
+@lru_cache(maxsize=1)
+def _nothing() -> NDArray[np.int8]:
+    """The state of what is not judged."""
     import numpy as np
 
-    return np.triu_indices(m, 1)
+    return np.array([UNKNOWN_CODE], dtype=np.int8)
 
 
 def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
     """1 where a state has the code, 0 where it is unknown, else -1."""
-    held = (state == code).astype("int8")
-    return held + held - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]
+    held: NDArray[np.int8] = (state == code).view("int8")
+    held += held
+    held -= (state != UNKNOWN_CODE).view("int8")
+    return held

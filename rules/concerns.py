@@ -35,8 +35,11 @@ class Held:
 
 
 def stand(
-    values: Values, held: Mapping[Key, Held], cooling: Mapping[Key, float], before: float
-) -> tuple[Mapping[Key, Held], Mapping[Key, float]]:
+    values: Values,
+    held: MappingProxyType[Key, Held],
+    cooling: Mapping[Key, float],
+    before: float,
+) -> tuple[MappingProxyType[Key, Held], Mapping[Key, float]]:
     """What holds now and what still stands of before, and what must not be raised again yet.
 
     Args:
@@ -54,7 +57,7 @@ def stand(
     for hit in hits:
         found.setdefault(keys[hit], hit)
     rest = {key: until for key, until in cooling.items() if until > now} if cooling else {}
-    after: dict[Key, Held] = dict(held)
+    after = held.copy()
     for key, old in held.items():
         if key in found:
             if old.until != inf:

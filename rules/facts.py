@@ -7,7 +7,7 @@ Quantities are intervals: value +- `SIGMAS` standard deviations where the deviat
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,9 +87,8 @@ class Facts:
         """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
         tables = self.mind.truths_of(names, self.ids)
         # An object is equal to itself, and nothing else.
-        each = np.arange(len(self.ids))
-        itself = [[YES if name in ITSELF else NO] for name in names]
-        tables[:, each, each] = np.array(itself, dtype=np.int8).reshape(-1, 1)
+        n = len(self.ids)
+        tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)
         return tables
 
     def _coupled(self) -> Codes:
@@ -126,7 +125,7 @@ class Facts:
         values[np.ix_(known, known)] = table[inner]
         return values
 
-    def between(self, quantity: int) -> Floats:
+    def of_pairs(self, quantity: int) -> Floats:
         """(2, n, n) intervals of one of the quantities of `pair_loops`."""
         whole: Floats = self._pairs[0][quantity]
         return whole
@@ -152,14 +151,23 @@ class Facts:
         return self._paired
 
 
+@lru_cache(maxsize=256)
+def _of_itself(names: tuple[str, ...]) -> Codes:
+    """(k, 1) whether relations hold of an object and itself."""
+    return np.array([[YES if name in ITSELF else NO] for name in names], dtype=np.int8)
+
+
 def code(value: bool) -> int:
     """`YES` or `NO`."""
     return YES if value else NO
 
 
 def exactly(values: Floats) -> Floats:
-    """(2, ...) intervals of known values; NaN becomes unknown."""
-    return between(values, values)
+    """(2, n) intervals of known values; NaN becomes unknown."""
+    known = values.tolist()
+    return np.array(
+        ([v if v == v else -np.inf for v in known], [v if v == v else np.inf for v in known])
+    )
 
 
 def between(low: Floats, high: Floats) -> Floats:

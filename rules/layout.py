@@ -27,6 +27,7 @@ from visup.rules.operators import (
 )
 from visup.rules.program import Program, Step
 from visup.rules.states import Memory, Moments, States, Window
+from visup.rules.terms import Measure
 
 _ON = Arrays()
 _KINDS = {
@@ -69,6 +70,7 @@ class Layout:
         places: Where the intervals of each step begin.
         axes: Axes of the objects that each depends on, in order.
         size: Of all intervals, numbers.
+        looked: Of those of the quantities that are looked up; they come first, in their order.
         memory: Where states stand.
         fresh: The states before the first sample.
     """
@@ -84,7 +86,13 @@ class Layout:
         self._moments: list[Moments] = []
         self._windows: list[Window] = []
         self._kept = 0
+        # Quantities stand before all else, so that they are put there in one go.
+        measured = [k for k, node in program.looks() if isinstance(node, Measure)]
+        places = {k: self._room(n ** len(self.axes[k])) for k in measured}
+        self.looked = self.size
         for number, step in enumerate(program.steps):
+            room = places.get(number)
+            self.places.append(self._room(n ** len(step.axes)) if room is None else room)
             self._lay(number, step)
         self.memory = Memory(n, tuple(self._moments), tuple(self._windows))
         self.fresh = self.memory.fresh()
@@ -131,9 +139,8 @@ class Layout:
         return arena[at : at + 2 * self.n**axes].reshape(2, *(self.n,) * axes)
 
     def _lay(self, number: int, step: Step) -> None:
-        """Find a place for a step, and say how it is done."""
+        """Say how a step is done."""
         cells = self.n ** len(step.axes)
-        self.places.append(self._room(cells))
         stage = max((self._ready[r] for r in step.reads), default=0)
         if isinstance(step.operator, Sliding | Counting):
             reads = tuple(self._wide(r, step.axes) for r in step.reads)

@@ -101,7 +101,7 @@ class Ruled:
     _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
     _layouts: dict[int, Layout] = field(default_factory=dict, repr=False)
-    _verdicts: dict[int, Whole] = field(default_factory=dict, repr=False)
+    _verdicts: dict[int, tuple[Whole, int]] = field(default_factory=dict, repr=False)
     lines: dict[tuple[str, tuple[str, ...]], tuple[Any, ...]] = field(
         default_factory=dict, repr=False
     )
@@ -187,10 +187,6 @@ class Ruled:
             self._layouts[n] = Layout(self.program, n, places, begin)
         return self._layouts[n]
 
-    def most_found(self, n: int) -> int:
-        """How many choices of a number of objects there are for all rules."""
-        return sum([n ** len(rule.variables) for rule in self.rules])
-
     @cached_property
     def rules_by_name(self) -> Mapping[str, Rule]:
         """The rules by name."""
@@ -218,8 +214,11 @@ class Ruled:
         """What is remembered before the first sample."""
         return self.layout(n).fresh
 
-    def verdicts(self, n: int) -> Whole:
-        """Of each rule where its values stand for a number of objects; see `machine.choices`."""
+    def verdicts(self, n: int) -> tuple[Whole, int]:
+        """Of each rule where its values stand for a number of objects, and how many may be found.
+
+        See `machine.choices`.
+        """
         if n not in self._verdicts:
             layout, rows = self.layout(n), []
             for rule, places in zip(self.rules, self.places, strict=True):
@@ -227,7 +226,8 @@ class Ruled:
                 when, unless = (*at, (-1, 0))[:2]
                 apart = sum(1 << i + j - 1 for i, j in _apart(rule))
                 rows.append((*when, *unless, len(rule.variables), apart))
-            self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6)
+            most = sum(n ** len(rule.variables) for rule in self.rules)
+            self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6), most
         return self._verdicts[n]
 
 

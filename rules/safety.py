@@ -42,7 +42,7 @@ class Kept:
     before: States | None = None
     after: States | None = None
     tasks: tuple[TaskBelief, ...] = ()
-    held: Mapping[Key, Held] = field(default_factory=lambda: MappingProxyType({}))
+    held: MappingProxyType[Key, Held] = field(default_factory=lambda: MappingProxyType({}))
     cooling: Mapping[Key, float] = field(default_factory=lambda: MappingProxyType({}))
 
 

@@ -35,41 +35,36 @@ class Values:
         self.facts: Facts = facts
         self._layout: Layout = prepared.layout(len(facts.ids))
         self._arena: Floats = np.empty(self._layout.size)
-        self._measure()
+        if prepared.quantities:
+            np.concatenate(self._measured(), out=self._arena[: self._layout.looked])
         self.after: States = self._layout.step(before, now, self._codes(), self._arena)
 
     def _codes(self) -> Codes:
         """All facts: the relations, then the others."""
         facts, layout, prepared = self.facts, self._layout, self.prepared
-        codes: Codes = np.empty(layout.codes, dtype=np.int8)
-        width = layout.n * layout.n
-        related = len(prepared.relations) * width
-        codes[:related] = facts.relations(tuple(prepared.relations)).ravel()
-        for look in prepared.facts:
-            at = layout.facts[look.step]
-            codes[at : at + layout.n**look.axes] = look.ask(facts).ravel()
+        looked = [look.ask(facts).ravel() for look in prepared.facts]
+        related = facts.relations(tuple(prepared.relations)).ravel()
+        codes: Codes = np.concatenate([related, *looked])
         if facts.mind.unknown:
-            for name, k in prepared.relations.items():
-                if blind(facts.mind, name):
-                    codes[k * width : (k + 1) * width] = MAYBE
-            for look in prepared.facts:
-                if blind(facts.mind, look.name):
-                    at = layout.facts[look.step]
-                    codes[at : at + layout.n**look.axes] = MAYBE
+            for step, node in prepared.program.looks():
+                if step in layout.facts and blind(facts.mind, node.name):
+                    at = layout.facts[step]
+                    codes[at : at + layout.n ** len(layout.axes[step])] = MAYBE
         return codes
 
-    def _measure(self) -> None:
-        """Put all quantities where the program reads them."""
-        layout, arena, unknown = self._layout, self._arena, self.facts.mind.unknown
-        for look in self.prepared.quantities:
-            at, width = layout.places[look.step], layout.n**look.axes
-            if unknown and blind(self.facts.mind, look.name):
-                arena[at : at + width], arena[at + width : at + 2 * width] = -np.inf, np.inf
-                continue
-            value: Box = look.ask(self.facts)
-            if look.turned:
-                value = value.swapaxes(1, 2)
-            arena[at : at + 2 * width] = value.ravel()
+    def _measured(self) -> list[Floats]:
+        """The intervals of all quantities, in their order."""
+        facts = self.facts
+        told = [look.ask(facts) for look in self.prepared.quantities]
+        if facts.mind.unknown:
+            told = [
+                facts.unknown(look.axes) if blind(facts.mind, look.name) else value
+                for look, value in zip(self.prepared.quantities, told, strict=True)
+            ]
+        return [
+            (value.swapaxes(1, 2) if look.turned else value).ravel()
+            for look, value in zip(self.prepared.quantities, told, strict=True)
+        ]
 
     def at(self, place: Place) -> Box:
         """(2, ...) the intervals of a formula, along the axes of the objects that it depends on."""
@@ -90,9 +85,9 @@ class Values:
 
     def found(self) -> list[int]:
         """The same as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
-        n = self._layout.n
-        found: Whole = np.empty(self.prepared.most_found(n), dtype=np.int64)
-        count = choices(self.prepared.verdicts(n), n, self._arena, found)
+        rules, most = self.prepared.verdicts(self._layout.n)
+        found: Whole = np.empty(most, dtype=np.int64)
+        count = choices(rules, self._layout.n, self._arena, found)
         told: list[int] = found[:count].tolist()
         return told
 

@@ -186,7 +186,7 @@ def healthy(facts: Facts) -> Codes:
 def depth_difference(facts: Facts) -> Floats:
     """Difference of depth as a share of the smaller one; both depths within their deviations."""
     depth = facts.one("depth")
-    if not (depth == depth).any():  # NaN is not equal to itself
+    if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
         return facts.unknown(2)
     spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
     apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
@@ -279,11 +279,11 @@ WORDS: MappingProxyType[str, Word] = MappingProxyType(
 QUANTITIES: MappingProxyType[str, Quantity] = MappingProxyType(
     {
         "time_to_contact": Quantity(
-            _TWO, TIME, lambda f: f.between(CONTACT), "until the outlines meet"
+            _TWO, TIME, lambda f: f.of_pairs(CONTACT), "until the outlines meet"
         ),
-        "gap": Quantity(_TWO, LENGTH, lambda f: f.between(GAP), "between the outlines"),
-        "closing_speed": Quantity(_TWO, SPEED, lambda f: f.between(CLOSING), "of the distance"),
-        "relative_speed": Quantity(_TWO, SPEED, lambda f: f.between(RELATIVE), "in the image"),
+        "gap": Quantity(_TWO, LENGTH, lambda f: f.of_pairs(GAP), "between the outlines"),
+        "closing_speed": Quantity(_TWO, SPEED, lambda f: f.of_pairs(CLOSING), "of the distance"),
+        "relative_speed": Quantity(_TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"),
         "speed": Quantity(_ONE, SPEED, lambda f: exactly(f.one("speed")), "in the image"),
         "depth_difference": Quantity(_TWO, SHARE, depth_difference, "of the smaller depth"),
         "spin": Quantity(_ONE, TURNING, spin, "about itself"),
