@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import log
 
 import numpy as np
@@ -23,6 +24,7 @@ import numpy as np
 from visup.agent import Region
 from visup.agent.changing import replace
 from visup.rules.geometry import Floats
+from visup.rules.joint_loops import course, recent_of
 from visup.rules.outline_loops import beside, boxes_of, evenly, laid
 from visup.rules.outlines import EVEN_POINTS, ready
 
@@ -252,37 +254,9 @@ def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
     """
     if len(joint.path) <= LEAST_PLACES:
         return None
-    path = np.array(joint.path)
-    inside = int(np.count_nonzero(path[:, 0] > now - window_s - 1e-6))
-    long = int(np.count_nonzero(path[:, 0] > path[-1, 0] - 0.6 * window_s + 1e-6)) + 1
-    recent = path[-max(inside, long, LEAST_PLACES) :]
-    span = float(recent[-1, 0] - recent[0, 0])
+    places = np.fromiter(chain.from_iterable(joint.path), float, 6 * len(joint.path)).reshape(-1, 6)
+    begin = recent_of(places, now, window_s, LEAST_PLACES)
+    span = float(places[-1, 0] - places[begin, 0])
     if span < 0.6 * window_s - 1e-6:
         return None
-    # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
-    # longer, and is believed to be as large.
-    steps = np.diff(path[:, 1:3], axis=0)
-    noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
-    return _motion(recent, noise)
-
-
-def _motion(path: Floats, noise: Floats) -> Motion:
-    """The slope of the places, joined with the mean of the velocities, each by its precision."""
-    t = path[:, 0] - path[:, 0].mean()
-    lever = max(float(t @ t), 1e-9)
-    slope, spread = t @ path[:, 1:3] / lever, noise / lever
-    flow, span = path[np.isfinite(path[:, 5]), 3:], float(path[-1, 0] - path[0, 0])
-    if not len(flow):
-        return Motion(slope, spread, span)
-    independent = max(1.0, span / LASTS_S)
-    precision = _inverse(spread)
-    certain = independent / flow[:, 2].mean() * np.eye(2)
-    spread = _inverse(precision + certain)
-    return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread, span)
-
-
-def _inverse(matrix: Floats) -> Floats:
-    """Of a (2, 2) matrix, by hand: it is too small for a library."""
-    (a, b), (c, d) = matrix.tolist()
-    inverse: Floats = np.array(((d, -b), (-c, a))) / (a * d - b * c)
-    return inverse
+    return Motion(*course(places, begin, LASTS_S), span)

@@ -216,13 +216,19 @@ class Measuring:
     settings: RelationSettings
 
     def __call__(
-        self, h: History, objects: tuple[ObjectBelief, ...], mind: Mind, before: Measured
+        self,
+        h: History,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        mind: Mind,
+        before: Measured,
     ) -> Measured:
         """Measure one step.
 
         Args:
             h: Samples up to now.
             objects: The objects of the samples.
+            seen: (M, 8) how they were seen; see `sightings`.
             mind: The mind.
             before: What was measured in the step before.
 
@@ -231,7 +237,6 @@ class Measuring:
         """
         s, diagonal = self.settings, scale(mind.frame_size)
         noise, strong = s.judge.noise_px, 2.0 * s.rate_enter * diagonal
-        seen = sightings(objects, mind.time)
         gaps = self._gaps(objects, seen, h, mind, before)
         windows = s.window_s, s.quick_window_s, s.motion_window_s
         slope, sigma, motion, spread = fitted(

@@ -17,7 +17,8 @@ from visup.rules.geometry import (
     pixels_in,
     shared_pixels,
 )
-from visup.rules.latch import UNKNOWN, hold_sign
+from visup.rules.judge_loops import hold_sign
+from visup.rules.latch import UNKNOWN
 from visup.rules.outlines import outline_gap, reach
 from visup.rules.rcc8 import from_outline_signs, outline_differences, rcc8
 

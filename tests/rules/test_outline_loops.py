@@ -60,7 +60,7 @@ def test_an_outline_reaches_out_of_and_into_a_region_as_its_points_say(
     points = first[::step]
     far = apart(points, second).min(axis=1)
     at = np.rint(points).astype(int) - (20, 10)
-    inside: NDArray[np.bool_] = ((at >= 0) & (at < (40, 50))).all(axis=1)
+    inside = np.asarray(((at >= 0) & (at < (40, 50))).all(axis=1))
     inside[inside] = mask[at[inside, 1], at[inside, 0]]
     far[inside] *= -1
     boxes = loops.boxes_of(second)
@@ -76,7 +76,7 @@ def test_an_outline_reaches_as_far_as_its_furthest_point(seed: int) -> None:
     loops.reached(points, DIRECTIONS, 80.0, 70.0, support, free)
     along = points @ DIRECTIONS.T
     assert np.allclose(support, along.max(axis=0))
-    clear: NDArray[np.bool_] = ((points > 1.5) & (points < np.array([77.5, 67.5]))).all(axis=1)
+    clear = np.asarray(((points > 1.5) & (points < np.array([77.5, 67.5]))).all(axis=1))
     for k in range(16):
         tied = along[:, k] > along[:, k].max() - 1e-9
         assert free[k] in clear[tied]
