@@ -147,7 +147,7 @@ class Question:
     text: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ObjectBelief:
     """What is believed about one object.
 
@@ -268,7 +268,7 @@ class StageBelief:
     evidence: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TaskBelief:
     """How a task stands.
 
@@ -302,7 +302,7 @@ class TaskBelief:
     active: float = 1.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Mind:
     """All that is believed at one moment.
 

@@ -124,26 +124,31 @@ class RelationTable(Sequence[Relation]):
         """
         import numpy as np
 
-        codes = np.zeros((len(names), len(ids), len(ids)), dtype=np.int8)
-        for part in self.parts:
-            which, code, rows, turned = _rows_of(part.columns, names)
-            if not len(which):
-                continue
-            state = part.state
-            first, second = _pairs_of(len(self.ids))
-            if tuple(ids) != self.ids:
-                place = {object_id: i for i, object_id in enumerate(ids)}
-                where = np.array([place.get(i, -1) for i in self.ids], dtype=np.intp)
-                here = (where[first] >= 0) & (where[second] >= 0)
-                first, second, state = where[first[here]], where[second[here]], state[:, here]
-            codes[which, first, second] = _truth(state[rows], code)
-            codes[which, second, first] = _truth(state[turned], code)
+        columns = tuple([part.columns for part in self.parts])
+        heights = tuple([len(part.state) for part in self.parts])
+        places, code = _places_of(columns, heights, names, len(self.ids))
+        states = [part.state.ravel() for part in self.parts]
+        codes = _truth(np.concatenate([*states, _nothing()]).take(places), code)
+        if tuple(ids) != self.ids:
+            codes = self._of(codes, ids)
         for r in self.extra:
             if r.name in names and len(r.objects) == 2 and set(r.objects) <= set(ids):
                 i, j = (list(ids).index(o) for o in r.objects)
                 k = names.index(r.name)
                 codes[k, i, j] = codes[k, j, i] = _CODES[r.truth]
         return codes
+
+    def _of(self, codes: NDArray[np.int8], ids: Sequence[int]) -> NDArray[np.int8]:
+        """(k, n, n) tables for other objects; what is not judged is unknown."""
+        import numpy as np
+
+        out = np.zeros((len(codes), len(ids), len(ids)), dtype=np.int8)
+        there = [n for n, i in enumerate(ids) if i in self._place]
+        here = [self._place[ids[n]] for n in there]
+        out[:, np.array(there, np.intp)[:, None], there] = codes[
+            :, np.array(here, np.intp)[:, None], here
+        ]
+        return out
 
     def all(self) -> Iterator[Relation]:
         """Everything that is judged, listed or not: of each column the relation that holds."""
@@ -214,31 +219,38 @@ class RelationTable(Sequence[Relation]):
         return {(r.name, frozenset(r.objects)): r for r in reversed(self.extra)}
 
 
-@lru_cache(maxsize=16)
-def _rows_of(
-    columns: Columns, wanted: tuple[str, ...]
-) -> tuple[NDArray[np.intp], NDArray[np.int8], NDArray[np.intp], NDArray[np.intp]]:
-    """Where some relations are found among cells.
+@lru_cache(maxsize=128)
+def _places_of(
+    columns: tuple[Columns, ...], heights: tuple[int, ...], wanted: tuple[str, ...], m: int
+) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
+    """Where some relations of all of m objects are found in the states of all cells, end to end.
 
     Returns:
-        Of those that are there: (W, 1) which of the wanted it is and its code, (W,) its row, and
-        its row for pairs turned round.
+        (k, m, m) places, of what is not judged that behind the last state, and (k, 1, 1) codes.
     """
     import numpy as np
 
-    there = [(k, *columns.named[n]) for k, n in enumerate(wanted) if n in columns.named]
-    which = np.array([[k] for k, _, _ in there], dtype=np.intp)
-    code = np.array([[code] for _, _, code in there], dtype=np.int8)
-    rows = np.array([column.rows for _, column, _ in there], dtype=np.intp).reshape(-1, 2)
-    return which, code, rows[:, 0], rows[:, 1]
+    first, second = np.triu_indices(m, 1)
+    pairs, each = len(first), np.arange(len(first))
+    places = np.full((len(wanted), m, m), sum(heights) * pairs, dtype=np.intp)
+    codes = np.zeros((len(wanted), 1, 1), dtype=np.int8)
+    for number, part in enumerate(columns):
+        begin = sum(heights[:number])
+        for k, name in enumerate(wanted):
+            if name in part.named:
+                column, codes[k] = part.named[name]
+                row, turned = column.rows
+                places[k, first, second] = (begin + row) * pairs + each
+                places[k, second, first] = (begin + turned) * pairs + each
+    return places, codes
 
 
-@lru_cache(maxsize=128)
-def _pairs_of(m: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First and second index of every pair of m objects."""
+@lru_cache(maxsize=1)
+def _nothing() -> NDArray[np.int8]:
+    """The state of what is not judged."""
     import numpy as np
 
-    return np.triu_indices(m, 1)
+    return np.array([UNKNOWN_CODE], dtype=np.int8)
 
 
 def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
