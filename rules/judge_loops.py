@@ -113,8 +113,9 @@ def edge_differences(boxes: Floats) -> Floats:
 @compiled
 def box_gap(boxes: Floats, i: int, j: int) -> float:
     """Distance between two boxes, pixels; see `box_gaps`."""
-    dx = -min(difference(boxes, i, j, 4), difference(boxes, i, j, 6))
-    dy = -min(difference(boxes, i, j, 5), difference(boxes, i, j, 7))
+    x, y, left, top = boxes[i, 0], boxes[i, 1], boxes[j, 0], boxes[j, 1]
+    dx = max(x - (left + boxes[j, 2]), left - (x + boxes[i, 2]))
+    dy = max(y - (top + boxes[j, 3]), top - (y + boxes[i, 3]))
     if np.isnan(dx + dy):
         return np.nan
     if dx <= 0.0 and dy <= 0.0:

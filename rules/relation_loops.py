@@ -16,6 +16,11 @@ GAP, RATE, SIGMA, RELATIVE = range(4)
 """Of the tables of `Measured`."""
 
 
+TOLD = (0, 1, 2, 8, 9, 10, 11, 12, 13, 14)
+JUDGED = (14, 15, 16, 17, 10, 11, 12, 13, 9, 8)
+"""Rows of what is told, and the rows of the latch that they are taken from."""
+
+
 @compiled
 def smoothed(before: float, now: float, share: float, jump: float) -> float:
     """One value, smoothed; see `smooth.py`."""
@@ -295,24 +300,13 @@ def told(
         np.empty((16, pairs)),
         np.empty((7, pairs)),
     )
-    rows = (
-        (0, 14),
-        (1, 15),
-        (2, 16),
-        (8, 17),
-        (9, 10),
-        (10, 11),
-        (11, 12),
-        (12, 13),
-        (13, 9),
-        (14, 8),
-    )
-    for to, row in rows:
-        codes[to], moments[to] = state[row], since[row]
-    moments[15] = since[8]
-    for k in range(2):
-        codes[3 + 3 * k], moments[3 + 3 * k] = rcc8[k], rcc8_since[k]
-        moments[4 + 3 * k] = rcc8_since[k]
+    for n in range(len(TOLD)):
+        for k in range(pairs):
+            codes[TOLD[n], k], moments[TOLD[n], k] = state[JUDGED[n], k], since[JUDGED[n], k]
+    for k in range(pairs):
+        codes[3, k], codes[6, k], moments[15, k] = rcc8[0, k], rcc8[1, k], since[8, k]
+        moments[3, k] = moments[4, k] = rcc8_since[0, k]
+        moments[6, k] = moments[7, k] = rcc8_since[1, k]
     k = -1
     for i in range(count):
         for j in range(i + 1, count):
