@@ -154,7 +154,8 @@ class Facts:
 @lru_cache(maxsize=256)
 def _of_itself(names: tuple[str, ...]) -> Codes:
     """(k, 1) whether relations hold of an object and itself."""
-    return np.array([[YES if name in ITSELF else NO] for name in names], dtype=np.int8)
+    codes = np.array([YES if name in ITSELF else NO for name in names], dtype=np.int8)
+    return codes.reshape(-1, 1)
 
 
 def code(value: bool) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from visup.rules.intervals import Box, Interval
 from visup.rules.layout import Layout
 from visup.rules.machine import Codes, Floats, Whole, choices
 from visup.rules.program import Place
-from visup.rules.ruled import Ruled
+from visup.rules.ruled import Key, Ruled
 from visup.rules.states import States
 
 
@@ -83,8 +83,12 @@ class Values:
         """Every rule with every choice of objects for which it is true and not suspended."""
         return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
 
+    def true_of(self) -> Mapping[Key, int]:
+        """For each rule and set of objects of which it is true the first choice, as `found` tells it."""
+        return self.prepared.keys(self.facts.ids).of(self.found())
+
     def found(self) -> list[int]:
-        """The same as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
+        """What is true as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
         rules, most = self.prepared.verdicts(self._layout.n)
         found: Whole = np.empty(most, dtype=np.int64)
         count = choices(rules, self._layout.n, self._arena, found)
