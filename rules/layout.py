@@ -126,11 +126,10 @@ class Layout:
             begin = end
             for slot in stage.windows:
                 w = self._windows[slot]
-                shape = (2, w.cells)
                 # What is remembered must not change when the arena does.
-                parts = [arena[r : r + 2 * w.cells].reshape(shape).copy() for r in w.reads]
+                parts = [arena[read].reshape(2, -1).copy() for read in w.reads]
                 windows[slot], value = w.step(windows[slot], now, *parts)
-                arena[w.place : w.place + 2 * w.cells].reshape(shape)[:] = value
+                arena[w.place].reshape(2, -1)[:] = value
         return States(now, after if changed else states.moments, tuple(windows))
 
     def box(self, step: int, arena: Floats) -> Box:
@@ -143,11 +142,17 @@ class Layout:
         cells = self.n ** len(step.axes)
         stage = max((self._ready[r] for r in step.reads), default=0)
         if isinstance(step.operator, Sliding | Counting):
-            reads = tuple(self._wide(r, step.axes) for r in step.reads)
             self._stage(stage).windows.append(len(self._windows))
-            on = step.operator.on(_ON)
-            place = self.places[number]
-            self._windows.append(Window(step.operator, on, len(step.axes), reads, place, cells))
+            starts = [self._wide(r, step.axes) for r in step.reads]
+            self._windows.append(
+                Window(
+                    step.operator,
+                    step.operator.on(_ON),
+                    len(step.axes),
+                    tuple(slice(at, at + 2 * cells) for at in starts),
+                    slice(self.places[number], self.places[number] + 2 * cells),
+                )
+            )
             stage += 1
         elif step.node is None or isinstance(step.node, Predicate):
             self._put(stage, *self._row(number, step, cells))
