@@ -146,7 +146,7 @@ class Question:
     text: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ObjectBelief:
     """What is believed about one object.
 
@@ -267,7 +267,7 @@ class StageBelief:
     evidence: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TaskBelief:
     """How a task stands.
 
@@ -301,7 +301,7 @@ class TaskBelief:
     active: float = 1.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Mind:
     """All that is believed at one moment.
 

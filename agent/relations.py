@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 from visup.agent.records import Truth
 
@@ -47,56 +47,28 @@ class Relation:
     sigma: float | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Column:
-    """One question about every pair of objects, and its answers.
-
-    Pairs (a, b) with a < b stand in the order (0, 1), (0, 2), ..., (1, 2), ... of the table's ids.
-    Arrays have one row where the question is symmetric; else row 0 says what a is to b, row 1 what
-    b is to a.
+    """One question about every pair of objects; see `Cells`.
 
     Attributes:
         names: The relation that each code stands for; '' for a code that has no name of its own (not
             where only the one that holds is listed).
-        state: (R, P) int8 codes, -1 unknown.
-        since: (R, P) seconds since when each pair has its code.
-        confidence: (R, P) 0 to 1.
-        value: (R, P) the quantity behind it, NaN unknown; or None.
-        sigma: (R, P) its standard deviation, NaN unknown; or None.
+        rows: Row of the codes that say what a is to b, and of those that say what b is to a; the same
+            where the question is symmetric.
+        confidence: Row of the numbers that say how sure the answer is, 0 to 1.
+        value: Row of the quantity behind it, NaN unknown; or None.
+        sigma: Row of its standard deviation, NaN unknown; or None.
         listed: Which of its relations are told when a mind's relations are gone through: 'each'
             (true or false), 'one' (the one that holds), or 'none' (they are there to be asked for).
     """
 
     names: tuple[str, ...]
-    state: NDArray[np.int8]
-    since: NDArray[np.float64]
-    confidence: NDArray[np.float64]
-    value: NDArray[np.float64] | None = None
-    sigma: NDArray[np.float64] | None = None
+    rows: tuple[int, int]
+    confidence: int
+    value: int | None = None
+    sigma: int | None = None
     listed: str = "each"
-
-    def relation(self, code: int, pair: tuple[int, int], row: int, k: int) -> Relation:
-        """The relation of one code for pair number k, in row `row`."""
-        row = min(row, len(self.state) - 1)
-        state = int(self.state[row, k])
-        unknown = state == UNKNOWN_CODE
-        held = Truth.TRUE if state == code else Truth.FALSE
-        return Relation(
-            self.names[code],
-            pair,
-            Truth.UNKNOWN if unknown else held,
-            float(self.since[row, k]),
-            0.0 if unknown else float(self.confidence[row, k]),
-            _number(self.value, row, k),
-            _number(self.sigma, row, k),
-        )
-
-    def told(self, pair: tuple[int, int], k: int) -> Iterator[Relation]:
-        """What is listed of one pair, as it stands; the converse can be asked for."""
-        codes: Iterable[int] = range(len(self.names))
-        if self.listed == "one":
-            codes = (max(0, int(self.state[0, k])),)
-        return (self.relation(code, pair, 0, k) for code in codes if self.names[code])
 
     @property
     def count(self) -> int:
@@ -105,18 +77,88 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns that stand together in every step, and so made once.
+
+    Attributes:
+        each: In the order in which they are listed.
+    """
+
+    each: tuple[Column, ...]
+
+    @cached_property
+    def named(self) -> Mapping[str, tuple[Column, int]]:
+        """Relation -> its column, and its code there."""
+        return {n: (q, code) for q in self.each for code, n in enumerate(q.names) if n}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """What holds between all pairs of objects.
+
+    Pairs (a, b) with a < b stand in the order (0, 1), (0, 2), ..., (1, 2), ... of a table's ids.
+
+    Attributes:
+        columns: What the rows stand for.
+        state: (R, P) int8 codes, -1 unknown.
+        since: (R, P) seconds since when each pair has its code.
+        numbers: (N, P) confidences and quantities.
+    """
+
+    columns: Columns
+    state: NDArray[np.int8]
+    since: NDArray[np.float64]
+    numbers: NDArray[np.float64]
+
+    def relation(
+        self, column: Column, code: int, pair: tuple[int, int], row: int, k: int
+    ) -> Relation:
+        """The relation of one code for pair number k, as it stands (row 0) or turned round (1)."""
+        at = column.rows[row]
+        state = int(self.state[at, k])
+        unknown = state == UNKNOWN_CODE
+        held = Truth.TRUE if state == code else Truth.FALSE
+        return Relation(
+            column.names[code],
+            pair,
+            Truth.UNKNOWN if unknown else held,
+            float(self.since[at, k]),
+            0.0 if unknown else float(self.numbers[column.confidence, k]),
+            self._number(column.value, k),
+            self._number(column.sigma, k),
+        )
+
+    def told(self, column: Column, pair: tuple[int, int], k: int) -> Iterator[Relation]:
+        """What is listed of one pair, as it stands; the converse can be asked for."""
+        codes: Iterable[int] = range(len(column.names))
+        if column.listed == "one":
+            codes = (max(0, int(self.state[column.rows[0], k])),)
+        return (self.relation(column, c, pair, 0, k) for c in codes if column.names[c])
+
+    def _number(self, row: int | None, k: int) -> float | None:
+        if row is None:
+            return None
+        value = float(self.numbers[row, k])
+        return value if value == value else None  # NaN is not equal to itself
+
+
+@dataclass(frozen=True, eq=False)
 class RelationTable(Sequence[Relation]):
     """The relations of one step; immutable. As a sequence it gives those that are listed.
 
     Attributes:
         ids: (M,) object ids, increasing.
-        columns: Questions about all pairs of them.
-        extra: RelationTable given one by one (`coupled`, those of plug-ins).
+        parts: What holds between all pairs of them.
+        extra: Relations given one by one (those of plug-ins).
     """
 
     ids: tuple[int, ...] = ()
-    columns: tuple[Column, ...] = ()
+    parts: tuple[Cells, ...] = ()
     extra: tuple[Relation, ...] = field(default=())
+
+    def with_cells(self, cells: Cells) -> RelationTable:
+        """The same with more that holds between all pairs of its objects."""
+        return RelationTable(self.ids, (*self.parts, cells), self.extra)
 
     def find(self, name: str, *objects: int) -> Relation | None:
         """The relation of that name between exactly these objects, or None when it is not judged.
@@ -125,40 +167,43 @@ class RelationTable(Sequence[Relation]):
             name: Any relation, listed or not.
             objects: Ids; their order matters for relations that are not symmetric.
         """
-        at = self._named.get(name)
-        if at is not None and len(objects) == 2:
+        if len(objects) == 2:
             k, row = self.pair(*objects)
-            if k >= 0:
-                column, code = at
-                return self.columns[column].relation(code, (objects[0], objects[1]), row, k)
+            for part in self.parts:
+                at = part.columns.named.get(name)
+                if at is not None and k >= 0:
+                    return part.relation(*at, (objects[0], objects[1]), row, k)
         return self._given.get((name, frozenset(objects))) if self.extra else None
 
     def truth(self, name: str, a: int, b: int) -> Truth | None:
         """Whether the relation of that name holds from a to b, or None when it is not judged."""
-        at = self._named.get(name)
-        if at is not None:
-            k, row = self.pair(a, b)
-            if k >= 0:
-                column, code = at
-                state = self.columns[column].state
-                held = int(state[row if len(state) > 1 else 0, k])
-                return _TRUTHS[1 if held == code else 0 if held == UNKNOWN_CODE else -1]
+        for part in self.parts:
+            at = part.columns.named.get(name)
+            if at is not None:
+                k, row = self.pair(a, b)
+                if k >= 0:
+                    column, code = at
+                    held = int(part.state[column.rows[row], k])
+                    return _TRUTHS[1 if held == code else 0 if held == UNKNOWN_CODE else -1]
         found = self._given.get((name, frozenset((a, b)))) if self.extra else None
         return None if found is None else found.truth
 
     def true(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""
         found = [r for r in self.extra if r.name in names and r.truth is Truth.TRUE]
-        for name in names:
-            if name not in self._named:
-                continue
-            number, code = self._named[name]
-            column = self.columns[number]
-            rows, places = (column.state == code).nonzero()
-            pairs = list(self._pairs) if len(places) else []
-            for row, k in zip(rows.tolist(), places.tolist(), strict=True):
-                pair = pairs[k] if row == 0 else pairs[k][::-1]
-                found.append(column.relation(code, pair, row, k))
+        pairs: list[tuple[int, int]] = []
+        for part in self.parts:
+            for name in names:
+                column, code = part.columns.named.get(name, (None, 0))
+                if column is None:
+                    continue
+                pairs = pairs or list(self._pairs)
+                for row in range(len(set(column.rows))):
+                    states = part.state[column.rows[row]].tolist()
+                    for k, state in enumerate(states):
+                        if state == code:
+                            pair = pairs[k] if row == 0 else pairs[k][::-1]
+                            found.append(part.relation(column, code, pair, row, k))
         return tuple(sorted(found, key=lambda r: r.objects))
 
     def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
@@ -186,8 +231,10 @@ class RelationTable(Sequence[Relation]):
         """
         import numpy as np
 
-        places, code = _places_of(self._names, self._heights, names, len(self.ids))
-        states = [c.state.ravel() for c in self.columns]
+        columns = tuple([part.columns for part in self.parts])
+        heights = tuple([len(part.state) for part in self.parts])
+        places, code = _places_of(columns, heights, names, len(self.ids))
+        states = [part.state.ravel() for part in self.parts]
         codes = _truth(np.concatenate([*states, _nothing()]).take(places), code)
         if tuple(ids) != self.ids:
             codes = self._of(codes, ids)
@@ -211,13 +258,15 @@ class RelationTable(Sequence[Relation]):
         return out
 
     def all(self) -> Iterator[Relation]:
-        """Everything that is judged, listed or not: of each question the relation that holds."""
-        for k, pair in enumerate(self._pairs):
-            for column in self.columns:
-                for row in range(len(column.state)):
-                    code = max(0, int(column.state[row, k]))
-                    if column.names[code]:
-                        yield column.relation(code, pair if row == 0 else pair[::-1], row, k)
+        """Everything that is judged, listed or not: of each column the relation that holds."""
+        for part in self.parts:
+            for k, pair in enumerate(self._pairs):
+                for column in part.columns.each:
+                    for row, at in enumerate(dict.fromkeys(column.rows)):
+                        code = max(0, int(part.state[at, k]))
+                        if column.names[code]:
+                            turned = pair if row == 0 else pair[::-1]
+                            yield part.relation(column, code, turned, row, k)
         yield from self.extra
 
     def pair(self, a: int, b: int) -> tuple[int, int]:
@@ -230,15 +279,17 @@ class RelationTable(Sequence[Relation]):
         return low * m - low * (low + 1) // 2 + high - low - 1, row
 
     def __iter__(self) -> Iterator[Relation]:
-        listed = [c for c in self.columns if c.listed != "none"]
-        for k, pair in enumerate(self._pairs):
-            for column in listed:
-                yield from column.told(pair, k)
+        for part in self.parts:
+            listed = [q for q in part.columns.each if q.listed != "none"]
+            for k, pair in enumerate(self._pairs):
+                for column in listed:
+                    yield from part.told(column, pair, k)
         yield from self.extra
 
     def __len__(self) -> int:
         m = len(self.ids)
-        return m * (m - 1) // 2 * sum(c.count for c in self.columns) + len(self.extra)
+        count = sum(q.count for part in self.parts for q in part.columns.each)
+        return m * (m - 1) // 2 * count + len(self.extra)
 
     @overload
     def __getitem__(self, index: int) -> Relation: ...
@@ -248,7 +299,7 @@ class RelationTable(Sequence[Relation]):
         return self._listed[index]
 
     def __add__(self, more: Iterable[Relation]) -> RelationTable:
-        return RelationTable(self.ids, self.columns, (*self.extra, *more))
+        return RelationTable(self.ids, self.parts, (*self.extra, *more))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RelationTable | tuple):
@@ -271,59 +322,33 @@ class RelationTable(Sequence[Relation]):
         return {object_id: i for i, object_id in enumerate(self.ids)}
 
     @cached_property
-    def _named(self) -> Mapping[str, tuple[int, int]]:
-        return _codes_of(self._names)
-
-    @property
-    def _names(self) -> tuple[tuple[str, ...], ...]:
-        return tuple([c.names for c in self.columns])
-
-    @property
-    def _heights(self) -> tuple[int, ...]:
-        return tuple([len(c.state) for c in self.columns])
-
-    @cached_property
     def _given(self) -> Mapping[tuple[str, frozenset[int]], Relation]:
         return {(r.name, frozenset(r.objects)): r for r in reversed(self.extra)}
 
 
-def _number(table: Any, row: int, k: int) -> float | None:
-    if table is None:
-        return None
-    value = float(table[row, k])
-    return value if value == value else None  # NaN is not equal to itself
-
-
-@lru_cache(maxsize=16)
-def _codes_of(names: tuple[tuple[str, ...], ...]) -> Mapping[str, tuple[int, int]]:
-    """Relation -> number of its column and its code there; tables of all steps have the same ones."""
-    return {n: (c, code) for c, told in enumerate(names) for code, n in enumerate(told) if n}
-
-
 @lru_cache(maxsize=128)
 def _places_of(
-    names: tuple[tuple[str, ...], ...],
-    heights: tuple[int, ...],
-    wanted: tuple[str, ...],
-    m: int,
+    columns: tuple[Columns, ...], heights: tuple[int, ...], wanted: tuple[str, ...], m: int
 ) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
-    """Where some relations of all of m objects are found in the states of all columns, end to end.
+    """Where some relations of all of m objects are found in the states of all cells, end to end.
 
     Returns:
         (k, m, m) places, of what is not judged that behind the last state, and (k, 1, 1) codes.
     """
     import numpy as np
 
-    named, first, second = _codes_of(names), *np.triu_indices(m, 1)
+    first, second = np.triu_indices(m, 1)
     pairs, each = len(first), np.arange(len(first))
     places = np.full((len(wanted), m, m), sum(heights) * pairs, dtype=np.intp)
     codes = np.zeros((len(wanted), 1, 1), dtype=np.int8)
-    for k, name in enumerate(wanted):
-        if name in named:
-            column, codes[k] = named[name]
-            row = sum(heights[:column])
-            places[k, first, second] = row * pairs + each
-            places[k, second, first] = (row + heights[column] - 1) * pairs + each
+    for number, part in enumerate(columns):
+        begin = sum(heights[:number])
+        for k, name in enumerate(wanted):
+            if name in part.named:
+                column, codes[k] = part.named[name]
+                row, turned = column.rows
+                places[k, first, second] = (begin + row) * pairs + each
+                places[k, second, first] = (begin + turned) * pairs + each
     return places, codes
 
 
@@ -337,7 +362,5 @@ def _nothing() -> NDArray[np.int8]:
 
 def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
     """1 where a state has the code, 0 where it is unknown, else -1."""
-    held: NDArray[np.int8] = (state == code).view("int8")
-    held += held
-    held -= (state != UNKNOWN_CODE).view("int8")
-    return held
+    held = (state == code).astype("int8")
+    return held + held - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Presence
 from visup.agent.changing import replace
-from visup.rules.geometry import FAN, Floats, hull_separation, reach
+from visup.rules.geometry import FAN, Floats, hull_separation
+from visup.rules.outlines import reach
 from visup.rules.tracks import merged_pairs, tracks
 
 ROOM = 64

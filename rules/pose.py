@@ -87,7 +87,7 @@ class PoseSettings:
     spin_stale_s: float = 8.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Track:
     """What is remembered of one object's views.
 

@@ -10,6 +10,7 @@ from math import exp
 
 import numpy as np
 
+from visup.compiled import compiled
 from visup.rules.latch import Floats
 
 TAU_S = 0.15
@@ -28,9 +29,14 @@ def smoothed(before: Floats, now: Floats, seconds: float, jump: float) -> Floats
     Returns:
         The means now; NaN where unknown now.
     """
-    step = now - before
     share = 1.0 - exp(-seconds / TAU_S)
-    steady = np.abs(step) <= jump
-    step *= share
-    step += before
-    return np.where(steady, step, now)
+    return _smoothed(before.reshape(-1), now.reshape(-1), share, jump).reshape(now.shape)
+
+
+@compiled
+def _smoothed(before: Floats, now: Floats, share: float, jump: float) -> Floats:
+    means = np.empty(len(now))
+    for k in range(len(now)):
+        step = now[k] - before[k]
+        means[k] = share * step + before[k] if abs(step) <= jump else now[k]
+    return means

@@ -25,7 +25,7 @@ Fix = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Track:
     """What is remembered of one object's sightings.
 

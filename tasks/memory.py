@@ -9,7 +9,7 @@ from visup.tasks.activity import ALONE, Activity
 from visup.tasks.readings import Reading
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TaskMemory:
     """What is remembered of one task from step to step.
 

@@ -43,7 +43,7 @@ NEARER, OVER, BEGUN = 1, 2, 3
 See = Callable[[Step], Sighting]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Reading:
     """One course that what was seen may have taken.
 

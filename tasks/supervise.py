@@ -147,8 +147,7 @@ def _inferred(
         [a.belief.verdict in OVER or _ends(a, b) for a, b in zip(before, seen, strict=True)],
     )
     each = zip(before, seen, activities, strict=True)
-    heard = (_heard(old.belief, new, activity) for old, new, activity in each)
-    return tuple(replace(m, inferred=now) for m in heard)
+    return tuple([_heard(old.belief, new, activity, now) for old, new, activity in each])
 
 
 def _ends(before: TaskMemory, now: TaskMemory) -> bool:
@@ -156,24 +155,25 @@ def _ends(before: TaskMemory, now: TaskMemory) -> bool:
     return before.activity.audible and now.belief.verdict in OVER
 
 
-def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity) -> TaskMemory:
+def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity, now: float) -> TaskMemory:
     """A memory with its activity; of a task that is not going on nothing is believed but that.
 
     What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
     what interrupts it, which is no matter of the task.
     """
     if memory.belief is told and memory.activity == activity:
-        return memory
+        return replace(memory, inferred=now)
     belief = replace(memory.belief, active=activity.chance)
     over = told.verdict in OVER or any(s.status in BAD for s in told.stages)
     if activity.audible or over or memory.interrupted:
-        return replace(memory, activity=activity, belief=belief)
+        return replace(memory, activity=activity, belief=belief, inferred=now)
     readings = memory.readings
     if memory.activity.begun and not activity.begun:
         readings = ()  # a rival has ended; what follows is another matter
     if any(x.watch.status in BAD for r in readings[:1] for x in leaves(r.state)):
         readings = ()  # if it begins yet, it begins from its beginning
-    return replace(memory, activity=activity, belief=hushed(belief, activity), readings=readings)
+    belief = hushed(belief, activity)
+    return replace(memory, activity=activity, belief=belief, readings=readings, inferred=now)
 
 
 def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:

@@ -15,11 +15,11 @@ from visup.rules.geometry import (
     hull_separation,
     moved,
     pixels_in,
-    reach,
     shared_pixels,
 )
-from visup.rules.latch import UNKNOWN, hold_sign
-from visup.rules.outlines import outline_gap
+from visup.rules.judge_loops import hold_sign
+from visup.rules.latch import UNKNOWN
+from visup.rules.outlines import outline_gap, reach
 from visup.rules.rcc8 import from_outline_signs, outline_differences, rcc8
 
 some = settings(max_examples=80, deadline=None)
