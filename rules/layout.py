@@ -13,7 +13,7 @@ import numpy as np
 
 from visup.rules import machine
 from visup.rules.formula import Predicate
-from visup.rules.intervals import FALSE, TRUE, UNKNOWN, Arrays, Box
+from visup.rules.intervals import FALSE, TRUE, UNKNOWN, Arrays, Interval
 from visup.rules.machine import Codes, Floats, bits
 from visup.rules.operators import (
     LONG_AGO,
@@ -132,10 +132,13 @@ class Layout:
                 arena[w.place].reshape(2, -1)[:] = value
         return States(now, after if changed else states.moments, tuple(windows))
 
-    def box(self, step: int, arena: Floats) -> Box:
-        """(2, ...) the intervals of a step, along the axes that it depends on."""
-        axes, at = len(self.axes[step]), self.places[step]
-        return arena[at : at + 2 * self.n**axes].reshape(2, *(self.n,) * axes)
+    def interval(self, step: int, rows: tuple[int, ...], arena: Floats) -> Interval:
+        """The interval of a step for one choice of objects, by the rows of these along all axes."""
+        axes, at = self.axes[step], 0
+        for axis in axes:
+            at = at * self.n + rows[axis]
+        at += self.places[step]
+        return arena.item(at), arena.item(at + self.n ** len(axes))
 
     def _lay(self, number: int, step: Step) -> None:
         """Say how a step is done."""

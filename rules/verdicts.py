@@ -9,7 +9,7 @@ import numpy as np
 from visup.rules.facts import MAYBE, Facts
 from visup.rules.formula import Rule
 from visup.rules.inputs import blind
-from visup.rules.intervals import Box, Interval
+from visup.rules.intervals import Interval
 from visup.rules.layout import Layout
 from visup.rules.machine import Codes, Floats, Whole, choices
 from visup.rules.program import Place
@@ -66,18 +66,9 @@ class Values:
             for look, value in zip(self.prepared.quantities, told, strict=True)
         ]
 
-    def at(self, place: Place) -> Box:
-        """(2, ...) the intervals of a formula, along the axes of the objects that it depends on."""
-        return self._layout.box(place.step, self._arena)
-
     def interval(self, place: Place, rows: tuple[int, ...]) -> Interval:
-        """The interval of a formula for one choice of objects, by the rows of these along the axes."""
-        layout, at = self._layout, 0
-        axes = layout.axes[place.step]
-        for axis in axes:
-            at = at * layout.n + rows[axis]
-        at += layout.places[place.step]
-        return self._arena.item(at), self._arena.item(at + layout.n ** len(axes))
+        """The interval of a formula for one choice of objects, by the rows of these."""
+        return self._layout.interval(place.step, rows, self._arena)
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
