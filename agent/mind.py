@@ -12,9 +12,10 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.cells import Relation
 from visup.agent.changing import replace
 from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
-from visup.agent.relations import Relation, RelationTable
+from visup.agent.relations import RelationTable
 
 if TYPE_CHECKING:
     import numpy as np

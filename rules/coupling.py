@@ -33,8 +33,8 @@ from visup.agent import (
     RelationTable,
     Truth,
 )
+from visup.agent.cells import UNKNOWN_CODE, Cells, Columns
 from visup.agent.changing import replace
-from visup.agent.relations import UNKNOWN_CODE, Cells, Columns
 from visup.rules.joint import Joint, begun, follow, motion
 from visup.rules.measure import RelationSettings, scale
 from visup.rules.relations import measured
@@ -82,7 +82,7 @@ class CouplingSettings:
     part_s: float = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pending:
     """What is remembered of one pair: seconds since when each holds, or None.
 
@@ -107,17 +107,17 @@ class Sight(NamedTuple):
 
     Attributes:
         pair: Their ids.
-        touching: Code of a truth.
-        converging: Whether they surely are.
-        diverging: Whether they surely are.
+        touching: Code of a truth, and
+        converging: the same, and
+        diverging: the same.
         gap: Of their outlines, pixels; NaN unknown.
         host: Id of the one in whose region both are merged, or None.
     """
 
     pair: Pair
     touching: int
-    converging: bool
-    diverging: bool
+    converging: int
+    diverging: int
     gap: float
     host: int | None
 
@@ -132,7 +132,8 @@ class Couple:
         """Judge one step; see `Thinker`."""
         old: Mapping[Pair, Pending] = mind.memory.get(COUPLING, MappingProxyType({}))
         coupled = {c.objects: c for c in mind.couplings}
-        sights = _sights(mind)
+        table = _table(mind)
+        sights = _sights(table, mind)
         kept: dict[Pair, Pending] = {}
         events: list[Event] = []
         for sight in sights:
@@ -151,24 +152,26 @@ class Couple:
                 p = NOTHING
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = _with_coupled(mind, sights, coupled)
+        table = table.with_cells(_coupled(sights, coupled, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
 
     def _look(self, before: Pending, sight: Sight, mind: Mind) -> Pending:
-        converging = sight.converging and sight.touching != YES
-        far = sight.diverging or sight.gap > 0.02 * scale(mind.frame_size)
+        converging = sight.converging == YES and sight.touching != YES
+        far = sight.diverging == YES or sight.gap > 0.02 * scale(mind.frame_size)
+        apart = sight.touching == NO and far
         joint = self._follow(before.joint, sight, mind)
         odds = before.rest_odds
         if joint is None or sight.touching != YES:
             odds = 0.0
         elif joint is not before.joint:
             odds = self._rest(odds, before.joint, joint, mind)
+        same = joint is before.joint and odds == before.rest_odds and not converging
+        if same and apart == (before.apart_since is not None):
+            return before  # as nearly always: most pairs are far from each other
         converged = mind.time if converging else before.converged_at
-        apart = _since(before.apart_since, sight.touching == NO and far, mind.time)
-        now = Pending(converged, odds, apart, joint)
-        return before if now == before else now
+        return Pending(converged, odds, _since(before.apart_since, apart, mind.time), joint)
 
     def _follow(self, before: Joint | None, sight: Sight, mind: Mind) -> Joint | None:
         """How the two move relative to each other; the same as before when they are not seen."""
@@ -213,48 +216,42 @@ class Couple:
         return p.converged_at is not None and mind.time - p.converged_at <= s.approach_s
 
 
-def _sights(mind: Mind) -> list[Sight]:
+def _sights(table: RelationTable, mind: Mind) -> list[Sight]:
     """All pairs of present objects as they are seen now."""
-    ids = [b.id for b in mind.present()]
-    hosts = {tuple(sorted(pair)): pair[1] for pair in merged_pairs(mind)}
-    touching, converging, diverging = mind.truths_of(
-        ("touching", "converging", "diverging"), ids
-    ).tolist()
-    now = measured(mind)
-    gaps = now.gap.tolist() if now.ids == tuple(ids) else None
-    return [
-        Sight(
-            (a, b),
-            touching[i][j],
-            converging[i][j] == YES,
-            diverging[i][j] == YES,
-            gaps[i][j] if gaps else now.pair("gap", a, b),
-            hosts.get((a, b)) if hosts else None,
-        )
-        for i, a in enumerate(ids)
-        for j, b in enumerate(ids)
-        if i < j
-    ]
+    ids, now = table.ids, measured(mind)
+    hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
+    gaps = now.gap.tolist() if now.ids == ids else None
+    told = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
+    sights = []
+    for i, a in enumerate(ids):
+        for j in range(i + 1, len(ids)):
+            b = ids[j]
+            gap = gaps[i][j] if gaps else now.pair("gap", a, b)
+            touching, closing, parting = next(told)
+            host = hosts.get((a, b))
+            sights.append(Sight((a, b), touching, closing, parting, gap, host))
+    return sights
 
 
-def _with_coupled(
-    mind: Mind, sights: Sequence[Sight], coupled: Mapping[Pair, Coupling]
-) -> RelationTable:
-    """The relations with those of being coupled."""
-    ids = tuple(b.id for b in mind.present())
-    hidden = {i for i in ids if mind.objects[i].presence is not Presence.SEEN}
-    state = np.zeros((1, len(sights)), dtype=np.int8)
-    since = np.full((1, len(sights)), mind.time)
+def _table(mind: Mind) -> RelationTable:
+    """The relations of all present objects."""
+    ids, table = tuple([b.id for b in mind.present()]), mind.relations
+    if isinstance(table, RelationTable) and table.ids == ids:
+        return table
+    return RelationTable(ids, extra=tuple(table))
+
+
+def _coupled(sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mind) -> Cells:
+    """The relation of being coupled."""
+    hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
+    state, since = [0] * len(sights), [mind.time] * len(sights)
     for k, sight in enumerate(sights):
         if sight.pair in coupled:
-            state[0, k], since[0, k] = 1, coupled[sight.pair].since
-        elif sight.touching == MAYBE or not hidden.isdisjoint(sight.pair):
-            state[0, k] = UNKNOWN_CODE
-    cells = Cells(COLUMNS, state, since, np.full((1, len(sights)), CONFIDENCE))
-    table = mind.relations
-    if not isinstance(table, RelationTable) or table.ids != ids:
-        table = RelationTable(ids, extra=tuple(table))
-    return table.with_cells(cells)
+            state[k], since[k] = 1, coupled[sight.pair].since
+        elif sight.touching == MAYBE or (hidden and not hidden.isdisjoint(sight.pair)):
+            state[k] = UNKNOWN_CODE
+    sure = np.full((1, len(sights)), CONFIDENCE)
+    return Cells(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
 
 
 def _regions(sight: Sight, mind: Mind) -> tuple[Region, Region] | None:

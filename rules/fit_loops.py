@@ -16,99 +16,106 @@ Flags = NDArray[np.bool_]
 
 
 @compiled
+def _below(part: Floats, pivot: float, other: float) -> int:
+    """Puts those below a pivot, or at another one, first; how many they are. Without a branch."""
+    count = 0
+    for k in range(len(part)):
+        value = part[k]
+        part[k] = part[count]
+        part[count] = value
+        count += (value < pivot) | (value == other)
+    return count
+
+
+@compiled
 def median(values: Floats, count: int) -> float:
     """Median of the first values, which it puts into another order; NaN for none."""
     if count == 0:
         return np.nan
-    at = count // 2
-    low, high = 0, count - 1
-    while low < high:  # quickselect (Hoare 1961)
+    at, low, high = count // 2, 0, count
+    while high - low > 32:  # quickselect (Hoare 1961)
         pivot = values[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while values[j] > pivot:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i, j = i + 1, j - 1
-        if at <= j:
-            high = j
-        elif at >= i:
-            low = i
-        else:
-            break
-    middle = values[at]
+        end = low + _below(values[low:high], pivot, np.nan)
+        if at < end:
+            high = end
+            continue
+        low = end + _below(values[end:high], pivot, pivot)
+        if at < low:
+            low, high = at, at + 1
+    few, middle = values[low:high], values[low]
+    for i in range(len(few)):  # among a few, counting is quicker
+        less = most = 0
+        for k in range(len(few)):
+            less += few[k] < few[i]
+            most += few[k] <= few[i]
+        if less <= at - low < most:
+            middle = few[i]
     if count % 2:
         return float(middle)
-    below = values[0]
-    for k in range(1, at):
-        below = max(below, values[k])
-    return float(0.5 * (below + middle))
+    fewer, below = 0, -np.inf
+    for k in range(count):
+        fewer += values[k] < middle
+        below = max(below, values[k] if values[k] < middle else -np.inf)
+    return float(0.5 * ((below if fewer == at else middle) + middle))
 
 
 @compiled
-def line(times: Floats, values: Floats, count: int) -> tuple[float, float]:
+def line(times: Floats, values: Floats, count: int, rises: Floats) -> tuple[float, float]:
     """Slope of a line through samples, by the median of the slopes of all pairs of samples.
 
     Up to 29 % of the samples may be wild without moving it far (Theil 1950, Sen 1968).
 
     Args:
-        times: Seconds, increasing.
-        values: Any unit; NaN where there is no sample.
+        times: Seconds, increasing; written over.
+        values: Any unit; NaN where there is no sample; written over.
         count: How many samples there are.
+        rises: Room for a number of each pair of them.
 
     Returns:
         Slope and its standard deviation, in units per second; NaN where fewer than four samples stand.
         The deviation comes from the spread of the residuals (their median absolute deviation) as if
         they were independent, so that it is too small for slow wobbles.
     """
-    moments, known = np.empty(count), np.empty(count)
     n = 0
     for k in range(count):
         if np.isfinite(values[k]):
-            moments[n], known[n] = times[k], values[k]
+            times[n], values[n] = times[k], values[k]
             n += 1
     if n < 4:
         return np.nan, np.nan
-    rises = np.empty(n * (n - 1) // 2)
-    pairs = 0
+    pairs, middle, lever = 0, 0.0, 0.0
     for i in range(n):
+        middle += times[i]
         for j in range(i + 1, n):
-            rises[pairs] = (known[j] - known[i]) / (moments[j] - moments[i])
+            rises[pairs] = (values[j] - values[i]) / (times[j] - times[i])
             pairs += 1
-    slope = median(rises, pairs)
-    middle = 0.0
+    slope, middle = median(rises, pairs), middle / n
     for k in range(n):
-        rises[k] = known[k] = known[k] - slope * moments[k]
-        middle += moments[k]
-    offset, middle, lever = median(rises, n), middle / n, 0.0
+        rises[k] = values[k] = values[k] - slope * times[k]
+        lever += (times[k] - middle) ** 2
+    offset = median(rises, n)
     for k in range(n):
-        known[k] = abs(known[k] - offset)
-        lever += (moments[k] - middle) ** 2
-    spread = 1.4826 * median(known, n) * np.sqrt(n / (n - 2))
+        values[k] = abs(values[k] - offset)
+    spread = 1.4826 * median(values, n) * np.sqrt(n / (n - 2))
     # Medians need pi/2 times as many samples as means for the same variance of their result.
     return slope, np.sqrt(np.pi / 2) * spread / max(np.sqrt(lever), 1e-9)
 
 
 @compiled
-def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
+def binned(times: Floats, values: Floats, bins: int, moments: Floats, means: Floats) -> int:
     """Means of neighbouring samples, so that a fit over all pairs of them stays cheap.
 
     Args:
         times: (T,) seconds, increasing.
         values: (T,) any unit; NaN where there is no sample.
         bins: Most samples wanted.
+        moments: (bins,) written: times of means of equally many neighbours; the newest bin is full.
+        means: (bins,) written: their values, NaN where a whole bin has no sample.
 
     Returns:
-        Times and values of at most `bins` means of equally many neighbours; the newest bin is full,
-        the oldest may not be. NaN where a whole bin has no sample.
+        How many means there are.
     """
-    size = (len(times) + bins - 1) // bins
-    if size <= 1:
-        return times, values
-    moments, means = np.empty(bins), np.empty(bins)
+    size = max(1, (len(times) + bins - 1) // bins)
     count, begin, end = 0, 0, len(times) % size
     if end == 0:
         end = size
@@ -124,7 +131,7 @@ def binned(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
         means[count] = total / known if known else np.nan
         count += 1
         begin, end = end, end + size
-    return moments[:count], means[:count]
+    return count
 
 
 @compiled
@@ -132,11 +139,12 @@ def trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     """Lines through binned samples (T, N): their slopes and deviations, (N,) each; see `line`."""
     count = values.shape[1]
     slope, sigma, series = np.empty(count), np.empty(count), np.empty(len(times))
+    moments, means, rises = np.empty(bins), np.empty(bins), np.empty(bins * bins)
     for k in range(count):
         for t in range(len(times)):
             series[t] = values[t, k]
-        moments, means = binned(times, series, bins)
-        slope[k], sigma[k] = line(moments, means, len(moments))
+        found = binned(times, series, bins, moments, means)
+        slope[k], sigma[k] = line(moments, means, found, rises)
     return slope, sigma
 
 
@@ -190,8 +198,8 @@ def common_motion(
     has little say.
 
     Args:
-        slopes: (K,) pixels per second.
-        usable: (K,) whether each is known.
+        slopes: (K,) pixels per second, and
+        usable: whether each is known, in
         directions: (K, 2) unit vectors.
         misfit: Mean deviation of the directions from a common motion up to which the outline moves as
             one, pixels per second; a third of the speed is allowed anyway.
@@ -253,7 +261,7 @@ def velocities(
 
 @compiled
 def quick_trend(
-    times: Floats, values: Floats, recent: int, bins: int, limits: tuple[float, float, float]
+    times: Floats, values: Floats, recent: int, limits: tuple[float, float, float], room: Floats
 ) -> tuple[float, float]:
     """Slope over the window, or over its last part where that is strong and of another sign.
 
@@ -261,21 +269,22 @@ def quick_trend(
         times: (T,) seconds.
         values: (T,) pixels.
         recent: First sample of the last part.
-        bins: Most means to which lines are fitted.
         limits: Noise of a sample, pixels; the least slope that is strong, pixels per second; how many
             of its deviations it must be, too.
+        room: (bins + 2, bins) for the means to which lines are fitted, and the slopes of their pairs.
 
     Returns:
         Pixels per second, and its deviation.
     """
     noise, least, sigmas = limits
-    moments, means = binned(times, values, bins)
-    slope, sigma = line(moments, means, len(moments))
+    bins = room.shape[1]
+    moments, means, rises = room[0], room[1], room[2:].reshape(-1)
+    slope, sigma = line(moments, means, binned(times, values, bins, moments, means), rises)
     floor = slope_noise(times, noise)
     if sigma < floor:
         sigma = floor
-    moments, means = binned(times[recent:], values[recent:], bins)
-    quick, spread = line(moments, means, len(moments))
+    found = binned(times[recent:], values[recent:], bins, moments, means)
+    quick, spread = line(moments, means, found, rises)
     floor = slope_noise(times[recent:], noise)
     if spread < floor:
         spread = floor
@@ -283,15 +292,6 @@ def quick_trend(
     if turned and np.sign(quick) != np.sign(slope):
         return quick, spread
     return slope, sigma
-
-
-@compiled
-def later_than(times: Floats, moment: float) -> int:
-    """Number of the first sample after a moment; how many there are when none is."""
-    for k in range(len(times)):
-        if times[k] > moment:
-            return k
-    return len(times)
 
 
 @compiled
@@ -328,20 +328,20 @@ def fitted(
     pairs = count * (count - 1) // 2
     slope, sigma = np.full(pairs, np.nan), np.full(pairs, np.nan)
     motion = np.full((3, count, 2), np.nan)
-    recent = later_than(times, now - moving)
+    recent = np.searchsorted(times, now - moving, side="right")
     spread = slope_noise(times[recent:], noise)
     if samples < 6 or times[samples - 1] - times[0] < 0.6 * window:
         return slope, sigma, motion, spread
     half = recent + (samples - recent) // 2
     spans = np.array([[recent, samples], [recent, half], [half, samples]])
     motion = velocities(times, support, free, spans, directions, misfit)
-    recent = later_than(times, times[samples - 1] - quick)
+    recent = np.searchsorted(times, times[samples - 1] - quick, side="right")
     strength = np.sqrt(2.0) * noise, strong, sigmas
-    series, number = np.empty(samples), 0
+    series, room, number = np.empty(samples), np.empty((bins + 2, bins)), 0
     for i in range(count):
         for j in range(i + 1, count):
             for t in range(samples):
                 series[t] = separation[t, i, j]
-            slope[number], sigma[number] = quick_trend(times, series, recent, bins, strength)
+            slope[number], sigma[number] = quick_trend(times, series, recent, strength, room)
             number += 1
     return slope, sigma, motion, spread

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Region
+from visup.compiled import compiled
 
 Floats = NDArray[np.float64]
 Box = tuple[int, int, int, int]
@@ -23,9 +24,6 @@ FAN = 16
 _ANGLES = 2.0 * np.pi * np.arange(FAN) / FAN
 DIRECTIONS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 """(16, 2) unit vectors, evenly round the circle; the opposite of row k is row k + 8 modulo 16."""
-
-OPPOSITE = (np.arange(FAN) + FAN // 2) % FAN
-"""Row of the opposite of each of `DIRECTIONS`."""
 
 RCC8 = (
     "disconnected",
@@ -68,8 +66,21 @@ def hull_separation(support: Floats) -> Floats:
     Returns:
         (M, M) float, pixels; positive apart, negative the depth of penetration.
     """
-    least: Floats = (support[:, None, :] + support[:, OPPOSITE]).min(axis=2)
-    return -least
+    return _separations(np.ascontiguousarray(support))
+
+
+@compiled
+def _separations(support: Floats) -> Floats:
+    count, fan = support.shape
+    apart = np.empty((count, count))
+    for i in range(count):
+        for j in range(count):
+            least = np.inf
+            for k in range(fan):
+                least = min(least, support[i, k] + support[j, (k + fan // 2) % fan])
+            known = not (np.isnan(support[i, 0]) or np.isnan(support[j, 0]))
+            apart[i, j] = -least if known else np.nan
+    return apart
 
 
 def masks_overlap(a: Region, b: Region) -> bool:

@@ -23,7 +23,7 @@ from visup.rules.measure_loops import (
     tables,
 )
 from visup.rules.outlines import NEAR, outline_gap
-from visup.rules.pairs import carried, of_pairs, pairs
+from visup.rules.pairs import carried, pairs
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,9 +272,8 @@ class Measuring:
     ) -> Floats:
         """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
         m, near = len(objects), NEAR * scale(mind.frame_size)
-        nothing = np.full(m * (m - 1) // 2, np.nan)
-        apart = of_pairs(h.separation[-1]) if len(h.times) else nothing
-        last = np.append(of_pairs(before.gap), np.nan)[carried(before.ids, h.ids)[1]]
+        apart = h.separation[-1] if len(h.times) else np.full((m, m), np.nan)
+        last = before.gap if before.ids == h.ids else _moved(before.gap, before.ids, h.ids)
         found, asked = near_pairs(seen, apart, last, near, self.settings.hold_s)
         i, j = pairs(m)
         for k in asked.tolist():
@@ -284,6 +283,13 @@ class Measuring:
 
 
 NOWHERE = np.empty((0, FAN))
+
+
+def _moved(table: Floats, old: tuple[int, ...], new: tuple[int, ...]) -> Floats:
+    """A table of all pairs of other objects; NaN for pairs with a new one."""
+    rows, _ = carried(old, new)
+    wide = np.pad(table, (0, 1), constant_values=np.nan)
+    return np.ascontiguousarray(wide[np.ix_(rows, rows)])
 
 
 def sightings(objects: tuple[ObjectBelief, ...], now: float) -> Floats:

@@ -22,15 +22,16 @@ def near_pairs(
     Args:
         seen: (M, 8) of each body: seconds since it was seen; its image motion (x, y), pixels per second,
             and the deviation of that, NaN where it is not seen or not known; its box, pixels.
-        separation: (P,) signed distances of the hulls, pixels; NaN unknown.
-        before: (P,) gaps of the step before, pixels.
+        separation: (M, M) signed distances of the hulls, pixels; NaN unknown.
+        before: (M, M) gaps of the step before, pixels.
         near: Gap beyond which outlines are not looked at, pixels.
         hold: For how long the last gap stands for what is not seen, seconds.
 
     Returns:
         (P,) pixels, and numbers of pairs.
     """
-    gaps, asked = np.empty(len(before)), np.empty(len(before), np.int64)
+    pairs = len(seen) * (len(seen) - 1) // 2
+    gaps, asked = np.empty(pairs), np.empty(pairs, np.int64)
     number, count = -1, 0
     for i in range(len(seen)):
         for j in range(i + 1, len(seen)):
@@ -39,9 +40,9 @@ def near_pairs(
             gaps[number] = np.nan
             if longest > 0.0:
                 if longest <= hold:
-                    gaps[number] = before[number]
+                    gaps[number] = before[i, j]
                 continue
-            apart = separation[number]
+            apart = separation[i, j]
             gaps[number] = np.nan if np.isnan(apart) else max(near, apart)
             dx = max(
                 seen[j, 4] - seen[i, 4] - seen[i, 6], seen[i, 4] - seen[j, 4] - seen[j, 6], 0.0

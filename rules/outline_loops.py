@@ -15,7 +15,7 @@ from visup.compiled import compiled
 
 Floats = NDArray[np.float64]
 
-RUN = 8
+RUN = 16
 """Neighbouring points that share a box."""
 
 
@@ -189,6 +189,16 @@ def evenly(points: Floats, count: int) -> Floats:
             slope = (points[m, i] - points[n, i]) / length if length > 0.0 else 0.0
             out[k, i] = slope * (at - along[n]) + points[n, i]
     return out
+
+
+@compiled
+def widest_step(points: Floats) -> float:
+    """Greatest distance of neighbouring points of a closed outline (N, 2), pixels."""
+    widest = 0.0
+    for n in range(len(points)):
+        dx, dy = points[n, 0] - points[n - 1, 0], points[n, 1] - points[n - 1, 1]
+        widest = max(widest, dx * dx + dy * dy)
+    return float(np.sqrt(widest))
 
 
 @compiled

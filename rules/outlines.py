@@ -7,7 +7,6 @@ nothing but time hangs on that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -16,14 +15,20 @@ from numpy.typing import NDArray
 from visup.agent import Region
 from visup.rules.geometry import (
     DIRECTIONS,
-    FAN,
     Floats,
     box_gap,
     dense,
     masks_overlap,
     outline,
 )
-from visup.rules.outline_loops import boxes_of, evenly, least_distance, reached, signed_extent
+from visup.rules.outline_loops import (
+    boxes_of,
+    evenly,
+    least_distance,
+    reached,
+    signed_extent,
+    widest_step,
+)
 
 NEAR = 0.05
 """How near outlines must be for anybody to care how near they are, image diagonals."""
@@ -33,6 +38,9 @@ RECENT = 128
 
 EVEN_POINTS = 96
 """Least points of an outline that another one is laid upon."""
+
+CLOSE = 2.0
+"""Neighbouring points of an outline that are so near each other leave no gap, pixels."""
 
 MOST_POINTS = 200
 """Points of an outline that are measured against another one."""
@@ -60,7 +68,7 @@ class Outline:
     @cached_property
     def closed(self) -> Floats:
         """(M, 2) points without wide gaps between neighbours; see `dense`."""
-        return dense(self.points)
+        return self.points if widest_step(self.points) <= CLOSE else dense(self.points, CLOSE)
 
     @cached_property
     def closed_boxes(self) -> Floats:
@@ -91,34 +99,19 @@ def ready(region: Region) -> Outline:
     return Outline(region)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reach:
-    """How far one outline reaches.
-
-    Attributes:
-        support: (16,) float, pixels: max over the outline of p . n for each of `DIRECTIONS`.
-        free: (16,) bool: whether the furthest point is clear of the image border, so that it
-            belongs to the body and not to where the image ends.
-    """
-
-    support: Floats
-    free: NDArray[np.bool_]
-
-
-def reach(region: Region, frame_size: tuple[int, int]) -> Reach:
-    """Support function of a region's outline.
+def reach(
+    region: Region, frame_size: tuple[int, int], support: Floats, free: NDArray[np.bool_]
+) -> None:
+    """How far a region's outline reaches.
 
     Args:
         region: Any region.
         frame_size: (width, height), pixels.
-
-    Returns:
-        Its reach in each of `DIRECTIONS`.
+        support: (16,) written, pixels: max over the outline of p . n for each of `DIRECTIONS`.
+        free: (16,) written: whether the furthest point is clear of the image border, so that it
+            belongs to the body and not to where the image ends.
     """
-    support, free = np.empty(FAN), np.empty(FAN, dtype=np.bool_)
-    width, height = frame_size
-    reached(ready(region).points, DIRECTIONS, width, height, support, free)
-    return Reach(support, free)
+    reached(ready(region).points, DIRECTIONS, *frame_size, support, free)
 
 
 def outline_gap(a: Region, b: Region, near: float) -> float | None:

@@ -86,30 +86,25 @@ def rcc8(boxes: Floats, tolerance: float = 0.0) -> NDArray[np.int8]:
     return table
 
 
-def outline_differences(
-    regions: Sequence[Region], near: NDArray[np.bool_], known: NDArray[np.bool_], far: float
-) -> Floats:
-    """How the outlines of all pairs of regions stand to each other.
+def outline_differences(regions: Sequence[Region], asked: Sequence[int]) -> Floats:
+    """How the outlines of some pairs of regions stand to each other.
 
     Args:
         regions: (M) regions.
-        near: (P,) bool: pairs that may meet; the others are taken to be apart.
-        known: (P,) bool: pairs of which both are seen.
-        far: Distance that stands for pairs that are apart, pixels.
+        asked: (K) numbers of pairs.
 
     Returns:
-        (3, P) pixels: nearest point of either outside the other; farthest point of a outside b;
-        farthest of b outside a. Negative is within; NaN where not known.
+        (3, K) pixels: nearest point of either outside the other; farthest point of a outside b;
+        farthest of b outside a. Negative is within.
     """
-    found = np.full((3, len(near)), far)
-    found[:, ~known] = np.nan
+    found = np.empty((3, len(asked)))
     i, j = pairs(len(regions))
-    for k in np.flatnonzero(near & known):
+    for n, k in enumerate(asked):
         a, b = regions[i[k]], regions[j[k]]
         least_a, most_a = signed_distances(a, b)
         least_b, most_b = signed_distances(b, a)
         # Outlines run through the centres of pixels: neighbours meet, though they are 1 px apart.
-        found[:, k] = min(least_a, least_b) - 1.0, most_a, most_b
+        found[0, n], found[1, n], found[2, n] = min(least_a, least_b) - 1.0, most_a, most_b
     return found
 
 

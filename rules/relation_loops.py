@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.compiled import compiled
 from visup.rules.latch import UNKNOWN, Codes, Floats
@@ -13,6 +14,85 @@ COUPLED, MERGED = 1, 2
 
 GAP, RATE, SIGMA, RELATIVE = range(4)
 """Of the tables of `Measured`."""
+
+
+@compiled
+def smoothed(before: float, now: float, share: float, jump: float) -> float:
+    """One value, smoothed; see `smooth.py`."""
+    step = now - before
+    return share * step + before if abs(step) <= jump else now
+
+
+@compiled
+def places(
+    boxes: Floats,
+    gaps: Floats,
+    seen: Floats,
+    tables: Floats,
+    numbers: tuple[float, float, float, float, float],
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Where bodies are, smoothed.
+
+    Args:
+        boxes: (M, 4) before, pixels.
+        gaps: (P,) of the outlines before, pixels.
+        seen: (M, 8) how bodies were seen; see `measure_loops.near_pairs`.
+        tables: (5, M, M); see `Measured`.
+        numbers: Share of what is new; differences of edges, and of gaps, beyond which a mean begins anew,
+            pixels; for how long a box stands for a body out of sight, seconds; gap up to which outlines
+            may meet, pixels.
+
+    Returns:
+        (M, 4) boxes and (P,) gaps, NaN unknown, and the numbers of the pairs that may meet.
+    """
+    share, jump, wide, hold, near = numbers
+    now, apart = np.full(boxes.shape, np.nan), np.empty(len(gaps))
+    asked = np.empty(len(gaps), np.int64)
+    for i in range(len(boxes)):
+        if not seen[i, 0] > hold:
+            for k in range(4):
+                now[i, k] = smoothed(boxes[i, k], seen[i, 4 + k], share, jump)
+    number = count = 0
+    for i in range(len(boxes)):
+        for j in range(i + 1, len(boxes)):
+            apart[number] = smoothed(gaps[number], tables[GAP, i, j], share, wide)
+            if apart[number] <= near:
+                asked[count] = number
+                count += 1
+            number += 1
+    return now, apart, asked[:count]
+
+
+@compiled
+def outlines(
+    before: Floats,
+    gaps: Floats,
+    asked: NDArray[np.int64],
+    found: Floats,
+    numbers: tuple[float, ...],
+) -> Floats:
+    """How outlines stand to each other, smoothed.
+
+    Args:
+        before: (3, P) pixels; see `outline_differences`.
+        gaps: (P,) pixels, NaN unknown.
+        asked: (K,) pairs that were looked at.
+        found: (3, K) of these, pixels.
+        numbers: Share of what is new; differences beyond which a mean begins anew; distance that stands for
+            pairs that were not looked at, pixels.
+
+    Returns:
+        (3, P) pixels; NaN unknown.
+    """
+    share, jump, far = numbers
+    now, k = np.empty(before.shape), 0
+    for number in range(len(gaps)):
+        looked = k < len(asked) and asked[k] == number
+        for row in range(3):
+            value = found[row, k] if looked else np.nan if np.isnan(gaps[number]) else far
+            now[row, number] = smoothed(before[row, number], value, share, jump)
+        k += looked
+    return now
 
 
 @compiled

@@ -26,6 +26,7 @@ How to read them off a mind:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import sqrt
 
 import numpy as np
 
@@ -39,8 +40,8 @@ from visup.agent import (
     RelationTable,
     Truth,
 )
+from visup.agent.cells import Cells, Columns
 from visup.agent.changing import replace
-from visup.agent.relations import Cells, Columns
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES
@@ -51,7 +52,7 @@ from visup.rules.judge import AWAY, JUDGED, ORDER, SIDE, least_durations, limits
 from visup.rules.judge_loops import hold_sign, judged
 from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
 from visup.rules.measure import Measured, Measuring, RelationSettings, scale, sightings
-from visup.rules.pairs import carried, of_pairs, pairs
+from visup.rules.pairs import carried, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import (
     CONVERSE,
@@ -59,8 +60,8 @@ from visup.rules.rcc8 import (
     from_signs,
     outline_differences,
 )
-from visup.rules.relation_loops import COUPLED, MERGED, told, wanted
-from visup.rules.smooth import smoothed
+from visup.rules.relation_loops import COUPLED, MERGED, outlines, places, told, wanted
+from visup.rules.smooth import share_of
 from visup.rules.tracks import merged_pairs
 from visup.rules.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 
@@ -280,30 +281,22 @@ class Relations:
         mind: Mind,
     ) -> Smooth:
         """Boxes as they are, or were until a moment ago; gaps; outlines that may meet."""
-        s, seconds = self.settings, mind.time - before.time
-        boxes = seen[:, 4:].copy()
-        boxes[seen[:, 0] > s.hold_s] = np.nan
-        jump = 6.0 * s.judge.noise_px
-        gap = smoothed(before.gap, of_pairs(now.gap), seconds, jump * np.sqrt(2.0))
-        diagonal = scale(mind.frame_size)
-        near = gap <= 2.0 * s.judge.level_enter * diagonal
-        regions = [b.region for b in objects]
-        apart = outline_differences(regions, near, ~np.isnan(gap), 0.05 * diagonal)
-        return Smooth(
-            mind.time,
-            smoothed(before.boxes, boxes, seconds, jump),
-            gap,
-            smoothed(before.outlines, apart, seconds, jump * np.sqrt(2.0)),
+        s, diagonal = self.settings, scale(mind.frame_size)
+        share, jump = share_of(mind.time - before.time), 6.0 * s.judge.noise_px
+        wide, near = jump * sqrt(2.0), 2.0 * s.judge.level_enter * diagonal
+        boxes, gap, asked = places(
+            before.boxes, before.gap, seen, now.tables, (share, jump, wide, s.hold_s, near)
         )
+        apart = outline_differences([b.region for b in objects], asked.tolist())
+        level = outlines(before.outlines, gap, asked, apart, (share, wide, 0.05 * diagonal))
+        return Smooth(mind.time, boxes, gap, level)
 
     def _depth_trend(self, h: History) -> Codes:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
         i, j = pairs(len(h.ids))
         codes = np.full(len(i), UNKNOWN, dtype=np.int8)
-        if len(i) == 0 or not covered(h, self.settings.window_s):
-            return codes
-        found_at = np.isfinite(h.depth)
-        if not found_at.any():
+        found_at = h.depth == h.depth  # NaN is not equal to itself
+        if not found_at.any() or not covered(h, self.settings.window_s):
             return codes
         known = found_at.mean(axis=0) >= 0.6
         at = np.flatnonzero(known[i] & known[j])

@@ -29,8 +29,13 @@ def smoothed(before: Floats, now: Floats, seconds: float, jump: float) -> Floats
     Returns:
         The means now; NaN where unknown now.
     """
-    share = 1.0 - exp(-seconds / TAU_S)
-    return _smoothed(before.reshape(-1), now.reshape(-1), share, jump).reshape(now.shape)
+    flat = _smoothed(before.reshape(-1), now.reshape(-1), share_of(seconds), jump)
+    return flat.reshape(now.shape)
+
+
+def share_of(seconds: float) -> float:
+    """Share of a new value in the mean, so many seconds after the value before."""
+    return 1.0 - exp(-seconds / TAU_S)
 
 
 @compiled

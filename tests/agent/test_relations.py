@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Column, Mind, Relation, RelationTable, Truth
+from visup.agent.cells import Cells, Columns
 from visup.agent.encode import plain
-from visup.agent.relations import Cells, Columns
 
 IDS = (2, 5, 9)
 PAIRS = ((2, 5), (2, 9), (5, 9))

@@ -27,8 +27,8 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.agent import Thinkers
+from visup.agent.cells import UNKNOWN_CODE, Cells, Columns
 from visup.agent.mind import UNKNOWN_OBJECT
-from visup.agent.relations import UNKNOWN_CODE, Cells, Columns
 from visup.rules.formula import Rule
 from visup.rules.safety import RuleThinker
 from visup.tasks.supervise import MEMORY, task_thinker
