@@ -10,13 +10,12 @@ from types import MappingProxyType
 from visup.agent import Concern, Truth
 from visup.rules.explain import evidence
 from visup.rules.formula import Rule
+from visup.rules.ruled import Key
 from visup.rules.sentences import sentence, with_names
 from visup.rules.verdicts import Values
 
 MOST_RETOLD = 3
 """How many concerns that stand are told anew in one step; words cost more than judging."""
-Key = tuple[str, frozenset[int]]
-"""Rule and objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,33 +50,42 @@ def stand(
     Returns:
         The same two after this step.
     """
-    now, rules = values.facts.mind.time, values.prepared.rules_by_name
-    found: dict[Key, int] = {}
-    keys, hits = values.prepared.keys(values.facts.ids), values.found()
-    for hit in hits:
-        found.setdefault(keys[hit], hit)
-    rest = {key: until for key, until in cooling.items() if until > now} if cooling else {}
+    now, found = values.facts.mind.time, values.true_of()
     after = held.copy()
-    for key, old in held.items():
+    rest = {key: until for key, until in cooling.items() if until > now} if cooling else {}
+    for key in [key for key, old in held.items() if old.until != inf]:
         if key in found:
-            if old.until != inf:
-                after[key] = Held(old.concern, inf, old.told)
-            continue
-        rule, until = rules[key[0]], old.until
-        if until == inf:
-            until = before + (rule.hold.base if rule.hold is not None else 0.0)
-            after[key] = Held(old.concern, until, old.told)
-        if until <= now:
-            del after[key]
-            if rule.cooldown is not None:
-                rest[key] = now + rule.cooldown.base
+            after[key] = Held(held[key].concern, inf, held[key].told)
+    if held.keys() - found.keys():
+        _gone(after, rest, found, values, before)
     for key in _oldest(held, found):
         old = after.pop(key)  # what is told anew comes last
         after[key] = Held(_retold(old.concern, found[key], values), inf, now)
-    for key, hit in found.items():
-        if key not in after and key not in rest:
-            after[key] = Held(_raised(hit, values), inf, now)
+    if found.keys() - after.keys():
+        for key, hit in found.items():
+            if key not in after and key not in rest:
+                after[key] = Held(_raised(hit, values), inf, now)
     return MappingProxyType(after), MappingProxyType(rest)
+
+
+def _gone(
+    held: dict[Key, Held],
+    cooling: dict[Key, float],
+    found: Mapping[Key, int],
+    values: Values,
+    before: float,
+) -> None:
+    """Note of concerns whose rule is true no more how long they stay, or take them out."""
+    now, rules = values.facts.mind.time, values.prepared.rules_by_name
+    for key in [key for key in held if key not in found]:
+        rule, until = rules[key[0]], held[key].until
+        if until == inf:
+            until = before + (rule.hold.base if rule.hold is not None else 0.0)
+            held[key] = Held(held[key].concern, until, held[key].told)
+        if until <= now:
+            del held[key]
+            if rule.cooldown is not None:
+                cooling[key] = now + rule.cooldown.base
 
 
 def _oldest(held: Mapping[Key, Held], found: Mapping[Key, int]) -> list[Key]:

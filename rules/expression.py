@@ -131,10 +131,9 @@ class Expression:
         return whole.parts[0] if self.quantity else whole
 
     def _reading(self, values: Values, ids: tuple[int, ...]) -> Reading:
-        compiler = values.prepared.compiler
         if self.quantity:
             node = cast("Comparison", self.rule.when).left
-            place, unit = compiler.term(node, scope_of(self.rule)), _unit(node)
+            place, unit = values.prepared.place(node, scope_of(self.rule)), _unit(node)
         else:
             place, unit = values.prepared.places[0][0], ""
         low, high = values.interval(place, tuple(values.facts.row[i] for i in ids))

@@ -6,7 +6,7 @@ Quantities are intervals: value +- `SIGMAS` standard deviations where the deviat
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -64,6 +64,11 @@ class Facts:
     def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
         """(n,) codes from a look at each object."""
         return np.array([look(b) for b in self.beliefs], dtype=np.int8)
+
+    def among(self, ids: Collection[int | None]) -> Codes:
+        """(n,) `YES` of some objects, `NO` of the others."""
+        codes = [YES if i in ids else NO for i in self.ids] if ids else [NO] * len(self.ids)
+        return np.array(codes, dtype=np.int8)
 
     def pairs(self, code: int) -> Codes:
         """(n, n) codes that are all the same."""
@@ -154,7 +159,8 @@ class Facts:
 @lru_cache(maxsize=256)
 def _of_itself(names: tuple[str, ...]) -> Codes:
     """(k, 1) whether relations hold of an object and itself."""
-    return np.array([[YES if name in ITSELF else NO] for name in names], dtype=np.int8)
+    codes = np.array([YES if name in ITSELF else NO for name in names], dtype=np.int8)
+    return codes.reshape(-1, 1)
 
 
 def code(value: bool) -> int:

@@ -66,13 +66,18 @@ class Scalars:
         """See `Algebra`."""
         a, b = v
         c, d = w
-        return (a if a < c else c, b if b < d else d)
+        # One of the two where it can be: a window then holds each value once.
+        if a <= c and b <= d:
+            return v
+        return w if c <= a and d <= b else (a if a < c else c, b if b < d else d)
 
     def most(self, v: Interval, w: Interval) -> Interval:
         """See `Algebra`."""
         a, b = v
         c, d = w
-        return (a if a > c else c, b if b > d else d)
+        if a >= c and b >= d:
+            return v
+        return w if c >= a and d >= b else (a if a > c else c, b if b > d else d)
 
     def negated(self, v: Interval) -> Interval:
         """Zero minus the interval: 'not'."""

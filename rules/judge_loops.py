@@ -119,7 +119,7 @@ def box_gap(boxes: Floats, i: int, j: int) -> float:
     if np.isnan(dx + dy):
         return np.nan
     if dx <= 0.0 and dy <= 0.0:
-        return max(dx, dy)
+        return float(max(dx, dy))
     dx, dy = max(dx, 0.0), max(dy, 0.0)
     return float(np.sqrt(dx * dx + dy * dy))
 

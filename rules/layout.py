@@ -13,7 +13,7 @@ import numpy as np
 
 from visup.rules import machine
 from visup.rules.formula import Predicate
-from visup.rules.intervals import FALSE, TRUE, UNKNOWN, Arrays, Box
+from visup.rules.intervals import FALSE, TRUE, UNKNOWN, Arrays, Interval
 from visup.rules.machine import Codes, Floats, bits
 from visup.rules.operators import (
     LONG_AGO,
@@ -126,28 +126,36 @@ class Layout:
             begin = end
             for slot in stage.windows:
                 w = self._windows[slot]
-                shape = (2, w.cells)
                 # What is remembered must not change when the arena does.
-                parts = [arena[r : r + 2 * w.cells].reshape(shape).copy() for r in w.reads]
+                parts = [arena[read].reshape(2, -1).copy() for read in w.reads]
                 windows[slot], value = w.step(windows[slot], now, *parts)
-                arena[w.place : w.place + 2 * w.cells].reshape(shape)[:] = value
+                arena[w.place].reshape(2, -1)[:] = value
         return States(now, after if changed else states.moments, tuple(windows))
 
-    def box(self, step: int, arena: Floats) -> Box:
-        """(2, ...) the intervals of a step, along the axes that it depends on."""
-        axes, at = len(self.axes[step]), self.places[step]
-        return arena[at : at + 2 * self.n**axes].reshape(2, *(self.n,) * axes)
+    def interval(self, step: int, rows: tuple[int, ...], arena: Floats) -> Interval:
+        """The interval of a step for one choice of objects, by the rows of these along all axes."""
+        axes, at = self.axes[step], 0
+        for axis in axes:
+            at = at * self.n + rows[axis]
+        at += self.places[step]
+        return arena.item(at), arena.item(at + self.n ** len(axes))
 
     def _lay(self, number: int, step: Step) -> None:
         """Say how a step is done."""
         cells = self.n ** len(step.axes)
         stage = max((self._ready[r] for r in step.reads), default=0)
         if isinstance(step.operator, Sliding | Counting):
-            reads = tuple(self._wide(r, step.axes) for r in step.reads)
             self._stage(stage).windows.append(len(self._windows))
-            on = step.operator.on(_ON)
-            place = self.places[number]
-            self._windows.append(Window(step.operator, on, len(step.axes), reads, place, cells))
+            starts = [self._wide(r, step.axes) for r in step.reads]
+            self._windows.append(
+                Window(
+                    step.operator,
+                    step.operator.on(_ON),
+                    len(step.axes),
+                    tuple(slice(at, at + 2 * cells) for at in starts),
+                    slice(self.places[number], self.places[number] + 2 * cells),
+                )
+            )
             stage += 1
         elif step.node is None or isinstance(step.node, Predicate):
             self._put(stage, *self._row(number, step, cells))

@@ -65,72 +65,63 @@ def run(
     """
     changed = False
     for i in range(begin, end):
-        row = code[i]
-        op, c = row[OP], row[CELLS]
-        out, a, b = arena[row[DEST] :], arena[row[A] :], arena[row[B] :]
+        op, out, a, b, c = code[i, OP], code[i, DEST], code[i, A], code[i, B], code[i, CELLS]
         p, q = numbers[i, 0], numbers[i, 1]
         if op == LEAST:
             for k in range(2 * c):
-                out[k] = a[k] if a[k] < b[k] else b[k]
+                arena[out + k] = min(arena[a + k], arena[b + k])
         elif op == MOST:
             for k in range(2 * c):
-                out[k] = a[k] if a[k] > b[k] else b[k]
-        elif op == NOT:
+                arena[out + k] = max(arena[a + k], arena[b + k])
+        elif op in (NOT, BELOW):
             for k in range(c):
-                out[k], out[c + k] = -a[c + k], -a[k]
-        elif op == FACT:
-            _told(facts, row, n, out)
-        elif op == SPREAD:
-            _spread(a, row, n, out)
+                arena[out + k] = -arena[a + c + k] + p + q
+                arena[out + c + k] = -arena[a + k] + p + q
         elif op == SHIFT:
             for k in range(2 * c):
-                out[k] = a[k] + p + q
-        elif op == BELOW:
-            for k in range(c):
-                out[k], out[c + k] = -a[c + k] + p + q, -a[k] + p + q
-        elif op in (SOME, EVERY):
-            _quantified(a, row, n, out)
-        elif op >= ALWAYS:
-            if _kept(row, a, b, out, now, p, before[row[STATE] :], after[row[STATE] :]):
-                changed = True
+                arena[out + k] = arena[a + k] + p + q
         elif op == NUMBER:
-            out[0], out[1] = p, p
-        elif op == ABS:
-            for k in range(c):
-                low, high = a[k], a[c + k]
-                out[k], out[c + k] = max(low, -high, 0.0), max(-low, high)
+            arena[out], arena[out + 1] = p, p
+        elif op == FACT:
+            _told(facts, code[i], n, arena)
+        elif op in (SPREAD, SOME, EVERY):
+            _along(code[i], n, arena)
+        elif op >= ALWAYS:
+            if _kept(code[i], now, p, arena, before, after):
+                changed = True
         else:
-            _computed(op, c, a, b, p, out)
+            _computed(op, c, a, b, p, out, arena)
     return changed
 
 
 @compiled
-def _computed(op: int, c: int, a: Floats, b: Floats, p: float, out: Floats) -> None:
-    """Arithmetic of two quantities; what is no number is unknown, 0 times what is without end is 0."""
+def _computed(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floats) -> None:
+    """Arithmetic of quantities; what is no number is unknown, 0 times what is without end is 0."""
     for k in range(c):
-        low, high, other_low, other_high = a[k], a[c + k], b[k], b[c + k]
-        if op in (TIMES, OVER):
-            divides = op == OVER
-            if divides and other_low <= 0.0 <= other_high:
-                out[k], out[c + k] = -np.inf, np.inf
-                continue
-            if divides:
+        low, high = arena[a + k], arena[a + c + k]
+        other_low, other_high = arena[b + k], arena[b + c + k]
+        if op == ABS:
+            low, high = max(max(low, -high), 0.0), max(-low, high)
+        elif op == OVER and other_low <= 0.0 <= other_high:
+            low, high = -np.inf, np.inf
+        elif op in (TIMES, OVER):
+            if op == OVER:
                 other_low, other_high = 1.0 / other_high, 1.0 / other_low
             one, two = _product(low, other_low), _product(low, other_high)
             three, four = _product(high, other_low), _product(high, other_high)
-            out[k] = min(min(one, two), min(three, four))
-            out[c + k] = max(max(one, two), max(three, four))
-            continue
-        if op == PLUS:
-            low, high = low + other_low, high + other_high
+            low = min(min(one, two), min(three, four))
+            high = max(max(one, two), max(three, four))
         else:
-            low, high = low - other_high, high - other_low
-        low, high = -np.inf if low != low else low, np.inf if high != high else high
-        if op == COMPARE:
-            low, high = low + p, high + p
-        elif op == RATE:
-            low, high = low * p, high * p
-        out[k], out[c + k] = low, high
+            if op == PLUS:
+                low, high = low + other_low, high + other_high
+            else:
+                low, high = low - other_high, high - other_low
+            low, high = -np.inf if low != low else low, np.inf if high != high else high
+            if op == COMPARE:
+                low, high = low + p, high + p
+            elif op == RATE:
+                low, high = low * p, high * p
+        arena[out + k], arena[out + c + k] = low, high
 
 
 @compiled
@@ -139,14 +130,13 @@ def _product(p: float, q: float) -> float:
 
 
 @compiled
-def _told(facts: Codes, row: Whole, n: int, out: Floats) -> None:
+def _told(facts: Codes, row: Whole, n: int, arena: Floats) -> None:
     """What is true is [inf, inf], what is false [-inf, -inf]; the other way round if so asked."""
-    c, turned = row[CELLS], row[AXIS]
+    c, out, turned = row[CELLS], row[DEST], row[AXIS]
     for k in range(c):
-        at = k % n * n + k // n if turned else k
-        code = facts[row[A] + at]
-        out[k] = np.inf if code > 0 else -np.inf
-        out[c + k] = -np.inf if code < 0 else np.inf
+        code = facts[row[A] + (k % n * n + k // n if turned else k)]
+        arena[out + k] = np.inf if code > 0 else -np.inf
+        arena[out + c + k] = -np.inf if code < 0 else np.inf
 
 
 @compiled
@@ -159,98 +149,83 @@ def _strides(mask: int, n: int) -> tuple[int, int, int]:
 
 
 @compiled
-def _spread(a: Floats, row: Whole, n: int, out: Floats) -> None:
-    """The same intervals for more objects, on which they do not depend."""
-    mask, c = row[MASK], row[CELLS]
+def _along(row: Whole, n: int, arena: Floats) -> None:
+    """The same intervals for more objects, on which they do not depend.
+
+    Or the greatest (`exists`) or the least (`forall`) along an axis, of objects that are not left out.
+    """
+    op, mask, c, axis, apart = row[OP], row[MASK], row[CELLS], row[AXIS], row[APART]
     first, second, third = _strides(row[MASK_A], n)
-    width = 1
-    for axis in range(3):
-        if row[MASK_A] >> axis & 1:
-            width *= n
-    k = 0
+    along = first if axis == 0 else second if axis == 1 else third
+    upper = n ** ((row[MASK_A] & 1) + (row[MASK_A] >> 1 & 1) + (row[MASK_A] >> 2 & 1))
+    out, sign = row[DEST], -1.0 if op == EVERY else 1.0
     for x in range(n if mask & 1 else 1):
         for y in range(n if mask & 2 else 1):
             for z in range(n if mask & 4 else 1):
-                at = x * first + y * second + z * third
-                out[k], out[c + k] = a[at], a[width + at]
-                k += 1
-
-
-@compiled
-def _quantified(a: Floats, row: Whole, n: int, out: Floats) -> None:
-    """The greatest (`exists`) or the least (`forall`) along an axis, of objects that are not left out."""
-    mask, c, axis, apart = row[MASK], row[CELLS], row[AXIS], row[APART]
-    strides = _strides(row[MASK_A], n)
-    width = 1
-    for other in range(3):
-        if row[MASK_A] >> other & 1:
-            width *= n
-    along, some, k = strides[axis], row[OP] == SOME, 0
-    for x in range(n if mask & 1 else 1):
-        for y in range(n if mask & 2 else 1):
-            for z in range(n if mask & 4 else 1):
-                at = x * strides[0] + y * strides[1] + z * strides[2]
-                low = high = -np.inf if some else np.inf
-                for w in range(n):
-                    if (apart & 1 and x == w) or (apart & 2 and y == w) or (apart & 4 and z == w):
-                        continue
-                    v, u = a[at + w * along], a[width + at + w * along]
-                    low = max(low, v) if some else min(low, v)
-                    high = max(high, u) if some else min(high, u)
-                out[k], out[c + k] = low, high
-                k += 1
+                at = row[A] + x * first + y * second + z * third
+                low = high = -np.inf
+                if op == SPREAD:
+                    low, high = arena[at], arena[at + upper]
+                else:
+                    for w in range(n):
+                        left_out = (
+                            (apart & 1 and x == w)
+                            or (apart & 2 and y == w)
+                            or (apart & 4 and z == w)
+                        )
+                        if not left_out:
+                            low = max(low, sign * arena[at + w * along])
+                            high = max(high, sign * arena[at + upper + w * along])
+                arena[out], arena[out + c] = sign * low, sign * high
+                out += 1
 
 
 @compiled
 def _kept(
-    row: Whole,
-    a: Floats,
-    b: Floats,
-    out: Floats,
-    now: float,
-    span: float,
-    before: Floats,
-    after: Floats,
+    row: Whole, now: float, span: float, arena: Floats, before: Floats, after: Floats
 ) -> bool:
     """One operator that keeps but a moment of each choice of objects."""
-    op, c, changed = row[OP], row[CELLS], False
-    if op in (LASTS, HAPPENED):
-        # Up to when either bound was not as wanted; without end while it is not. Of `within` it is the
-        # upper bound that what is not known makes so, and which stands first.
-        for k in range(2 * c):
-            other = k + c if k < c else k - c
-            broken = a[k] < 0.0 if op == LASTS else a[other] > 0.0
-            until = np.inf if broken else now if before[k] == np.inf else before[k]
-            after[k] = until
-            changed |= until != before[k]
-            shown = until > now - span
-            if op == LASTS:
-                out[k] = -np.inf if shown else np.inf
-            else:
-                out[other] = np.inf if shown else -np.inf
-    elif op == LATCH:
+    op, c, out, a, b, changed = row[OP], row[CELLS], row[DEST], row[A], row[B], False
+    state = row[STATE]
+    if op == RECALL:
         for k in range(c):
-            entered = before[k] > 0.0
-            low, high = (b[k], b[c + k]) if entered else (a[k], a[c + k])
-            out[k], out[c + k] = low, high
-            after[k] = 1.0 if low > 0.0 or (entered and high >= 0.0) else 0.0
-            changed |= after[k] != before[k]
-    elif op == RECALL:
-        for k in range(c):
-            known = a[k] > -np.inf or a[c + k] < np.inf
+            known = arena[a + k] > -np.inf or arena[a + c + k] < np.inf
             for part in range(2):
-                after[part * c + k] = a[part * c + k] if known else before[part * c + k]
-            after[2 * c + k] = now if known else before[2 * c + k]
-            recent = now - after[2 * c + k] <= span
-            out[k], out[c + k] = (after[k], after[c + k]) if recent else (-np.inf, np.inf)
+                kept = before[state + part * c + k]
+                after[state + part * c + k] = arena[a + part * c + k] if known else kept
+            at = state + 2 * c + k
+            after[at] = now if known else before[at]
+            recent = now - after[at] <= span
+            arena[out + k] = after[state + k] if recent else -np.inf
+            arena[out + c + k] = after[state + c + k] if recent else np.inf
             changed |= known
-    else:
-        for k in range(2 * c):
-            v = max(before[k], a[k]) if op == ONCE else min(before[k], a[k])
+        return changed
+    if op == LATCH:
+        for k in range(c):
+            entered = before[state + k] > 0.0
+            read = b if entered else a
+            low, high = arena[read + k], arena[read + c + k]
+            arena[out + k], arena[out + c + k] = low, high
+            after[state + k] = 1.0 if low > 0.0 or (entered and high >= 0.0) else 0.0
+            changed |= after[state + k] != before[state + k]
+        return changed
+    for k in range(2 * c):
+        kept, value, at = before[state + k], arena[a + k], out + k
+        if op in (LASTS, HAPPENED):
+            # Up to when either bound was not as wanted; without end while it is not. Of `within` it
+            # is the upper bound that what is not known makes so, and which stands first.
+            if op == HAPPENED:
+                other = k + c if k < c else k - c
+                value, at = -arena[a + other], out + other
+            new = np.inf if value < 0.0 else now if kept == np.inf else kept
+            arena[at] = -np.inf if (new > now - span) == (op == LASTS) else np.inf
+        else:
+            new = max(kept, value) if op == ONCE else min(kept, value)
             if op == SINCE:
-                v = max(b[k], v)
-            out[k] = after[k] = v
-            changed |= v != before[k]
+                new = max(arena[b + k], new)
+            arena[at] = new
+        after[state + k] = new
+        changed |= new != kept
     return changed
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from visup.rules.intervals import EQUAL, FALSE, TRUE, UNKNOWN, Algebra, Interval, Scalars
-from visup.rules.sliding import Fold, Queue, Slide, changed, slide
+from visup.rules.sliding import Fold, Queue, Slide, changed, fresh, slide
 from visup.rules.units import ticks
 
 REACH = ticks(0.5)
@@ -82,7 +82,7 @@ class Sliding:
 
         def begun(state: Slide | None, now: int) -> Slide:
             if state is None:
-                return Slide(now, unknown)
+                return fresh(now, unknown)
             if now - state[0] > REACH:
                 return slide(state, state[0] + REACH, unknown, low, high, fold)[0]
             return state

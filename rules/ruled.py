@@ -30,6 +30,8 @@ from visup.rules.states import States
 from visup.rules.terms import Measure, Term
 from visup.rules.vocabulary import RULES, Quantity, Word
 
+Key = tuple[str, frozenset[int]]
+"""Name of a rule, and objects."""
 MOST_KEYS = 16
 """Of so many sets of objects it is remembered what may be found of them."""
 
@@ -65,8 +67,8 @@ def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
     return look(facts, *others)
 
 
-class Keys(dict[int, tuple[str, frozenset[int]]]):
-    """What `machine.choices` finds -> name of the rule and set of objects, found once for each.
+class Keys:
+    """What stands for whatever rules may be true of, for some objects; found once for each.
 
     Args:
         prepared: The rules.
@@ -74,12 +76,28 @@ class Keys(dict[int, tuple[str, frozenset[int]]]):
     """
 
     def __init__(self, prepared: Ruled, ids: tuple[int, ...]) -> None:
-        super().__init__()
         self._prepared, self._ids = prepared, ids
+        self._known: dict[int, Key] = {}
+        # What was found is nearly always what was found a step ago, in whichever mind.
+        self._latest: tuple[list[int], Mapping[Key, int]] = ([], {})
 
-    def __missing__(self, hit: int) -> tuple[str, frozenset[int]]:
-        rule, chosen = self._prepared.choice(hit, self._ids)
-        return self.setdefault(hit, (rule.name, frozenset(chosen)))
+    def of(self, hits: list[int]) -> Mapping[Key, int]:
+        """Each key of what `machine.choices` found, with the first choice that it stands for."""
+        latest, found = self._latest
+        if latest != hits:
+            found = self._of(hits)
+            self._latest = hits, found
+        return found
+
+    def _of(self, hits: list[int]) -> Mapping[Key, int]:
+        found: dict[Key, int] = {}
+        for hit in hits:
+            key = self._known.get(hit)
+            if key is None:
+                rule, chosen = self._prepared.choice(hit, self._ids)
+                key = self._known.setdefault(hit, (rule.name, frozenset(chosen)))
+            found.setdefault(key, hit)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +220,7 @@ class Ruled:
         return rule, tuple(chosen[::-1])
 
     def keys(self, ids: tuple[int, ...]) -> Keys:
-        """Name of the rule and set of objects of all that may be found of some objects."""
+        """What stands for whatever rules may be true of, for some objects."""
         known = self._keys.get(ids)
         if known is None:
             if len(self._keys) >= MOST_KEYS:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Mind, Observation, Outcome, TaskBelief
-from visup.rules.concerns import Held, Key, stand
+from visup.rules.concerns import Held, stand
 from visup.rules.facts import Facts
 from visup.rules.formula import Rule
 from visup.rules.operators import SPACING
-from visup.rules.ruled import Ruled, ruled
+from visup.rules.ruled import Key, Ruled, ruled
 from visup.rules.states import States
 from visup.rules.units import ticks
 from visup.rules.verdicts import Values, rerowed

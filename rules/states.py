@@ -61,17 +61,15 @@ class Window:
         operator: The operator.
         step: How it takes in a sample.
         axes: How many axes its objects have.
-        reads: Where the intervals of its parts begin.
-        place: Where its own begin.
-        cells: How many of each bound.
+        reads: Where the intervals of its parts stand.
+        place: Where its own stand.
     """
 
     operator: Windowed
     step: Stepping
     axes: int
-    reads: tuple[int, ...]
-    place: int
-    cells: int
+    reads: tuple[slice, ...]
+    place: slice
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +138,7 @@ class Memory:
             then,
             after,
             tuple(
-                None if s is None else w.operator.rows(s, _picker(chosen[w.axes], w.cells))
+                None if s is None else w.operator.rows(s, _picker(chosen[w.axes], self.n**w.axes))
                 for s, w in zip(windows, self.windows, strict=True)
             ),
         )

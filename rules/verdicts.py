@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from visup.rules.facts import MAYBE, Facts
 from visup.rules.formula import Rule
 from visup.rules.inputs import blind
-from visup.rules.intervals import Box, Interval
+from visup.rules.intervals import Interval
 from visup.rules.layout import Layout
 from visup.rules.machine import Codes, Floats, Whole, choices
 from visup.rules.program import Place
-from visup.rules.ruled import Ruled
+from visup.rules.ruled import Key, Ruled
 from visup.rules.states import States
 
 
@@ -66,25 +66,20 @@ class Values:
             for look, value in zip(self.prepared.quantities, told, strict=True)
         ]
 
-    def at(self, place: Place) -> Box:
-        """(2, ...) the intervals of a formula, along the axes of the objects that it depends on."""
-        return self._layout.box(place.step, self._arena)
-
     def interval(self, place: Place, rows: tuple[int, ...]) -> Interval:
-        """The interval of a formula for one choice of objects, by the rows of these along the axes."""
-        layout, at = self._layout, 0
-        axes = layout.axes[place.step]
-        for axis in axes:
-            at = at * layout.n + rows[axis]
-        at += layout.places[place.step]
-        return self._arena.item(at), self._arena.item(at + layout.n ** len(axes))
+        """The interval of a formula for one choice of objects, by the rows of these."""
+        return self._layout.interval(place.step, rows, self._arena)
 
     def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
         """Every rule with every choice of objects for which it is true and not suspended."""
         return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
 
+    def true_of(self) -> Mapping[Key, int]:
+        """For each rule and set of objects of which it is true the first choice, as `found` tells it."""
+        return self.prepared.keys(self.facts.ids).of(self.found())
+
     def found(self) -> list[int]:
-        """The same as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
+        """What is true as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
         rules, most = self.prepared.verdicts(self._layout.n)
         found: Whole = np.empty(most, dtype=np.int64)
         count = choices(rules, self._layout.n, self._arena, found)

@@ -118,20 +118,20 @@ def expected(facts: Facts, name: str) -> Codes:
 def engaged(facts: Facts) -> Codes:
     """Whether an active task expects something of an object and another one now."""
     wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
-    return facts.each(lambda b: code(b.id in wanted))
+    return facts.among(wanted)
 
 
 def unexpected(facts: Facts) -> Codes:
     """Whether no active task explains an object; without a task nothing is unexpected."""
     told = [task.unexplained for task in facts.mind.tasks]
     nobody = set(told[0]).intersection(*told[1:]) if told else ()
-    return facts.each(lambda b: code(b.id in nobody))
+    return facts.among(nobody)
 
 
 def is_actor(facts: Facts) -> Codes:
     """Whether an object plays an actor of an active task."""
     bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
-    return facts.each(lambda b: code(b.id in bound))
+    return facts.among(bound)
 
 
 def is_named(facts: Facts, name: str) -> Codes:
@@ -170,7 +170,7 @@ def first_contact(facts: Facts) -> Codes:
 def lost(facts: Facts) -> Codes:
     """Whether an object is out of sight and nothing tells why."""
     known = tracks(facts.mind).of
-    return facts.each(lambda b: code(b.id in known and known[b.id].told == "lost"))
+    return facts.among([i for i in facts.ids if i in known and known[i].told == "lost"])
 
 
 def stale(facts: Facts, kind: str) -> Codes:
@@ -222,14 +222,14 @@ def _since(moment: str) -> Callable[[Facts], Floats]:
 
 
 def _presence(wanted: Presence) -> Callable[[Facts], Codes]:
-    return lambda facts: facts.each(lambda b: code(b.presence is wanted))
+    return lambda facts: facts.among([b.id for b in facts.beliefs if b.presence is wanted])
 
 
 def in_forbidden_zone(facts: Facts) -> Codes:
     """Whether some part of an object is in a zone that is forbidden to all."""
     zones = [z.name for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
     if not zones:
-        return facts.each(lambda _: NO)
+        return facts.among(())
     codes: Codes = np.max([_zone("reaching")(facts, name) for name in zones], axis=0)
     return codes
 

@@ -190,10 +190,9 @@ def test_each_choice_of_objects_is_what_it_is_by_itself(block: int) -> None:
             sample = drawn(rng, ids)
             codes, arena = laid(prepared, ids, sample)
             states = layout.step(states, ticks(time), codes, arena)
-            box = layout.box(place.step, arena)
             signals = {"_".join([n, *map(str, objects)]): v for (n, objects), v in sample.items()}
             signals |= {"nobody_exists": FALSE, "nobody_forall": TRUE}
             for c, monitor in alone.items():
-                rows = tuple(ids.index(c[axis]) for axis in sorted(place.axes))
-                found = (float(box[0][rows]), float(box[1][rows]))
+                rows = tuple(ids.index(i) for i in c)
+                found = layout.interval(place.step, rows, arena)
                 assert alike(found, monitor.step(time, signals)), f"{seed}: {f} of {c}"

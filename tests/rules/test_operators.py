@@ -89,8 +89,7 @@ def by_arrays(
             states = rerowed(prepared, states, ticks(time), ids, now)
         ids, layout = now, prepared.layout(len(now))
         states, arena = sampled(layout, states, ticks(time), objects)
-        value = np.broadcast_to(layout.box(place.step, arena), (2, len(ids)))
-        told.append({i: (float(value[0, k]), float(value[1, k])) for k, i in enumerate(ids)})
+        told.append({i: layout.interval(place.step, (k,), arena) for k, i in enumerate(ids)})
     return told
 
 
@@ -145,8 +144,8 @@ def test_facts_keep_one_moment_and_are_judged_as_the_oracle_judges_numbers_witho
         for time, code, expected in zip(times, codes, truth, strict=True):
             arena = np.full(layout.size, np.nan)
             states = layout.step(states, ticks(time), np.array([code], np.int8), arena)
-            found = layout.box(place.step, arena)
-            assert (found[0, 0], found[1, 0]) == expected, f"{seed}: {formula}"
+            found = layout.interval(place.step, (0,), arena)
+            assert found == expected, f"{seed}: {formula}"
 
 
 def fact_for(formula: Formula) -> Formula:
