@@ -387,6 +387,10 @@ class Mind:
         """The relations of some names that are true, by their objects."""
         return self._table.true(*names)
 
+    def held(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
+        """Objects and names of the relations that `holding` gives."""
+        return self._table.held(*names)
+
     def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
         """A relation between all of some objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
         return self._table.truths(name, ids)

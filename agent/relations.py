@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from operator import itemgetter
 from typing import TYPE_CHECKING, overload
 
 from visup.agent.cells import UNKNOWN_CODE, Cells, Columns, Relation
@@ -83,7 +84,14 @@ class RelationTable(Sequence[Relation]):
 
     def true(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""
-        found = [r for r in self.extra if r.name in names and r.truth is Truth.TRUE]
+        held = (self.find(name, *objects) for objects, name in self.held(*names))
+        return tuple([r for r in held if r is not None])
+
+    def held(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
+        """Objects and names of the relations of some names that are true, by objects: no records."""
+        found: list[tuple[tuple[int, ...], str]] = [
+            (r.objects, r.name) for r in self.extra if r.name in names and r.truth is Truth.TRUE
+        ]
         pairs: list[tuple[int, int]] = []
         for part in self.parts:
             for name in names:
@@ -96,8 +104,8 @@ class RelationTable(Sequence[Relation]):
                     for k, state in enumerate(states):
                         if state == code:
                             pair = pairs[k] if row == 0 else pairs[k][::-1]
-                            found.append(part.relation(column, code, pair, row, k))
-        return tuple(sorted(found, key=lambda r: r.objects))
+                            found.append((pair, name))
+        return sorted(found, key=itemgetter(0))
 
     def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
         """A relation between all of some objects.

@@ -47,8 +47,11 @@ class TellRelations:
         """Judge one step; see `Thinker`."""
         told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
         events = []
-        for relation in mind.holding(*TEMPLATES):
-            if not self._worth_telling(relation, told.get(relation.objects), mind):
+        for objects, name in mind.held(*TEMPLATES):
+            if not self._new(name, told.get(objects), mind):
+                continue
+            relation = mind.relation(name, *objects)
+            if relation is None or not self._worth_telling(relation, mind):
                 continue
             told[relation.objects] = (relation.name, mind.time)
             events.append(_event(relation, mind, observation))
@@ -58,15 +61,17 @@ class TellRelations:
         old: Mapping[tuple[int, ...], Told] = mind.memory.get(NARRATIVE, MappingProxyType({}))
         return {pair: t for pair, t in old.items() if all(i in mind.objects for i in pair)}
 
-    def _worth_telling(self, relation: Relation, last: Told | None, mind: Mind) -> bool:
+    def _new(self, name: str, last: Told | None, mind: Mind) -> bool:
+        """Whether it is not what was told of these objects last, or too soon after that."""
+        if last is None:
+            return name != "keeping_distance"
+        return last[0] != name and mind.time - last[1] >= self.settings.quiet_s
+
+    def _worth_telling(self, relation: Relation, mind: Mind) -> bool:
         s = self.settings
         if relation.confidence < s.least_confidence or mind.time - relation.since < s.lasting_s:
             return False
-        if len(relation.objects) == 2 and mind.coupled(*relation.objects):
-            return False
-        if last is None:
-            return relation.name != "keeping_distance"
-        return last[0] != relation.name and mind.time - last[1] >= s.quiet_s
+        return not (len(relation.objects) == 2 and mind.coupled(*relation.objects))
 
 
 def _event(relation: Relation, mind: Mind, observation: Observation) -> Event:
