@@ -124,20 +124,8 @@ def _open(concern: Concern, time: float, number: int) -> Alert:
 
 def _renew(alert: Alert, concern: Concern, time: float) -> Alert:
     # The cause keeps its first wording, so that the narrative and the report tell one story.
-    # Made directly: of a hundred open alerts each is renewed in each step.
-    return Alert(
-        alert.id,
-        alert.kind,
-        max(alert.severity, concern.severity),
-        alert.opened,
-        time,
-        alert.objects,
-        alert.cause,
-        concern.evidence,
-        alert.closed,
-        alert.key,
-        alert.needs,
-    )
+    severity = max(alert.severity, concern.severity)
+    return replace(alert, severity=severity, updated=time, evidence=concern.evidence)
 
 
 def _unsure(alert: Alert, unknown: frozenset[str], time: float) -> Alert:

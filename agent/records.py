@@ -344,7 +344,7 @@ class Concern:
     needs: tuple[str, ...] = ("region",)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Alert:
     """An event that a person should act on, with its life.
 
