@@ -147,7 +147,7 @@ def spread_to(
 
 @compiled
 def brought(
-    old: Labels, new: Labels, flow: Floats, shares: Floats, count: int, every: int
+    old: Labels, new: Labels, flow: Floats, shares: Floats, area: Floats, every: int
 ) -> Floats:
     """Shares of cells of an older image as they come to those of a newer one, along the flow.
 
@@ -156,7 +156,7 @@ def brought(
         new: (h, w) cells of the newer one.
         flow: (h, w, 2) float32, from the newer back to the older.
         shares: (old count, K) float32.
-        count: How many cells the newer one has.
+        area: (count,) float32, how many pixels each cell of the newer one has.
         every: One in so many pixels of a cell, its first one always, is asked where it comes from.
 
     Returns:
@@ -164,15 +164,12 @@ def brought(
     """
     height, width = new.shape
     kinds = shares.shape[1]
-    seen, asked = np.zeros(count, np.int32), np.zeros(count, np.int32)
-    out = np.zeros((count, kinds), np.float32)
-    for y in range(height):
-        for x in range(width):
-            seen[new[y, x]] += 1
+    count = len(area)
+    asked, out = np.zeros(count, np.int32), np.zeros((count, kinds), np.float32)
     # A mean is summed up share by share, so that what is whole stays whole within rounding.
     part = np.empty(count, np.float32)
     for c in range(count):
-        part[c] = np.float32(1) / np.float32(max((seen[c] + every - 1) // every, 1))
+        part[c] = np.float32(1) / np.float32(max((int(area[c]) + every - 1) // every, 1))
     for y in range(height):
         for x in range(width):
             c = new[y, x]
