@@ -114,23 +114,24 @@ class MotionSegmenter:
         image = prepare(frame, self.settings.work_size)
         self._history.push(image)
         self._count += 1
-        coming = self._beside.submit(superpixels, image, self.settings.cell, self.settings.contrast)
         before = self._cells
         if before is None:
-            self._cells = coming.result()
+            self._cells = superpixels(image, self.settings.cell, self.settings.contrast)
             self._ground = bare_ground(image.shape)
             return ()
-        scene, tracks = self._look(image, before, coming)
+        scene, carried, prior = self._look(image, before)
         cells = self._cells = scene.cells
-        tracks = fit_tracks(tracks, scene)
-        tracks = bear(tracks, scene, self.settings, self._born)
+        known = fit_tracks(carried, scene)
+        tracks = bear(known, scene, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
-        prior = priors(tracks, cells)
+        if tracks != known:  # what was seen before is expected where it was
+            prior = priors(tracks, cells)
         near = reach_of(scene, tracks, prior)
+        old = self._history.back(scene.measured[-1].constraints.lag)
+        dense = self._beside.submit(warped, scene, tracks, old, near, self.settings.noise)
         likelihood, has = explain(scene, tracks, near, self.settings)
         likelihood = obey(directives, scene, likelihood)
-        old = self._history.back(scene.measured[-1].constraints.lag)
-        more = warped(scene, tracks, old, near, self.settings.noise)
+        more = dense.result()
         stay = np.zeros(cells.count, dtype=bool)
         for t in tracks:
             if rests(t, scene):
@@ -150,27 +151,28 @@ class MotionSegmenter:
         tracks, self._ids = confirm(tracks, scene, self._ids, self.settings, wanted)
         self._tracks = tracks
         self.looked = Looked(scene, tracks, keys, posterior)
-        seen = report(tracks, scene, self._size, self.settings)
+        seen = report(tracks, scene, self._size, self.settings, self._beside)
         seen, self._ids = self._resting.step(frame, scene, seen, self._ids, self.settings, evidence)
         return chosen(seen, directives)
 
-    def _look(
-        self, image: WorkImage, before: Superpixels, coming: Future[Superpixels]
-    ) -> tuple[Scene, Tracks]:
-        """Measure motion, and carry the tracks to the newest image."""
-        old = self._history.back(1)
+    def _look(self, image: WorkImage, before: Superpixels) -> tuple[Scene, Tracks, Floats]:
+        """Measure motion, and carry the tracks to the newest image, with where they are expected."""
+        cell, old = self.settings.cell, self._history.back(1)
         seconds = image.time - old.time
-        points = find_points(image, self.settings.cell, self.settings.noise)
+        found = self._beside.submit(find_points, image, cell, self.settings.noise)
+        coming = self._beside.submit(superpixels, image, cell, self.settings.contrast)
         flow = flow_back(image.grey, old.grey, self._engine)
+        points = found.result()
         first = self._follow(points, flow, old, image)
         cells = coming.result()
         tracks = carry(self._tracks, flow, before, cells, seconds)
-        owner = priors(tracks, cells).argmax(axis=1)
+        prior = priors(tracks, cells)
+        owner = prior.argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         later = [self._later(scene, tracks, lag) for lag in self._turn(image)]
         measured = [self._measure(scene, first)]
         measured += [self._measure(scene, c.result()) for c in later]
-        return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks
+        return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks, prior
 
     def _turn(self, image: WorkImage) -> list[int]:
         """The longer baseline whose turn it is: they are measured one in each frame.
