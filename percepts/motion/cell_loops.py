@@ -60,66 +60,6 @@ def totals(labels: Labels, values: Floats, count: int) -> Floats:
 
 
 @compiled
-def borders(labels: Labels, count: int) -> tuple[Labels, Labels, Labels]:
-    """Pairs of cells that touch, and along how many pixels.
-
-    Args:
-        labels: (h, w) cells, 0 to count - 1.
-        count: How many cells.
-
-    Returns:
-        (N,) the lower and (N,) the higher cell of each pair, in their order, and (N,) pixels.
-    """
-    low, high = _steps(labels)
-    room = np.zeros(count + 1, np.int64)
-    for n in range(len(low)):
-        room[low[n] + 1] += 1
-    begin = np.cumsum(room)
-    filled, other = begin.copy(), np.empty(len(low), np.int32)
-    for n in range(len(low)):
-        other[filled[low[n]]] = high[n]
-        filled[low[n]] += 1
-    one, two = np.empty(len(low), np.int32), np.empty(len(low), np.int32)
-    along, pixels, pairs = np.zeros(count, np.int32), np.empty(len(low), np.int32), 0
-    for k in range(count):
-        first = pairs
-        for n in range(begin[k], begin[k + 1]):
-            b = other[n]
-            if not along[b]:
-                # Neighbours are few: each goes to its place among those before it.
-                place = pairs
-                while place > first and two[place - 1] > b:
-                    two[place] = two[place - 1]
-                    place -= 1
-                two[place], one[pairs] = b, k
-                pairs += 1
-            along[b] += 1
-        for n in range(first, pairs):
-            pixels[n], along[two[n]] = along[two[n]], 0
-    return one[:pairs], two[:pairs], pixels[:pairs]
-
-
-@compiled
-def _steps(labels: Labels) -> tuple[Labels, Labels]:
-    """The lower and the higher cell wherever one pixel and the next, or that below it, differ."""
-    height, width = labels.shape
-    low, high = np.empty(2 * labels.size, np.int32), np.empty(2 * labels.size, np.int32)
-    count = 0
-    # Written always and kept when they differ: which do cannot be foreseen.
-    for y in range(height):
-        for x in range(width - 1):
-            a, b = labels[y, x], labels[y, x + 1]
-            low[count], high[count] = min(a, b), max(a, b)
-            count += a != b
-    for y in range(height - 1):
-        for x in range(width):
-            a, b = labels[y, x], labels[y + 1, x]
-            low[count], high[count] = min(a, b), max(a, b)
-            count += a != b
-    return low[:count], high[:count]
-
-
-@compiled
 def spread_to(
     ends: Labels, neighbours: Labels, members: NDArray[np.bool_], steps: int
 ) -> NDArray[np.bool_]:

@@ -10,6 +10,8 @@ from visup.percepts.motion.image import Floats
 
 Labels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
+
+
 LINE, WAITS = -1, -2  # marks of pixels that part cells, and of those in a queue
 LEVELS = 256
 
@@ -38,19 +40,19 @@ def flooded(right: Bytes, down: Bytes, marks: Labels) -> None:
             p = np.uint64(y * width + x)
             if flat[p] != 0:
                 continue
-            level = np.uint8(LEVELS - 1)
+            edge = np.uint8(LEVELS - 1)
             west, right_of = flat[p - one] > 0, flat[p + one] > 0
             above, below = flat[p - row] > 0, flat[p + row] > 0
             if west:
-                level = min(level, east[p - one])
+                edge = min(edge, east[p - one])
             if right_of:
-                level = min(level, east[p])
+                edge = min(edge, east[p])
             if above:
-                level = min(level, south[p - row])
+                edge = min(edge, south[p - row])
             if below:
-                level = min(level, south[p])
+                edge = min(edge, south[p])
             if west or right_of or above or below:
-                _queue(flat, first, last, p, np.uint64(level))
+                _queue(flat, first, last, p, np.uint64(edge))
     lowest = np.uint64(0)
     while True:
         while lowest < np.uint64(LEVELS) and first[lowest] < 0:
@@ -84,7 +86,7 @@ def flooded(right: Bytes, down: Bytes, marks: Labels) -> None:
 
 
 @compiled
-def _queue(flat: Labels, first: Labels, last: Labels, p: int, level: int) -> None:
+def _queue(flat: Labels, first: Labels, last: Labels, p: np.uint64, level: np.uint64) -> None:
     """Put a pixel behind those that wait at a level; each that waits holds the number of the next."""
     if first[level] < 0:
         first[level] = p
@@ -94,9 +96,67 @@ def _queue(flat: Labels, first: Labels, last: Labels, p: int, level: int) -> Non
 
 
 @compiled
-def linked(
-    one: Labels, other: Labels, values: Floats, count: int
-) -> tuple[Labels, Labels, Floats]:
+def borders(labels: Labels, count: int) -> tuple[Labels, Labels, Labels]:
+    """Pairs of cells that touch, and along how many pixels.
+
+    Args:
+        labels: (h, w) cells, 0 to count - 1.
+        count: How many cells.
+
+    Returns:
+        (N,) the lower and (N,) the higher cell of each pair, in their order, and (N,) pixels.
+    """
+    low, high = _steps(labels)
+    room = np.zeros(count + 1, np.int64)
+    for n in range(len(low)):
+        room[low[n] + 1] += 1
+    begin = np.cumsum(room)
+    filled, other = begin.copy(), np.empty(len(low), np.int32)
+    for n in range(len(low)):
+        other[filled[low[n]]] = high[n]
+        filled[low[n]] += 1
+    one, two = np.empty(len(low), np.int32), np.empty(len(low), np.int32)
+    along, pixels, pairs = np.zeros(count, np.int32), np.empty(len(low), np.int32), 0
+    for k in range(count):
+        first = pairs
+        for n in range(begin[k], begin[k + 1]):
+            b = other[n]
+            if not along[b]:
+                # Neighbours are few: each goes to its place among those before it.
+                place = pairs
+                while place > first and two[place - 1] > b:
+                    two[place] = two[place - 1]
+                    place -= 1
+                two[place], one[pairs] = b, k
+                pairs += 1
+            along[b] += 1
+        for n in range(first, pairs):
+            pixels[n], along[two[n]] = along[two[n]], 0
+    return one[:pairs], two[:pairs], pixels[:pairs]
+
+
+@compiled
+def _steps(labels: Labels) -> tuple[Labels, Labels]:
+    """The lower and the higher cell wherever one pixel and the next, or that below it, differ."""
+    height, width = labels.shape
+    low, high = np.empty(2 * labels.size, np.int32), np.empty(2 * labels.size, np.int32)
+    count = 0
+    # Written always and kept when they differ: which do cannot be foreseen.
+    for y in range(height):
+        for x in range(width - 1):
+            a, b = labels[y, x], labels[y, x + 1]
+            low[count], high[count] = min(a, b), max(a, b)
+            count += a != b
+    for y in range(height - 1):
+        for x in range(width):
+            a, b = labels[y, x], labels[y + 1, x]
+            low[count], high[count] = min(a, b), max(a, b)
+            count += a != b
+    return low[:count], high[:count]
+
+
+@compiled
+def linked(one: Labels, other: Labels, values: Floats, count: int) -> tuple[Labels, Labels, Floats]:
     """Pairs of cells as a symmetric matrix in rows (CSR).
 
     Args:

@@ -24,7 +24,7 @@ from visup.percepts.motion.constraints import (
     track,
     with_flow,
 )
-from visup.percepts.motion.dense import label
+from visup.percepts.motion.dense import label, looks
 from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.joining import absorb, merge, release
@@ -131,12 +131,15 @@ class MotionSegmenter:
         dense = self._beside.submit(warped, scene, tracks, old, near, self.settings.noise)
         likelihood, has = explain(scene, tracks, near, self.settings)
         likelihood = obey(directives, scene, likelihood)
+        look = looks(cells, prior)
         more = dense.result()
         stay = np.zeros(cells.count, dtype=bool)
         for t in tracks:
             if rests(t, scene):
                 stay |= t.share > 0.5
-        posterior = label(cells, scene.points, likelihood, has, prior, more, stay, self.settings)
+        posterior = label(
+            cells, scene.points, likelihood, has, prior, look, more, stay, self.settings
+        )
         keys = tuple(t.key for t in tracks)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
@@ -162,17 +165,24 @@ class MotionSegmenter:
         found = self._beside.submit(find_points, image, cell, self.settings.noise)
         coming = self._beside.submit(superpixels, image, cell, self.settings.contrast)
         flow = flow_back(image.grey, old.grey, self._engine)
+        carried = self._beside.submit(self._carried, flow, before, coming, seconds)
         points = found.result()
         first = self._follow(points, flow, old, image)
-        cells = coming.result()
-        tracks = carry(self._tracks, flow, before, cells, seconds)
-        prior = priors(tracks, cells)
+        cells, tracks, prior = carried.result()
         owner = prior.argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         later = [self._later(scene, tracks, lag) for lag in self._turn(image)]
         measured = [self._measure(scene, first)]
         measured += [self._measure(scene, c.result()) for c in later]
         return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks, prior
+
+    def _carried(
+        self, flow: Floats, before: Superpixels, coming: Future[Superpixels], seconds: float
+    ) -> tuple[Superpixels, Tracks, Floats]:
+        """The newest cells, the tracks carried there, and the labels expected of the cells."""
+        cells = coming.result()  # one worker does one thing after the other: it is there
+        tracks = carry(self._tracks, flow, before, cells, seconds)
+        return cells, tracks, priors(tracks, cells)
 
     def _turn(self, image: WorkImage) -> list[int]:
         """The longer baseline whose turn it is: they are measured one in each frame.

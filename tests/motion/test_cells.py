@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from visup.agent import Frame
-from visup.percepts.motion.cell_loops import borders, brought
+from visup.percepts.motion.cell_loops import brought
 from visup.percepts.motion.image import prepare
-from visup.percepts.motion.partition_loops import flooded, linked
+from visup.percepts.motion.partition_loops import borders, flooded, linked
 from visup.percepts.motion.superpixels import Superpixels, _edges, superpixels
 
 
