@@ -256,3 +256,47 @@ def beside_points(
             for i in range(kinds):
                 totals[k, i] += likelihood[n, i]
     return totals, number
+
+
+@compiled
+def weighed(
+    totals: NDArray[np.float64],
+    number: NDArray[np.float64],
+    more: Floats,
+    prior: Floats,
+    least: float,
+    clip: float,
+) -> tuple[Floats, Floats]:
+    """Shares of the labels of each cell after what its points and its pixels say.
+
+    Args:
+        totals: (count, K) float64 sums of log likelihoods over points.
+        number: (count,) float64, of how many.
+        more: (count, K) float32 dense log likelihood; all 0 where nothing is known.
+        prior: (count, K) float32 shares before.
+        least: What is added to those.
+        clip: Log likelihood ratio that counts as sure.
+
+    Returns:
+        (count, K) float32 shares; (count,) float32 weight of the evidence, 0 to 1.
+    """
+    count, kinds = prior.shape
+    share, sure = np.empty((count, kinds), np.float32), np.zeros(count, np.float32)
+    each = np.empty(kinds)
+    for c in range(count):
+        scale, told, highest = max(np.sqrt(number[c]), 1.0), number[c] > 0, -np.inf
+        for k in range(kinds):
+            each[k] = totals[c, k] / scale + more[c, k]
+            told |= more[c, k] != 0
+            highest = max(highest, each[k])
+        lowest, whole = 0.0, 0.0
+        for k in range(kinds):
+            off = each[k] - highest
+            lowest = min(lowest, off)
+            each[k] = (prior[c, k] + np.float32(least)) * np.exp(max(off, -2 * clip))
+            whole += each[k]
+        for k in range(kinds):
+            share[c, k] = each[k] / whole
+        if told:
+            sure[c] = min(-lowest, clip) / clip
+    return share, sure

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from visup.percepts.motion.appearance import appearance
-from visup.percepts.motion.cell_loops import beside_points
+from visup.percepts.motion.cell_loops import beside_points, weighed
 from visup.percepts.motion.constraints import Points
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.settings import MotionSettings
@@ -53,13 +53,7 @@ def gather(
     totals, number = beside_points(
         cells.labels, points.xy[has], points.normal[has], likelihood[has], REACH, cells.count
     )
-    totals /= np.maximum(np.sqrt(number), 1)[:, None]
-    totals += more
-    totals -= totals.max(axis=1, keepdims=True)
-    sure = np.minimum(-totals.min(axis=1), CLIP) / CLIP
-    share = (prior + LEAST) * np.exp(np.maximum(totals, -2 * CLIP))
-    share /= share.sum(axis=1, keepdims=True)
-    return share.astype(np.float32), (sure * ((number > 0) | more.any(axis=1))).astype(np.float32)
+    return weighed(totals, number, more, prior, LEAST, CLIP)
 
 
 def spread(
