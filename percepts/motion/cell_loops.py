@@ -50,12 +50,13 @@ def gathered(
 
 @compiled
 def totals(labels: Labels, values: Floats, count: int) -> Floats:
-    """Sum of a (h, w) map in each cell, (count,) float32."""
+    """Sum of a (h, w) map, most of it 0, in each cell, (count,) float32."""
     height, width = labels.shape
     out = np.zeros(count, np.float32)
     for y in range(height):
         for x in range(width):
-            out[labels[y, x]] += values[y, x]
+            if values[y, x] != 0:
+                out[labels[y, x]] += values[y, x]
     return out
 
 

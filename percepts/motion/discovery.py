@@ -114,4 +114,4 @@ def same_motion(
         return None
     both = fit_affine(c, (in_a | in_b).astype(np.float32), start, slack=slack)
     m2 = distances(both, c, slack)
-    return bool(np.median(m2[in_a]) < ALIKE and np.median(m2[in_b]) < ALIKE)
+    return median(m2[in_a]) < ALIKE and median(m2[in_b]) < ALIKE

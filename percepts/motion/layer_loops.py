@@ -165,3 +165,12 @@ def median(values: Floats) -> float:
         return float(np.partition(values, half)[half])
     parts = np.partition(values, half)
     return float((parts[:half].max() + parts[half]) / np.float32(2))
+
+
+@compiled
+def quantile(values: Floats, share: float) -> float:
+    """What a share of (N,) float32 with one or more lie below, between two of them in proportion."""
+    ordered, at = np.sort(values), share * (len(values) - 1)
+    low = int(at)
+    high = min(low + 1, len(values) - 1)
+    return float(ordered[low]) + (at - low) * (float(ordered[high]) - float(ordered[low]))
