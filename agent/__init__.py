@@ -7,6 +7,7 @@ behaviours are contained), `registry.py`, `journal.py`.
 """
 
 from visup.agent.behaviour import Behaviour, Contract, Outcome, Thinker
+from visup.agent.cells import Column, Relation
 from visup.agent.errors import VisupError
 from visup.agent.limits import Limits
 from visup.agent.mind import (
@@ -46,7 +47,7 @@ from visup.agent.records import (
     Severity,
     Truth,
 )
-from visup.agent.relations import Column, Relation, RelationTable
+from visup.agent.relations import RelationTable
 from visup.agent.shown import showing
 
 __all__ = [

@@ -7,7 +7,7 @@ each field anew every time.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from operator import attrgetter
 from typing import Any, TypeVar
 
@@ -33,23 +33,59 @@ def replace(record: Record, **changes: Any) -> Record:
         'bay'
     """
     kind = type(record)
-    read, place = _LAYOUTS.get(kind) or _layout(kind)
-    values = list(read(record))
+    layout = _LAYOUTS.get(kind) or _layout(kind)
+    if layout.open:
+        return _of_open(record, changes, layout)
+    values = list(layout.read(record))
     alike = True
     for name, value in changes.items():
-        at = place[name]
+        at = layout.place[name]
         if values[at] is not value:
             values[at], alike = value, False
     return record if alike else kind(*values)
 
 
-Layout = tuple[Callable[[Any], tuple[Any, ...]], Mapping[str, int]]
-_LAYOUTS: dict[type, Layout] = {}
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """What a kind of record is made of.
+
+    Attributes:
+        read: Reads all fields.
+        place: Field -> its place.
+        open: Whether its instances keep their fields in a dictionary and nothing is checked when one
+            is made: such records are copied at a third of the cost. Those that change in every step
+            are declared so (without `slots`).
+    """
+
+    read: Callable[[Any], tuple[Any, ...]]
+    place: Mapping[str, int]
+    open: bool
 
 
-def _layout(kind: Any) -> Layout:
-    """What reads all fields of a kind of record, and the place of each; found once for each kind."""
+_LAYOUTS: dict[type, _Layout] = {}
+
+
+def _of_open(record: Record, changes: Mapping[str, Any], layout: _Layout) -> Record:
+    held, alike = record.__dict__, True
+    for name, value in changes.items():
+        alike = held[name] is value and alike
+    if alike:
+        return record
+    new = object.__new__(type(record))
+    inside = new.__dict__
+    if len(held) == len(layout.place):
+        inside.update(held)
+    else:  # what was worked out from the old fields stays behind
+        inside.update(zip(layout.place, layout.read(record), strict=True))
+    inside.update(changes)
+    return new
+
+
+def _layout(kind: Any) -> _Layout:
+    """The layout of a kind of record; found once for each kind."""
     names = [f.name for f in fields(kind)]
     one = attrgetter(names[0])
     read = attrgetter(*names) if len(names) > 1 else lambda record: (one(record),)
-    return _LAYOUTS.setdefault(kind, (read, {name: i for i, name in enumerate(names)}))
+    open_ = not hasattr(kind, "__slots__") and not hasattr(kind, "__post_init__")
+    place = {name: i for i, name in enumerate(names)}
+    return _LAYOUTS.setdefault(kind, _Layout(read, place, open_))

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from pydantic_core import from_json, to_json
 
 from visup.agent import mind, records
+from visup.agent.codec_loops import NO_DIGIT, chain_digits, chain_points, run_lengths
 from visup.agent.errors import OutputError
 from visup.agent.records import Observation, Percept, Region, Report, ReportState
 
@@ -29,7 +30,6 @@ LARGEST = 256 * 2**20
 """No step is larger, bytes uncompressed: a damaged file must not fill the memory."""
 
 _LEVEL = 1  # of zlib: higher levels save a few per cent and take several times as long
-_WHOLE = 2**24  # float32 knows all whole numbers below
 _PLAIN = frozenset({type(None), bool, int, float, str})
 _LEFT_OUT = (records.Frame, records.Observation, mind.Mind)
 _TYPES: Mapping[str, type] = MappingProxyType(
@@ -267,12 +267,8 @@ def _told_region(told: Mapping[str, Any]) -> Region:
 
 def runs(mask: NDArray[np.bool_]) -> list[int]:
     """Lengths of the runs of a mask in reading order, that of False first (0 when there is none)."""
-    flat = np.ravel(mask)
-    turns = (flat[1:] != flat[:-1]).nonzero()[0]
-    ends = np.zeros(len(turns) + 2, np.int64)
-    ends[1:-1], ends[-1] = turns + 1, flat.size
-    lengths: list[int] = (ends[1:] - ends[:-1]).tolist()
-    return [0, *lengths] if flat.size and flat[0] else lengths
+    lengths: list[int] = run_lengths(np.ascontiguousarray(mask).reshape(-1)).tolist()
+    return lengths
 
 
 def unrun(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
@@ -288,9 +284,8 @@ def unrun(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
 
 
 _CHAIN = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
-_NO_DIGIT = "-"
-_CODE = np.full(9, ord(_NO_DIGIT), np.uint8)
-"""The digit of a move (dx, dy) at 3 (dx + 1) + dy + 1."""
+_CODE = np.full(9, NO_DIGIT, np.uint8)
+"""The character of a move (dx, dy) at 3 (dx + 1) + dy + 1."""
 for _digit, (_dx, _dy) in enumerate(_CHAIN):
     _CODE[3 * (_dx + 1) + _dy + 1] = ord("0") + _digit
 
@@ -304,30 +299,19 @@ def _chain(contour: NDArray[np.float32]) -> Any:
     points = np.asarray(contour)
     if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 2 or not len(points):
         return encoded(contour)
-    least, most = float(points.min()), float(points.max())
-    if not -_WHOLE < least <= most < _WHOLE:  # NaN is neither
+    digits = chain_digits(np.ascontiguousarray(points), _CODE)
+    if len(digits) == len(points):
         return encoded(contour)
-    if least <= 0.0 and np.signbit(points[points == 0]).any():
-        return encoded(contour)
-    whole = points.astype(np.int32)
-    # Moves of one pixel are 0, 1 and 2 here; of a longer one either is something else, or larger.
-    moves = (whole[1:] - whole[:-1] + 1).view(np.uint32)
-    if (whole != points).any() or moves.max(initial=0) > 2:
-        return encoded(contour)
-    digits = _CODE[3 * moves[:, 0] + moves[:, 1]].tobytes().decode()
-    if _NO_DIGIT in digits:
-        return encoded(contour)
-    return {"$": "chain", "from": whole[0].tolist(), "of": digits}
+    first = [int(points[0, 0]), int(points[0, 1])]
+    return {"$": "chain", "from": first, "of": digits.tobytes().decode()}
 
 
 def _unchained(told: Mapping[str, Any]) -> NDArray[np.float32]:
     digits = np.frombuffer(told["of"].encode(), np.uint8) - ord("0")
-    if (digits > 7).any():
+    if len(digits) and digits.max() > 7:
         raise ValueError("a chain code has digits from 0 to 7")
-    points = np.empty((len(digits) + 1, 2), np.int64)
-    points[0] = told["from"]
-    points[1:] = _CHAIN[digits]
-    return np.cumsum(points, axis=0).astype(np.float32)
+    x, y = told["from"]
+    return chain_points(int(x), int(y), digits, _CHAIN)
 
 
 _OTHERS["chain"] = _unchained

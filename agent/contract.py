@@ -32,6 +32,11 @@ class Contract:
         memory_mb: How much memory it may take, megabytes; None when it does not say.
         most_percepts: How many percepts one run may report.
         version: Version of the contract that it was written for.
+        awake: When it is awake: a condition of the rule language about one object `a`, such as
+            "expected(a)" or "exists b: gap(a, b) < 60 px"; it runs on frames that follow a step in
+            which that held of some object, and 'wake' directives say of which. Empty for always.
+        relieves: Names of behaviours that rest while this one runs, coarse ones whose work it does
+            more closely; where it fails they do it again.
 
     Raises:
         BehaviourError: A field is not as it should be.
@@ -48,6 +53,8 @@ class Contract:
     memory_mb: float | None = None
     most_percepts: int = 1000
     version: int = CONTRACT_VERSION
+    awake: str = ""
+    relieves: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
@@ -57,11 +64,13 @@ class Contract:
                 expected="a word of letters, digits and underscores, such as 'lamp'",
             )
         self._expect("version", self.version == CONTRACT_VERSION, f"{CONTRACT_VERSION}", _VERSION)
-        for field in ("gives", "needs"):
+        for field in ("gives", "needs", "relieves"):
             kinds = getattr(self, field)
             object.__setattr__(self, field, tuple(kinds) if isinstance(kinds, list) else kinds)
             self._expect_kinds(field)
         self._expect("gives", bool(self.gives), "at least one kind of percept")
+        self._expect("awake", isinstance(self.awake, str), 'a condition, such as "expected(a)"')
+        self._expect("relieves", self.name not in self.relieves, "names of other behaviours")
         self._expect("every_s", _number(self.every_s, 0.0), "seconds, 0 for every frame")
         for field in ("cost_ms", "memory_mb"):
             value = getattr(self, field)

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import to_json
+
 from visup.agent.agent import Step
 from visup.agent.codec import packed
 from visup.agent.encode import event_line, object_line, plain
@@ -100,7 +102,8 @@ class Journal:
             OutputError: The disk is full or the file has become unwritable; earlier steps stay.
         """
         seen = packed(step.observation)
-        row = (step.frame_index, step.time, _text(summary(step)), seen, zlib.crc32(seen))
+        text = to_json(summary(step)).decode()
+        row = (step.frame_index, step.time, text, seen, zlib.crc32(seen))
         statements: list[Statement] = [("INSERT INTO steps VALUES (?, ?, ?, ?, ?)", row)]
         statements += [
             ("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (number, *_event_row(e)))
@@ -116,7 +119,7 @@ class Journal:
         self._last_event += len(step.events)
         self.last_frame = step.frame_index
         self._begun = step.time if self._begun is None else self._begun
-        self._sizes[-1] += len(seen) + len(row[2])
+        self._sizes[-1] += len(seen) + len(text)
 
     def close(self) -> None:
         """Fold the log into the file and close it."""

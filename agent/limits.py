@@ -37,6 +37,8 @@ class Limits:
         memory_mb: How much memory a behaviour may take that declares nothing, megabytes.
         isolate: Names of behaviours that run in processes of their own, whatever their contracts say.
         here: Whether all run in this process, whatever contracts say: for debuggers and checkers.
+        wakeful: Names of behaviours that never sleep, whatever their contracts say: those that safety
+            rules need (`rules/waking.py`).
         clock: Seconds, by which the time of a run is measured.
     """
 
@@ -47,6 +49,7 @@ class Limits:
     memory_mb: float = 2048.0
     isolate: frozenset[str] = frozenset()
     here: bool = False
+    wakeful: frozenset[str] = frozenset()
     clock: Callable[[], float] = time.perf_counter
 
     def seconds(self, contract: Contract) -> float | None:
@@ -55,6 +58,10 @@ class Limits:
             return self.hang_s
         budget = (contract.cost_ms or self.budget_ms) / 1000.0
         return budget if self.hang_s is None else min(budget, self.hang_s)
+
+    def sleeps(self, contract: Contract) -> bool:
+        """Whether it runs only while it is asked to look."""
+        return bool(contract.awake) and contract.name not in self.wakeful
 
     def megabytes(self, contract: Contract) -> float:
         """How much memory it may take."""

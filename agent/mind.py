@@ -12,9 +12,10 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.cells import Relation
 from visup.agent.changing import replace
 from visup.agent.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
-from visup.agent.relations import Relation, RelationTable
+from visup.agent.relations import RelationTable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -146,7 +147,7 @@ class Question:
     text: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ObjectBelief:
     """What is believed about one object.
 
@@ -267,7 +268,7 @@ class StageBelief:
     evidence: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TaskBelief:
     """How a task stands.
 
@@ -301,7 +302,7 @@ class TaskBelief:
     active: float = 1.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Mind:
     """All that is believed at one moment.
 

@@ -13,8 +13,8 @@ from graphlib import CycleError, TopologicalSorter
 from visup.agent.behaviour import Behaviour
 from visup.agent.errors import BehaviourError
 from visup.agent.limits import Limits
-from visup.agent.records import Directive, Frame, Observation
-from visup.agent.slot import Slot, slot_of
+from visup.agent.records import Directive, Frame, Observation, ReportState
+from visup.agent.slot import Slot, slot_of, taken_over
 
 
 def in_order(behaviours: Sequence[Behaviour], limits: Limits | None = None) -> list[Slot]:
@@ -39,12 +39,31 @@ def in_order(behaviours: Sequence[Behaviour], limits: Limits | None = None) -> l
             f"there is no behaviour called '{name}' to isolate",
             expected=f"one of: {', '.join(sorted(named))}",
         )
-    sorter = TopologicalSorter({n: _providers(b, behaviours) for n, b in named.items()})
+    closer = {n: _closer(b, behaviours) for n, b in named.items()}
+    before = {n: [*_providers(b, behaviours), *closer[n]] for n, b in named.items()}
     try:
-        return [slot_of(named[name], held) for name in sorter.static_order()]
+        order = list(TopologicalSorter(before).static_order())
     except CycleError as circle:
         path = " -> ".join(circle.args[1])
         raise BehaviourError(f"behaviours wait for each other in a circle: {path}") from circle
+    slots = [slot_of(named[name], held) for name in order]
+    for slot in slots:
+        slot.relieved_by = frozenset(closer[slot.contract.name])
+    return slots
+
+
+def _closer(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
+    """Names of those that relieve one; they give all that it gives, so that nothing is lost."""
+    coarse = behaviour.contract
+    fine = [b.contract for b in behaviours if coarse.name in b.contract.relieves]
+    for contract in fine:
+        for kind in coarse.gives:
+            if kind not in contract.gives:
+                raise BehaviourError(
+                    f"behaviour '{contract.name}' relieves '{coarse.name}', but does not give '{kind}'",
+                    hint=f"let it give '{kind}' too, or leave '{coarse.name}' at work",
+                )
+    return [c.name for c in fine]
 
 
 def _providers(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
@@ -77,7 +96,10 @@ def perceive(slots: Sequence[Slot], frame: Frame, directives: Sequence[Directive
     seen = Observation(frame.index, frame.time, frame.size)
     for slot in slots:
         report = slot.run(shown, seen, directives)
-        seen = replace(seen, reports=(*seen.reports, report))
+        earlier = seen.reports
+        if slot.relieved_by and report.state is ReportState.RAN:
+            earlier = tuple(taken_over(r, slot) for r in earlier)
+        seen = replace(seen, reports=(*earlier, report))
     for slot in slots:
         slot.remember(shown, seen)
     return seen

@@ -377,13 +377,17 @@ class Alert:
     unsure: float | None = None
 
 
+WAKE = "wake"
+"""Kind of the directive that wakes a behaviour."""
+
+
 @dataclass(frozen=True, slots=True)
 class Directive:
     """What cogitation asks of behaviours, with its reason.
 
     Attributes:
         kind: 'expect_regions' (data: count), 'look_at' (data: bbox), 'ignore' (data: bbox),
-            'try_first' (data: names), 'restrict' (data: names), 'wake' (data: behaviour),
+            'try_first' (data: names), 'restrict' (data: names), 'wake' (data: behaviour, object, region),
             'ask' (data: question), 'rest' (data: behaviour, region, every_s).
         reason: One sentence.
         data: As the kind says.

@@ -15,7 +15,17 @@ from typing import Any
 from visup.agent.behaviour import Behaviour
 from visup.agent.contract import Contract
 from visup.agent.limits import Limits
-from visup.agent.records import Directive, Frame, Observation, Past, Percept, Report, ReportState
+from visup.agent.records import (
+    BROKEN,
+    WAKE,
+    Directive,
+    Frame,
+    Observation,
+    Past,
+    Percept,
+    Report,
+    ReportState,
+)
 from visup.agent.running import (
     Direct,
     GrowthError,
@@ -35,7 +45,7 @@ LONGEST_SUSPENSION_S = 60.0
 NEVER = float("-inf")
 
 
-_SETTLED = frozenset({"behaviour", "contract", "limits", "runner"})
+_SETTLED = frozenset({"behaviour", "contract", "limits", "runner", "relieved_by"})
 """What of a slot is settled when the agent is made; all else is conduct."""
 
 
@@ -48,6 +58,7 @@ class Slot:
         contract: As it was when the behaviour was plugged in.
         limits: What it is held to.
         runner: How it runs.
+        relieved_by: Names of behaviours that do its work more closely while they run.
         last_run: Seconds of the latest frame on which it ran.
         failures: In a row.
         error: Of the latest failure; empty once it has run again.
@@ -60,6 +71,7 @@ class Slot:
     contract: Contract
     limits: Limits
     runner: Runner
+    relieved_by: frozenset[str] = frozenset()
     last_run: float = NEVER
     failures: int = 0
     error: str = ""
@@ -100,8 +112,14 @@ class Slot:
         """
         contract = self.contract
         idle = Report(contract.name, ReportState.RESTED, contract.gives)
-        if (waiting := self._waiting(frame.time)) is not None:
+        asleep = self._asleep(directives)
+        if (waiting := self._waiting(frame.time, asleep)) is not None:
             return replace(idle, state=waiting, error=self.error)
+        if asleep:
+            return replace(idle, error="asleep: nothing calls for it")
+        closer = [r.behaviour for r in seen.reports if r.behaviour in self.relieved_by and _ran(r)]
+        if closer:
+            return replace(idle, error=f"'{closer[0]}' looks more closely")
         unseen = [k for k in contract.needs if not seen.observed(k)]
         if unseen:
             blind = any(k in seen.unknown for k in unseen)
@@ -126,13 +144,18 @@ class Slot:
         if self.past.maxlen:
             self.past.append(Past(frame, seen))
 
-    def _waiting(self, now: float) -> ReportState | None:
+    def _asleep(self, directives: Sequence[Directive]) -> bool:
+        name = self.contract.name
+        asked = (d for d in directives if d.kind == WAKE and d.data.get("behaviour") == name)
+        return self.limits.sleeps(self.contract) and next(asked, None) is None
+
+    def _waiting(self, now: float, asleep: bool) -> ReportState | None:
         """Why a behaviour that failed does not run now; None when it may."""
         if self.runner.tend():
             return ReportState.LATE
         if self._within(now, self.suspended_at, self.suspension_s):
             return ReportState.SUSPENDED
-        if self.error and self._within(now, self.last_run, self.contract.every_s):
+        if self.error and (asleep or self._within(now, self.last_run, self.contract.every_s)):
             return ReportState.SUSPENDED
         return None
 
@@ -174,6 +197,21 @@ class Slot:
 
     def _ms(self, begin: float) -> float:
         return (self.limits.clock() - begin) * 1000.0
+
+
+def _ran(report: Report) -> bool:
+    return report.state is ReportState.RAN
+
+
+def taken_over(report: Report, by: Slot) -> Report:
+    """The report of a behaviour that failed, once one that it relieves has run in its place.
+
+    What both give is known.
+    """
+    if report.state not in BROKEN or report.behaviour not in by.relieved_by:
+        return report
+    gives = tuple(kind for kind in report.gives if kind not in by.contract.gives)
+    return replace(report, gives=gives)
 
 
 def slot_of(behaviour: Behaviour, limits: Limits) -> Slot:

@@ -5,6 +5,7 @@ Read in this order: `thinkers.py` (everything, in the order in which it runs), `
 `entering.py` and `vanishing.py`), `votes.py` (who is who), `pose.py` with
 `interpretation.py` and `spin.py` (which way it faces, how it turns), `relations.py` and `coupling.py` (what
 holds between them), `safety.rules` and `rules.lark` (what to watch for, and the language that says
-so), `sentences.py` (how it is told). Below them lie `history.py` and `measure.py` (samples and
-quantities) and `geometry.py`, `fit.py`, `latch.py` (the mathematics).
+so), `program.py`, `layout.py` and `machine.py` (how it is judged), `sentences.py` (how it is told).
+Below them lie `history.py` and `measure.py` (samples and quantities) and `geometry.py`,
+`fit_loops.py`, `latch.py` (the mathematics).
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from itertools import product
@@ -12,7 +12,6 @@ from visup.agent.errors import RuleError
 from visup.rules.explain import Explanation, explained
 from visup.rules.facts import Facts
 from visup.rules.formula import Rule
-from visup.rules.intervals import Box, Interval
 from visup.rules.monitor import verdict
 from visup.rules.ruled import ruled
 from visup.rules.safety import kept
@@ -44,7 +43,7 @@ def values_of(mind: Mind) -> Values:
         RuleError: No rules have judged it.
     """
     memory = kept(mind)
-    if memory.now is None:
+    if memory.now is None or memory.before is None:
         raise RuleError("no rule has been judged in this mind", hint="let the agent make a step")
     # Rules saw the tasks as they stood a step before.
     facts = Facts(replace(mind, tasks=memory.tasks))
@@ -85,16 +84,10 @@ def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     places = values.prepared.places[values.prepared.rules.index(rule)]
     found = {}
     for ids in choices(values, rule):
-        rows = [values.facts.row[i] for i in ids]
-        when, *unless = (verdict(_interval(values.at(p), rows)) for p in places)
+        rows = tuple(values.facts.row[i] for i in ids)
+        when, *unless = (verdict(values.interval(p, rows)) for p in places)
         found[ids] = Truth.FALSE if Truth.TRUE in unless else when
     return found
-
-
-def _interval(box: Box, rows: Sequence[int]) -> Interval:
-    """The interval of a formula for one choice of objects, by their rows."""
-    at = tuple(rows[i] if i < len(rows) and n > 1 else 0 for i, n in enumerate(box.shape[1:]))
-    return float(box[0][at]), float(box[1][at])
 
 
 def _choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:

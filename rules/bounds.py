@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from visup.rules.formula import Node, Quantified, Rule, children
-from visup.rules.intervals import Arrays
 from visup.rules.program import Compiler
 from visup.rules.units import TICKS
 
@@ -43,9 +42,9 @@ def bounds_of(rule: Rule) -> Bounds:
     Returns:
         What it costs at most, whatever it sees.
     """
-    compiler = Compiler(Arrays(variables_of(rule)))
+    compiler = Compiler()
     latest = compiler.rule(rule)[0].delay
-    kept = sum(operator.kept for operator, _ in compiler.program.operators)
+    kept = sum(operator.kept for operator in compiler.program.operators())
     return Bounds(kept, latest / TICKS)
 
 

@@ -15,13 +15,14 @@ an agent makes of its objects, whose motion is measured on outlines instead.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
-from visup.rules.distance import CLASS_NAMES, signed_gap
-from visup.rules.fit import binned, slope_noise, theil_sen
+from visup.rules.distance import CLASS_NAMES
+from visup.rules.fit_loops import slope_noise, trends
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.judge import (
     AWAY,
@@ -32,14 +33,13 @@ from visup.rules.judge import (
     SIDE,
     JudgeSettings,
     least_durations,
-    moving_sign,
-    quantities,
-    wanted,
+    limits,
 )
+from visup.rules.judge_loops import box_gaps, judged, moving_signs
 from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
 from visup.rules.pairs import carried, pairs
 from visup.rules.qtc import text
-from visup.rules.rcc8 import CONVERSE, edge_differences, from_signs
+from visup.rules.rcc8 import CONVERSE, from_signs
 from visup.rules.smooth import smoothed
 
 APPROACH = JUDGED
@@ -159,8 +159,8 @@ def watch_boxes(
     s = settings or DEFAULT
     kept = before if ids == before.ids else _other(before, ids, now)
     m, p = len(ids), len(pairs(len(ids))[0])
-    differences = edge_differences(boxes)
-    gap = signed_gap(differences)
+    boxes = np.ascontiguousarray(boxes, dtype=float)
+    gap = box_gaps(boxes)
     smooth = smoothed(kept.smooth, boxes, now - kept.time, 6.0 * s.judge.noise_px)
     places = boxes[:, :2] + 0.5 * boxes[:, 2:]
     times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
@@ -168,26 +168,24 @@ def watch_boxes(
     slope, sigma = _fit(seconds, np.stack(samples), s)
     # What the noise of edges makes of a trend of one coordinate, and of a gap between two edges.
     noise = slope_noise(seconds, s.judge.noise_px)
-    velocity = slope[p:].reshape(2, m).T
+    velocity = slope[p:].reshape(2, m).T.copy()
     spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
-    judge = s.judge
-    q = quantities(smooth, velocity, spread, judge.noise_px)
-    state = kept.latch.state
+    judge, state = s.judge, kept.latch.state
+    bounds = limits(judge, s.diagonal)
     codes = np.empty((JUDGED + 1, p), dtype=np.int8)
-    codes[:JUDGED] = wanted(state[:JUDGED], q, judge, s.diagonal)
+    judged(state, smooth, velocity, spread, bounds, codes)
     rate, rate_sigma = slope[:p], np.maximum(np.sqrt(2.0) * noise, s.fit_share * sigma[:p])
-    codes[APPROACH] = moving_sign(
-        rate,
-        state[APPROACH],
-        np.maximum(judge.speed_enter * s.diagonal, judge.sigmas_enter * rate_sigma),
-        np.maximum(judge.speed_exit * s.diagonal, judge.sigmas_exit * rate_sigma),
-    )
-    lasts = np.append(least_durations(judge), [[judge.motion_minimum_s]], axis=0)
-    latch = step(kept.latch, codes, now, lasts)
+    codes[APPROACH] = moving_signs(rate, rate_sigma, state[APPROACH], bounds[-4:])
+    latch = step(kept.latch, codes, now, _lasts(judge))
     return Boxes(ids, now, times, samples, smooth, latch, gap, rate, rate_sigma, velocity)
 
 
 DEFAULT = BoxSettings()
+
+
+@lru_cache(maxsize=8)
+def _lasts(judge: JudgeSettings) -> Floats:
+    return np.append(least_durations(judge), [[judge.motion_minimum_s]], axis=0)
 
 
 def _window(
@@ -208,7 +206,7 @@ def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats
     if len(times) < 6 or times[-1] - times[0] < 0.6 * s.window_s:
         unknown = np.full(samples.shape[1], np.nan)
         return unknown, unknown
-    return theil_sen(*binned(times, samples, s.bins))
+    return trends(times, samples, s.bins)
 
 
 def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:

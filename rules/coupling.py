@@ -14,25 +14,29 @@ be apart in space: with the depth of one of the two unknown this is not told apa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
 
 from visup.agent import (
+    Column,
     Coupling,
     Event,
     Mind,
-    ObjectBelief,
     Observation,
     Outcome,
     Presence,
     Region,
-    Relation,
+    RelationTable,
     Truth,
 )
+from visup.agent.cells import UNKNOWN_CODE, Cells, Columns
 from visup.agent.changing import replace
 from visup.rules.joint import Joint, begun, follow, motion
-from visup.rules.measure import Measured, RelationSettings, scale
+from visup.rules.measure import RelationSettings, scale
 from visup.rules.relations import measured
 from visup.rules.sentences import sentence
 from visup.rules.tracks import merged_pairs
@@ -42,8 +46,12 @@ COUPLING = "rules.coupling"
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
 
+COLUMNS = Columns((Column(("", "coupled"), (0, 0), 0),))
+
+YES, MAYBE, NO = 1, 0, -1
+"""Codes of truths."""
+
 Pair = tuple[int, int]
-Held = Mapping[tuple[str, tuple[int, ...]], Truth]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +99,29 @@ class Pending:
     joint: Joint | None = None
 
 
+NOTHING = Pending()
+
+
+class Sight(NamedTuple):
+    """Two objects as they are seen now; lives only while the thinker runs.
+
+    Attributes:
+        pair: Their ids.
+        touching: Code of a truth, and
+        converging: the same, and
+        diverging: the same.
+        gap: Of their outlines, pixels; NaN unknown.
+        host: Id of the one in whose region both are merged, or None.
+    """
+
+    pair: Pair
+    touching: int
+    converging: int
+    diverging: int
+    gap: float
+    host: int | None
+
+
 @dataclass(frozen=True, slots=True)
 class Couple:
     """Thinker of the cogitate phase, after the relations: couplings and the `coupled` relation."""
@@ -101,20 +132,14 @@ class Couple:
         """Judge one step; see `Thinker`."""
         old: Mapping[Pair, Pending] = mind.memory.get(COUPLING, MappingProxyType({}))
         coupled = {c.objects: c for c in mind.couplings}
-        objects = mind.present()
-        pairs = [(a.id, b.id) for i, a in enumerate(objects) for b in objects[i + 1 :]]
-        held: Held = {
-            (name, pair): truth
-            for pair in pairs
-            for name in ("touching", "converging", "diverging")
-            if (truth := mind.truth(name, *pair)) is not None
-        }
-        now = measured(mind)
+        table = _table(mind)
+        sights = _sights(table, mind)
         kept: dict[Pair, Pending] = {}
         events: list[Event] = []
-        for pair in pairs:
-            p = self._look(old.get(pair, Pending()), pair, held, now, mind)
-            if pair not in coupled and self._joined(p, pair, mind):
+        for sight in sights:
+            pair = sight.pair
+            p = self._look(old.get(pair, NOTHING), sight, mind)
+            if pair not in coupled and self._joined(p, sight, mind):
                 coupled[pair] = Coupling(pair, mind.time)
                 events.append(
                     _event("coupled", "{0} and {1} {are} coupled.", pair, mind, observation)
@@ -124,53 +149,45 @@ class Couple:
                 del coupled[pair]
                 text = "{0} and {1} {are} no longer coupled."
                 events.append(_event("decoupled", text, pair, mind, observation))
-                p = Pending()
+                p = NOTHING
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        told = tuple(self._relation(pair, coupled.get(pair), held, mind) for pair in pairs)
+        table = table.with_cells(_coupled(sights, coupled, mind))
         memory = MappingProxyType(kept)
-        mind = mind.remember(COUPLING, memory, couplings=alive, relations=mind.relations + told)
+        mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
 
-    def _look(
-        self,
-        before: Pending,
-        pair: Pair,
-        held: Held,
-        now: Measured,
-        mind: Mind,
-    ) -> Pending:
-        touching = held.get(("touching", pair), Truth.UNKNOWN)
-        converging = held.get(("converging", pair)) is Truth.TRUE
-        converging = converging and touching is not Truth.TRUE
-        apart = touching is Truth.FALSE and held.get(("diverging", pair)) is Truth.TRUE
-        apart = apart or (touching is Truth.FALSE and self._well_apart(now, pair, mind))
-        joint = self._follow(before.joint, pair, now, mind)
+    def _look(self, before: Pending, sight: Sight, mind: Mind) -> Pending:
+        converging = sight.converging == YES and sight.touching != YES
+        far = sight.diverging == YES or sight.gap > 0.02 * scale(mind.frame_size)
+        apart = sight.touching == NO and far
+        joint = self._follow(before.joint, sight, mind)
         odds = before.rest_odds
-        if joint is None or touching is not Truth.TRUE:
+        if joint is None or sight.touching != YES:
             odds = 0.0
         elif joint is not before.joint:
             odds = self._rest(odds, before.joint, joint, mind)
-        return Pending(
-            mind.time if converging else before.converged_at,
-            odds,
-            _since(before.apart_since, apart, mind.time),
-            joint,
-        )
+        same = joint is before.joint and odds == before.rest_odds and not converging
+        if same and apart == (before.apart_since is not None):
+            return before  # as nearly always: most pairs are far from each other
+        converged = mind.time if converging else before.converged_at
+        return Pending(converged, odds, _since(before.apart_since, apart, mind.time), joint)
 
-    def _follow(self, before: Joint | None, pair: Pair, now: Measured, mind: Mind) -> Joint | None:
+    def _follow(self, before: Joint | None, sight: Sight, mind: Mind) -> Joint | None:
         """How the two move relative to each other; the same as before when they are not seen."""
         s = self.settings
-        regions = _regions(pair, mind)
+        merged = sight.host is not None
+        if before is None and not merged and not sight.gap <= s.near * scale(mind.frame_size):
+            return None
+        regions = _regions(sight, mind)
         if regions is None:
             old = before is None or mind.time - before.path_end > s.path_s / 2
             return None if old else before
-        gap = now.pair("gap", *pair)
-        if regions[0] is not regions[1] and not gap <= s.near * scale(mind.frame_size):
+        if not merged and not sight.gap <= s.near * scale(mind.frame_size):
             return None
-        if before is None and regions[0] is regions[1]:
+        if before is None and merged:
             # Not seen side by side before: one is followed as it was last seen, the other with it.
-            return begun(_apart(pair, mind), mind.time, mind.frame_size)
+            return begun(_apart(sight.pair, mind), mind.time, mind.frame_size)
         return follow(
             before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
         )
@@ -187,50 +204,62 @@ class Couple:
         # Odds beyond the bound would only delay that the opposite is believed.
         return min(max(0.0, odds + told), 2 * s.odds)
 
-    def _well_apart(self, now: Measured, pair: Pair, mind: Mind) -> bool:
-        return now.pair("gap", *pair) > 0.02 * scale(mind.frame_size)
-
-    def _joined(self, p: Pending, pair: Pair, mind: Mind) -> bool:
+    def _joined(self, p: Pending, sight: Sight, mind: Mind) -> bool:
         s = self.settings
         watched = p.joint is not None and p.joint.path_end == mind.time
         if not watched or p.rest_odds < s.odds:
             return False
-        if _host(pair, mind) is not None:
+        if sight.host is not None:
             return True
-        together = mind.relation("moving_together", *pair)
-        if together is not None and together.truth is Truth.TRUE:
+        if mind.truth("moving_together", *sight.pair) is Truth.TRUE:
             return True
         return p.converged_at is not None and mind.time - p.converged_at <= s.approach_s
 
-    def _relation(
-        self,
-        pair: Pair,
-        coupling: Coupling | None,
-        held: Held,
-        mind: Mind,
-    ) -> Relation:
-        if coupling is not None:
-            return Relation("coupled", pair, Truth.TRUE, coupling.since, 0.9)
-        hidden = any(mind.objects[i].presence is not Presence.SEEN for i in pair)
-        unknown = hidden or held.get(("touching", pair)) is Truth.UNKNOWN
-        truth = Truth.UNKNOWN if unknown else Truth.FALSE
-        return Relation("coupled", pair, truth, mind.time, 0.0 if unknown else 0.9)
+
+def _sights(table: RelationTable, mind: Mind) -> list[Sight]:
+    """All pairs of present objects as they are seen now."""
+    ids, now = table.ids, measured(mind)
+    hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
+    gaps = now.gap.tolist() if now.ids == ids else None
+    told = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
+    sights = []
+    for i, a in enumerate(ids):
+        for j in range(i + 1, len(ids)):
+            b = ids[j]
+            gap = gaps[i][j] if gaps else now.pair("gap", a, b)
+            touching, closing, parting = next(told)
+            host = hosts.get((a, b))
+            sights.append(Sight((a, b), touching, closing, parting, gap, host))
+    return sights
 
 
-def _host(pair: Pair, mind: Mind) -> ObjectBelief | None:
-    """The object in whose region the two are merged now, or None."""
-    for gone, host in merged_pairs(mind):
-        if {gone, host} == set(pair):
-            return mind.objects.get(host)
-    return None
+def _table(mind: Mind) -> RelationTable:
+    """The relations of all present objects."""
+    ids, table = tuple([b.id for b in mind.present()]), mind.relations
+    if isinstance(table, RelationTable) and table.ids == ids:
+        return table
+    return RelationTable(ids, extra=tuple(table))
 
 
-def _regions(pair: Pair, mind: Mind) -> tuple[Region, Region] | None:
+def _coupled(sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mind) -> Cells:
+    """The relation of being coupled."""
+    hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
+    state, since = [0] * len(sights), [mind.time] * len(sights)
+    for k, sight in enumerate(sights):
+        if sight.pair in coupled:
+            state[k], since[k] = 1, coupled[sight.pair].since
+        elif sight.touching == MAYBE or (hidden and not hidden.isdisjoint(sight.pair)):
+            state[k] = UNKNOWN_CODE
+    sure = np.full((1, len(sights)), CONFIDENCE)
+    return Cells(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
+
+
+def _regions(sight: Sight, mind: Mind) -> tuple[Region, Region] | None:
     """The regions in which the two are seen now, twice the same one when they are merged."""
-    host = _host(pair, mind)
-    if host is not None:
+    if sight.host is not None:
+        host = mind.objects[sight.host]
         return (host.region, host.region) if host.last_seen == mind.time else None
-    first, second = (mind.objects[i] for i in pair)
+    first, second = (mind.objects[i] for i in sight.pair)
     if first.last_seen < mind.time or second.last_seen < mind.time:
         return None
     return first.region, second.region

@@ -63,9 +63,11 @@ class BelieveDepth:
         for i, belief in mind.objects.items():
             new = told.get((i, belief.name))
             before = old.get(i)
+            if new is None and before is None and belief.depth is None:
+                continue  # as nearly always where nobody measures depth
             if not self._clear(belief):
                 new = before = None
-            elif visible_share(mind, i) < self.settings.least_visible:
+            elif new is not None and visible_share(mind, i) < self.settings.least_visible:
                 new = None
             now = self._smooth(before, new, belief.name, observation.time)
             if now is not None:

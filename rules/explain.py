@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isinf
 
@@ -12,7 +12,6 @@ from visup.agent import Truth
 from visup.agent.changing import replace
 from visup.rules.formula import (
     Comparison,
-    Formula,
     Node,
     Predicate,
     Quantified,
@@ -23,7 +22,7 @@ from visup.rules.formula import (
 from visup.rules.intervals import UNKNOWN, Interval
 from visup.rules.monitor import verdict
 from visup.rules.program import Place, Scope
-from visup.rules.ruled import scope_of
+from visup.rules.ruled import Ruled, scope_of
 from visup.rules.sentences import short
 from visup.rules.terms import Measure, Term
 from visup.rules.units import TICKS, Number
@@ -59,7 +58,7 @@ class Explanation:
 
     def line(self) -> str:
         """This node alone: `gap(the arm, the probe) < 20 px is true, by 3.5`."""
-        late = f" ({self.late_s:g} s ago)" if self.late_s else ""
+        late = _late(self.late_s)
         if self.verdict is None:
             return f"{self.text} = {_amount(self.interval, self.unit)}{late}"
         return f"{self.text} is {self.verdict.value}{_margin(self.interval)}{late}"
@@ -93,10 +92,73 @@ def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
     return Explanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
 
 
+MOST_LINES = 4096
+"""Of so many rules and names of objects the texts of their evidence are remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of evidence but for its values.
+
+    Attributes:
+        place: Of the fact or comparison.
+        text: Its source, with objects by name; of a comparison its sign.
+        sides: Of a comparison what is compared: text, place and unit; only a text of a number.
+    """
+
+    place: Place
+    text: str
+    sides: tuple[tuple[str, Place | None, str], ...] = ()
+
+    def told(self, values: Values, rows: tuple[int, ...]) -> str:
+        """The line for some objects.
+
+        It says of a comparison what its quantities are: `gap(the arm, the probe) = 3 px < 20 px is true`;
+        by how much is told by these.
+        """
+        interval, text = values.interval(self.place, rows), self.text
+        if not self.sides:
+            text = f"{text} is {verdict(interval).value}{_margin(interval)}"
+            return f"{text}{_late(self.place.delay / TICKS)}."
+        left, right = (
+            side
+            if at is None
+            else f"{side} = {_amount(values.interval(at, rows), unit)}{_late(at.delay / TICKS)}"
+            for side, at, unit in self.sides
+        )
+        return (
+            f"{left} {text} {right} is {verdict(interval).value}{_late(self.place.delay / TICKS)}."
+        )
+
+
 def evidence(rule: Rule, ids: tuple[int, ...], values: Values) -> tuple[str, ...]:
     """One sentence for each fact and comparison of `when`: what it says of these objects."""
-    reader = _Reader(values, rule, ids)
-    return tuple([f"{reader.told(f)}." for f in values.prepared.told(rule)])
+    facts, prepared = values.facts, values.prepared
+    names = tuple([facts.short(i) for i in ids])
+    lines = prepared.lines.get((rule.name, names))
+    if lines is None:
+        if len(prepared.lines) >= MOST_LINES:
+            prepared.lines.clear()
+        lines = prepared.lines.setdefault((rule.name, names), _lines(rule, names, prepared))
+    rows = tuple([facts.row[i] for i in ids])
+    return tuple([line.told(values, rows) for line in lines])
+
+
+def _lines(rule: Rule, names: tuple[str, ...], prepared: Ruled) -> tuple[Line, ...]:
+    """The evidence of a rule, for objects of these names."""
+    scope, named = scope_of(rule), dict(zip(rule.variables, names, strict=True))
+
+    def side(term: Term) -> tuple[str, Place | None, str]:
+        if isinstance(term, Number):
+            return str(term), None, ""
+        return _text(term, named, prepared), prepared.place(term, scope), _unit(term)
+
+    return tuple(
+        Line(prepared.place(f, scope), f.operator, (side(f.left), side(f.right)))
+        if isinstance(f, Comparison)
+        else Line(prepared.place(f, scope), _text(f, named, prepared))
+        for f in prepared.told(rule)
+    )
 
 
 class _Reader:
@@ -109,29 +171,13 @@ class _Reader:
         self.rows = tuple(values.facts.row[i] for i in ids)
         self.names = {v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)}
 
-    def told(self, formula: Formula) -> str:
-        """One line on a fact, on a quantifier, or on a comparison with its quantities in its text.
-
-        The last is `gap(the arm, the probe) = 3 px < 20 px is true`.
-        """
-        if not isinstance(formula, Comparison):
-            return self.node(formula, deep=False).line()
-        sides = [
-            str(s) if isinstance(s, Number) else self.node(s, deep=False).line()
-            for s in (formula.left, formula.right)
-        ]
-        place, interval = self._value(formula)
-        text = f"{sides[0]} {formula.operator} {sides[1]}"
-        # By how much is told by the quantities.
-        return Explanation(text, UNKNOWN, verdict(interval), (), place.delay / TICKS).line()
-
-    def node(self, node: Node, *, deep: bool = True) -> Explanation:
-        """What a node came to; with what it is made of, if `deep`."""
+    def node(self, node: Node) -> Explanation:
+        """What a node came to, with what it is made of."""
         place, interval = self._value(node)
         term = isinstance(node, Term)
-        whole = deep and not isinstance(node, Predicate | Measure | Number)
+        whole = not isinstance(node, Predicate | Measure | Number)
         return Explanation(
-            self._text(node),
+            _text(node, self.names, self.values.prepared),
             interval,
             None if term else verdict(interval),
             self._parts(node) if whole else (),
@@ -142,19 +188,7 @@ class _Reader:
     def _value(self, node: Node) -> tuple[Place, Interval]:
         """Where a node stands, and what it came to for these objects."""
         place = self.values.prepared.place(node, self.scope)
-        low, high = self.values.at(place)
-        for row in self.rows[: low.ndim]:
-            # Along the axis of an object on which it does not depend there is but one.
-            at = row if len(low) > 1 else 0
-            low, high = low[at], high[at]
-        return place, (low.item(0), high.item(0))
-
-    def _text(self, node: Node) -> str:
-        """Its source, with objects by name."""
-        text = self.values.prepared.text(node, tuple(self.names))
-        for variable, name in self.names.items():
-            text = text.replace(mark(variable), name)
-        return text
+        return place, self.values.interval(place, self.rows)
 
     def _parts(self, node: Node) -> tuple[Explanation, ...]:
         if isinstance(node, Quantified):
@@ -178,6 +212,18 @@ class _Reader:
             return ()
         pick = max if node.kind == "exists" else min
         return (pick(found, key=lambda e: e.interval),)
+
+
+def _text(node: Node, names: Mapping[str, str], prepared: Ruled) -> str:
+    """The source of a node, with objects by name."""
+    text = prepared.text(node, tuple(names))
+    for variable, name in names.items():
+        text = text.replace(mark(variable), name)
+    return text
+
+
+def _late(seconds: float) -> str:
+    return f" ({seconds:g} s ago)" if seconds else ""
 
 
 def _unit(node: Node) -> str:

@@ -28,8 +28,9 @@ from visup.rules.language import parse_rules
 from visup.rules.monitor import verdict
 from visup.rules.operators import SPACING
 from visup.rules.ruled import ruled, scope_of
+from visup.rules.states import States
 from visup.rules.units import ticks
-from visup.rules.verdicts import States, Values, rerowed
+from visup.rules.verdicts import Values, rerowed
 from visup.rules.vocabulary import RULES
 
 _CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)\)")
@@ -114,7 +115,7 @@ class Expression:
         prepared, now, facts = ruled((self.rule,)), ticks(mind.time), Facts(mind)
         if before is not None and not now > before.now:
             before = None
-        states = prepared.program.fresh if before is None else before.after
+        states = prepared.fresh(len(facts.ids)) if before is None else before.after
         if before is not None and now - before.now < SPACING:
             return before
         if before is not None and before.ids != facts.ids:
@@ -130,14 +131,12 @@ class Expression:
         return whole.parts[0] if self.quantity else whole
 
     def _reading(self, values: Values, ids: tuple[int, ...]) -> Reading:
-        compiler = values.prepared.compiler
         if self.quantity:
             node = cast("Comparison", self.rule.when).left
-            place, unit = compiler.term(node, scope_of(self.rule)), _unit(node)
+            place, unit = values.prepared.place(node, scope_of(self.rule)), _unit(node)
         else:
             place, unit = values.prepared.places[0][0], ""
-        rows = [values.facts.row[i] for i in ids]
-        low, high = (_at(bound, rows) for bound in values.at(place))
+        low, high = values.interval(place, tuple(values.facts.row[i] for i in ids))
         truth = None if self.quantity else verdict((low, high))
         return Reading(ids, (low, high), truth, unit)
 
@@ -218,13 +217,6 @@ def _with_variables(text: str) -> tuple[str, tuple[str, ...]]:
         return f"{call[1]}({', '.join(names)})"
 
     return _CALL.sub(rewritten, text), tuple(found)
-
-
-def _at(bound: Any, rows: Sequence[int]) -> float:
-    shape = bound.shape
-    return float(
-        bound[tuple(rows[i] if i < len(rows) and n > 1 else 0 for i, n in enumerate(shape))]
-    )
 
 
 def _unit(node: Any) -> str:

@@ -6,15 +6,17 @@ Quantities are intervals: value +- `SIGMAS` standard deviations where the deviat
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
+from collections.abc import Callable, Collection
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Truth
 from visup.rules.measure import Measured
+from visup.rules.pair_loops import pair_quantities
 from visup.rules.relations import NAMES, measured
+from visup.rules.sentences import short
 
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
@@ -40,6 +42,7 @@ class Facts:
         beliefs: Objects that are believed present, by increasing id.
         ids: Their ids.
         row: Id -> place in `ids`, and so in all arrays.
+        measured: Quantities of all pairs.
     """
 
     def __init__(self, mind: Mind) -> None:
@@ -47,38 +50,51 @@ class Facts:
         self.beliefs = mind.present()
         self.ids = tuple(b.id for b in self.beliefs)
         self.row = {object_id: i for i, object_id in enumerate(self.ids)}
+        self.measured: Measured = measured(mind)
+        self._names: dict[int, str] = {}
         self._codes: dict[str, Codes] = {}
+        self._paired: tuple[Floats, Codes] | None = None
+
+    def short(self, object_id: int) -> str:
+        """An object in two words; see `sentences.short`."""
+        if object_id not in self._names:
+            self._names[object_id] = short(self.mind, object_id)
+        return self._names[object_id]
 
     def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
         """(n,) codes from a look at each object."""
         return np.array([look(b) for b in self.beliefs], dtype=np.int8)
 
+    def among(self, ids: Collection[int | None]) -> Codes:
+        """(n,) `YES` of some objects, `NO` of the others."""
+        codes = [YES if i in ids else NO for i in self.ids] if ids else [NO] * len(self.ids)
+        return np.array(codes, dtype=np.int8)
+
     def pairs(self, code: int) -> Codes:
         """(n, n) codes that are all the same."""
-        return np.full((len(self.ids), len(self.ids)), code, dtype=np.int8)
+        codes = np.empty((len(self.ids), len(self.ids)), dtype=np.int8)
+        codes.fill(code)
+        return codes
 
     def unknown(self, objects: int) -> Floats:
         """(2, n) or (2, n, n) intervals of what is known of no object, or of no pair of objects."""
-        whole = np.full((2, *(len(self.ids),) * objects), np.inf)
-        whole[0] = -np.inf
+        whole = np.empty((2, *(len(self.ids),) * objects))
+        whole[0], whole[1] = -np.inf, np.inf
         return whole
 
     def related(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
         if name not in self._codes:
-            self.relate((name,))
+            self._codes[name] = self._coupled() if name == "coupled" else self.relations((name,))[0]
         return self._codes[name]
 
-    def relate(self, names: tuple[str, ...]) -> None:
-        """Look several relations up in one pass, before they are asked for."""
-        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
-        tables = self.mind.truths_of(tuple([n for n in names if n != "coupled"]), self.ids)
+    def relations(self, names: tuple[str, ...]) -> Codes:
+        """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
+        tables = self.mind.truths_of(names, self.ids)
         # An object is equal to itself, and nothing else.
-        each = np.arange(len(self.ids))
-        itself = [[YES if name in ITSELF else NO] for name in names if name != "coupled"]
-        tables[:, each, each] = np.array(itself, dtype=np.int8).reshape(-1, 1)
-        found = iter(tables)
-        self._codes |= {n: self._coupled() if n == "coupled" else next(found) for n in names}
+        n = len(self.ids)
+        tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)
+        return tables
 
     def _coupled(self) -> Codes:
         codes, row = self.pairs(NO), self.row
@@ -86,11 +102,6 @@ class Facts:
             if a in row and b in row:
                 codes[row[a], row[b]] = codes[row[b], row[a]] = YES
         return codes
-
-    @cached_property
-    def measured(self) -> Measured:
-        """Quantities of all pairs."""
-        return measured(self.mind)
 
     @cached_property
     def _rows(self) -> NDArray[np.intp]:
@@ -119,23 +130,37 @@ class Facts:
         values[np.ix_(known, known)] = table[inner]
         return values
 
-    @cached_property
-    def closing(self) -> Floats:
-        """(3, n, n) how fast distances shrink, px/s: the least, the most likely, the most."""
-        rate, sigma = -self.pair("rate"), self.pair("rate_sigma")
-        sigma = np.where(sigma == sigma, SIGMAS * sigma, 0.0)
-        return np.array((rate - sigma, rate, rate + sigma))
+    def of_pairs(self, quantity: int) -> Floats:
+        """(2, n, n) intervals of one of the quantities of `pair_loops`."""
+        whole: Floats = self._pairs[0][quantity]
+        return whole
 
-    @cached_property
-    def contact(self) -> Floats:
-        """(3, n, n) seconds until outlines meet: soonest, most likely, latest; NaN when unknown."""
-        gap, closing = self.pair("gap"), self.closing[::-1]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            times = np.where(closing > 0, gap / closing, np.inf)
-        known = closing[1] == closing[1]
-        times[:, (gap == 0.0) & known] = 0.0
-        times[:, ~known | (gap != gap)] = np.nan
-        return times
+    @property
+    def first_contact(self) -> Codes:
+        """(n, n) whether the second is what the first would meet first."""
+        return self._pairs[1]
+
+    @property
+    def _pairs(self) -> tuple[Floats, Codes]:
+        """All quantities of pairs, and what is met first."""
+        if self._paired is None:
+            n = len(self.ids)
+            out, first = np.empty((4, 2, n, n)), np.empty((n, n), np.int8)
+            # Of one layout, so that the loops are compiled once.
+            gap, rate, sigma, relative = (
+                np.ascontiguousarray(self.pair(name))
+                for name in ("gap", "rate", "rate_sigma", "relative_speed")
+            )
+            pair_quantities(gap, rate, sigma, relative, SIGMAS, out, first)
+            self._paired = out, first
+        return self._paired
+
+
+@lru_cache(maxsize=256)
+def _of_itself(names: tuple[str, ...]) -> Codes:
+    """(k, 1) whether relations hold of an object and itself."""
+    codes = np.array([YES if name in ITSELF else NO for name in names], dtype=np.int8)
+    return codes.reshape(-1, 1)
 
 
 def code(value: bool) -> int:
@@ -144,8 +169,11 @@ def code(value: bool) -> int:
 
 
 def exactly(values: Floats) -> Floats:
-    """(2, ...) intervals of known values; NaN becomes unknown."""
-    return between(values, values)
+    """(2, n) intervals of known values; NaN becomes unknown."""
+    known = values.tolist()
+    return np.array(
+        ([v if v == v else -np.inf for v in known], [v if v == v else np.inf for v in known])
+    )
 
 
 def between(low: Floats, high: Floats) -> Floats:

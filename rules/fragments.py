@@ -20,14 +20,9 @@ from dataclasses import dataclass
 
 from visup.agent import Mind, ObjectBelief, Presence, Region
 from visup.agent.changing import replace
-from visup.rules.geometry import (
-    DIRECTIONS,
-    box_overlap,
-    grow,
-    outline,
-)
+from visup.rules.geometry import DIRECTIONS, box_overlap, grow
 from visup.rules.measure import scale
-from visup.rules.outlines import outline_gap
+from visup.rules.outlines import outline_gap, ready
 from visup.rules.tracks import Track, border_sides, expected_box
 
 FRAGMENTS = "rules.fragments"
@@ -188,8 +183,8 @@ def share_within(region: Region, body: Region) -> float:
 
     The hull is taken as the polygon of its tangents in `DIRECTIONS`, at most 2 % too wide.
     """
-    points = outline(region) @ DIRECTIONS.T
-    limit = (outline(body) @ DIRECTIONS.T).max(axis=0)
+    points = ready(region).points @ DIRECTIONS.T
+    limit = (ready(body).points @ DIRECTIONS.T).max(axis=0)
     return float((points <= limit + 1.0).all(axis=1).mean())
 
 

@@ -9,13 +9,13 @@ without trusting the centroid of a body that the image border cuts off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Region
+from visup.compiled import compiled
 
 Floats = NDArray[np.float64]
 Box = tuple[int, int, int, int]
@@ -24,11 +24,6 @@ FAN = 16
 _ANGLES = 2.0 * np.pi * np.arange(FAN) / FAN
 DIRECTIONS: Floats = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 """(16, 2) unit vectors, evenly round the circle; the opposite of row k is row k + 8 modulo 16."""
-
-_EACH = np.arange(FAN)
-
-OPPOSITE = (np.arange(FAN) + FAN // 2) % FAN
-"""Row of the opposite of each of `DIRECTIONS`."""
 
 RCC8 = (
     "disconnected",
@@ -43,20 +38,6 @@ RCC8 = (
 """Names of the eight relations of the region connection calculus, by their code."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reach:
-    """How far one outline reaches.
-
-    Attributes:
-        support: (16,) float, pixels: max over the outline of p . n for each of `DIRECTIONS`.
-        free: (16,) bool: whether the furthest point is clear of the image border, so that it
-            belongs to the body and not to where the image ends.
-    """
-
-    support: Floats
-    free: NDArray[np.bool_]
-
-
 def outline(region: Region) -> Floats:
     """Contour of a region, or the corners of its box when it has none.
 
@@ -64,32 +45,13 @@ def outline(region: Region) -> Floats:
         region: Any region.
 
     Returns:
-        (N, 2) float, pixels, N >= 1.
+        (N, 2) float, pixels, N >= 1; an array of its own, row by row.
     """
     if len(region.contour):
-        return np.asarray(region.contour, dtype=float).reshape(-1, 2)
+        return np.array(region.contour, dtype=float, order="C").reshape(-1, 2)
     x, y, w, h = region.bbox
     right, bottom = x + max(w, 1) - 1, y + max(h, 1) - 1
     return np.array([[x, y], [right, y], [right, bottom], [x, bottom]], dtype=float)
-
-
-def reach(region: Region, frame_size: tuple[int, int]) -> Reach:
-    """Support function of a region's outline.
-
-    Args:
-        region: Any region.
-        frame_size: (width, height), pixels.
-
-    Returns:
-        Its reach in each of `DIRECTIONS`.
-    """
-    points = outline(region)
-    along = DIRECTIONS @ points.T
-    furthest = along.argmax(axis=1)
-    x, y = points[furthest].T
-    width, height = frame_size
-    free = (x > 1.5) & (y > 1.5) & (x < width - 2.5) & (y < height - 2.5)
-    return Reach(along[_EACH, furthest], free)
 
 
 def hull_separation(support: Floats) -> Floats:
@@ -99,13 +61,26 @@ def hull_separation(support: Floats) -> Floats:
     all directions n; with 16 of them it is at most 2 % too small for hulls that are apart.
 
     Args:
-        support: (M, 16) float, pixels, rows from `reach`; NaN rows for what is not seen.
+        support: (M, 16) float, pixels, rows from `outlines.reach`; NaN rows for what is not seen.
 
     Returns:
         (M, M) float, pixels; positive apart, negative the depth of penetration.
     """
-    least: Floats = (support[:, None, :] + support[:, OPPOSITE]).min(axis=2)
-    return -least
+    return _separations(np.ascontiguousarray(support))
+
+
+@compiled
+def _separations(support: Floats) -> Floats:
+    count, fan = support.shape
+    apart = np.empty((count, count))
+    for i in range(count):
+        for j in range(count):
+            least = np.inf
+            for k in range(fan):
+                least = min(least, support[i, k] + support[j, (k + fan // 2) % fan])
+            known = not (np.isnan(support[i, 0]) or np.isnan(support[j, 0]))
+            apart[i, j] = -least if known else np.nan
+    return apart
 
 
 def masks_overlap(a: Region, b: Region) -> bool:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Presence
 from visup.agent.changing import replace
-from visup.rules.geometry import FAN, Floats, hull_separation, reach
+from visup.rules.geometry import FAN, Floats, hull_separation
+from visup.rules.outlines import reach
 from visup.rules.tracks import merged_pairs, tracks
 
 ROOM = 64
@@ -77,20 +78,15 @@ def sample(
     if not (due and observation.observed("region")):
         return without(history, old)
     joint = {i for pair in merged_pairs(mind) for i in pair}
-    seen = [
-        b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint
-        for b in objects
-    ]
     support = np.full((len(ids), FAN), np.nan)
     free = np.zeros((len(ids), FAN), dtype=bool)
-    for i, (b, s) in enumerate(zip(objects, seen, strict=True)):
-        if s:
-            now = reach(b.region, mind.frame_size)
-            support[i], free[i] = now.support, now.free
-    depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
-    history = comparable(without(history, old), mind)
-    depth[[not s for s in seen]] = np.nan
-    return extended(history, (mind.time, support, free, hull_separation(support), depth))
+    depth = np.full(len(ids), np.nan)
+    for i, b in enumerate(objects):
+        if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
+            reach(b.region, mind.frame_size, support[i], free[i])
+            depth[i] = np.nan if b.depth is None else b.depth
+    row = (mind.time, support, free, hull_separation(support), depth)
+    return extended(comparable(history, mind), row, old)
 
 
 def covered(history: History, window_s: float) -> bool:
@@ -118,6 +114,8 @@ def comparable(history: History, mind: Mind) -> History:
     """A history without the samples of objects whose regions have changed their nature since."""
     of = tracks(mind).of
     changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
+    if not len(history.times) or not (changed > history.times[0] + 1e-9).any():
+        return history
     old = history.times[:, None] < changed[None, :] - 1e-9
     # Samples that are rid of them already stay the arrays that they are.
     if not (old[:, :, None] & (history.support == history.support)).any():
@@ -138,20 +136,21 @@ def without(history: History, old: int) -> History:
     return History(history.ids, times, support, free, separation, depth, history.start + old)
 
 
-def extended(history: History, row: tuple[Any, ...]) -> History:
-    """A history with one more sample: time, support, free, separation, depth."""
+def extended(history: History, row: tuple[Any, ...], old: int = 0) -> History:
+    """A history with one more sample (time, support, free, separation, depth) and without old ones."""
     count = len(history.times)
     end = history.start + count
     memory: list[Any] = [a.base for a in history.arrays]
     # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
-    if any(m is None or len(m) <= end for m in memory) or not np.isnan(memory[0][end]):
-        history = _with_room(history, max(ROOM, count))
+    if any(m is None or len(m) <= end for m in memory) or memory[0][end] == memory[0][end]:
+        history = _with_room(without(history, old), max(ROOM, count))
+        count, old = count - old, 0
         end = count
         memory = [a.base for a in history.arrays]
     for values, new in zip(memory, row, strict=True):
         values[end] = new
-    start = history.start
-    times, support, free, separation, depth = (m[start : end + 1] for m in memory)
+    start = history.start + old
+    times, support, free, separation, depth = [m[start : end + 1] for m in memory]
     return History(history.ids, times, support, free, separation, depth, start)
 
 

@@ -23,17 +23,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import radians
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Hypothesis
-from visup.agent.changing import replace
 from visup.agent.viewing import orientations, swing_and_roll
-from visup.rules.turns import Floats, nearest_rotations, turned
-
-NONE = -1
-"""In a path: no hypothesis is chosen at this level; as a view: none was chosen yet."""
+from visup.rules.tree_loops import NONE, grow
+from visup.rules.turns import Floats, nearest_rotations
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +105,16 @@ class Level:
     between: Floats
 
 
+_NO_LEVEL = Level(
+    0.0,
+    np.zeros(0, np.int64),
+    np.zeros((0, 3, 3)),
+    np.zeros(0, bool),
+    np.zeros(0),
+    np.zeros((0, 3, 3)),
+)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
     """The paths of one model that may still turn out cheapest, each by where it stands now.
@@ -158,33 +166,49 @@ def planted(settings: TreeSettings) -> Tree:
     )
 
 
-def level_of(
-    hypotheses: Sequence[Hypothesis], time: float, best: float, settings: TreeSettings
-) -> Level:
-    """The level that one model's hypotheses make.
+def levels_of(
+    hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings
+) -> dict[str, Level]:
+    """The levels that the hypotheses of one look make, by model.
 
     Args:
-        hypotheses: At least one, all of one model, in any order.
+        hypotheses: At least one, in any order.
         time: Seconds.
-        best: Greatest similarity of any model's hypothesis at this look.
         settings: Of the tree.
     """
-    ranked = sorted(hypotheses, key=lambda h: (-h.similarity, h.view, h.rotation or 0.0))
-    kept = ranked[: settings.most_hypotheses]
+    by_name: dict[str, list[Hypothesis]] = {}
+    for h in sorted(hypotheses, key=lambda h: (-h.similarity, h.view, h.rotation or 0.0)):
+        by_name.setdefault(h.name, []).append(h)
+    kept = {name: hs[: settings.most_hypotheses] for name, hs in by_name.items()}
+    whole = _level([h for hs in kept.values() for h in hs], time, settings)
+    ends = np.cumsum([len(hs) for hs in kept.values()]).tolist()
+    places = (slice(end - len(hs), end) for hs, end in zip(kept.values(), ends, strict=True))
+    return {name: _part(whole, at, settings) for name, at in zip(kept, places, strict=True)}
+
+
+def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings) -> Level:
+    """One level of hypotheses of all models, which do not tell anything together yet."""
     lost = (np.nan, np.nan, np.nan)
-    similarity = np.array([h.similarity for h in kept])
+    similarity = np.array([h.similarity for h in hypotheses])
     orientation = orientations(
-        np.array([h.direction or lost for h in kept]), np.array([h.rotation or 0.0 for h in kept])
+        np.array([h.direction or lost for h in hypotheses]),
+        np.array([h.rotation or 0.0 for h in hypotheses]),
     )
-    rolled = np.array([h.rotation is not None for h in kept])
     return Level(
         time,
-        np.array([h.view for h in kept]),
+        np.array([h.view for h in hypotheses]),
         orientation,
-        rolled,
-        (best - similarity) / settings.similarity_sigma,
-        _between(orientation, similarity, settings),
+        np.array([h.rotation is not None for h in hypotheses]),
+        (similarity.max() - similarity) / settings.similarity_sigma,
+        orientation,
     )
+
+
+def _part(whole: Level, at: slice, settings: TreeSettings) -> Level:
+    """The hypotheses of one model."""
+    orientation, cost = whole.orientation[at], whole.cost[at]
+    between = _between(orientation, -cost * settings.similarity_sigma, settings)
+    return Level(whole.time, whole.views[at], orientation, whole.rolled[at], cost, between)
 
 
 def _between(orientation: Floats, similarity: Floats, settings: TreeSettings) -> Floats:
@@ -215,82 +239,33 @@ def grown(
         settings: Of the tree.
     """
     weight = look_weight(time - tree.time, settings)
-    skipped = tree.cost + weight * settings.wrong
-    past = np.concatenate([tree.path[:, 1:], np.full((len(tree.cost), 1), NONE, np.int8)], axis=1)
-    waited = replace(tree, time=time, cost=skipped, path=past)
-    if level is None:
-        return _pruned(waited, settings)
-    through = tree.cost[:, None] + turn_costs(tree, level, turning, settings)
-    parent = through.argmin(axis=0)
-    each = np.arange(len(parent))
-    path = past[parent]
-    path[:, -1] = each
-    same = tree.view[parent] == level.views
-    chosen = Tree(
-        time,
-        through[parent, each] + weight * level.cost,
+    level = level or _NO_LEVEL
+    found = grow(
+        np.array((time, weight, *_costs(settings), turning.sigma, settings.most_paths)),
+        tree.cost,
+        tree.view,
+        tree.chosen,
+        tree.since,
+        tree.orientation,
+        tree.rolled,
+        tree.path,
         level.views,
-        np.full(len(parent), time),
-        np.where(same, tree.since[parent], time),
         level.orientation,
         level.rolled,
-        path,
+        level.cost,
+        np.array(turning.rate),
     )
-    return _pruned(_joined(chosen, waited), settings)
+    return Tree(time, *found[:7], tree.total + found[7])
+
+
+def _costs(settings: TreeSettings) -> tuple[float, float, float, float, float]:
+    s = settings
+    return s.wrong, s.jump, s.other_view, radians(s.swing_deg), radians(s.roll_deg)
 
 
 def look_weight(waited: float, settings: TreeSettings) -> float:
     """What a look counts for, so many seconds after the last: soon after it, the same is seen."""
     return min(1.0, max(waited, 0.0) / settings.independent_s)
-
-
-def turn_costs(tree: Tree, level: Level, turning: Turning, settings: TreeSettings) -> Floats:
-    """Costs (S, H) of choosing each hypothesis of a level after what each path chose last."""
-    dt = level.time - tree.chosen
-    spread = turning.sigma * dt
-    before = turned(np.asarray(turning.rate) * dt[:, None]) @ tree.orientation
-    swing, roll = swing_and_roll(before[:, None], level.orientation[None])
-    both = tree.rolled[:, None] & level.rolled[None]
-    s = np.hypot(np.radians(settings.swing_deg), spread)[:, None]
-    r = np.hypot(np.radians(settings.roll_deg), spread)[:, None]
-    cost = 0.5 * ((swing / s) ** 2 + both * (roll / r) ** 2)
-    same = tree.view[:, None] == level.views[None]
-    unknown = np.where(same, 0.0, settings.other_view)
-    cost = np.where(np.isnan(cost), unknown, np.minimum(cost, settings.jump))
-    cost[tree.view == NONE] = 0.0
-    return np.asarray(cost)
-
-
-def _joined(a: Tree, b: Tree) -> Tree:
-    return Tree(
-        a.time,
-        np.concatenate([a.cost, b.cost]),
-        np.concatenate([a.view, b.view]),
-        np.concatenate([a.chosen, b.chosen]),
-        np.concatenate([a.since, b.since]),
-        np.concatenate([a.orientation, b.orientation]),
-        np.concatenate([a.rolled, b.rolled]),
-        np.concatenate([a.path, b.path]),
-        b.total,
-    )
-
-
-def _pruned(tree: Tree, settings: TreeSettings) -> Tree:
-    """The same tree without the paths that cannot become cheapest, cheapest first."""
-    order = np.argsort(tree.cost, kind="stable")
-    least = tree.cost[order[0]]
-    kept = order[tree.cost[order] <= least + settings.jump][: settings.most_paths]
-    return Tree(
-        tree.time,
-        tree.cost[kept] - least,
-        tree.view[kept],
-        tree.chosen[kept],
-        tree.since[kept],
-        tree.orientation[kept],
-        tree.rolled[kept],
-        tree.path[kept],
-        tree.total + float(least),
-    )
 
 
 def rival_gap(tree: Tree, settings: TreeSettings) -> float:

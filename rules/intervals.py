@@ -1,7 +1,7 @@
 """Intervals [low, high]: what is known of a quantity, and of how far a formula is from changing.
 
 One algebra of two kinds: of single intervals (`Scalars`), and of arrays of them for all choices of
-objects at once (`Arrays`). What stands above, the operators over time, is written once for both.
+objects at once (`Arrays`). The operators that keep windows are written once for both.
 
 A formula's robustness is how far its quantities are from where it changes its truth (Donze and
 Maler, "Robust satisfaction of temporal logic over real-valued signals", 2010); as an interval it
@@ -14,7 +14,6 @@ added or subtracted, which changes no other number.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import inf, isnan
 from typing import Any, Protocol
 
@@ -32,7 +31,7 @@ EQUAL = 1e-300
 
 
 class Algebra(Protocol):
-    """What operators over time ask of intervals; `v` and `w` are intervals of its kind."""
+    """What operators with windows ask of intervals; `v` and `w` are intervals of its kind."""
 
     def constant(self, value: Interval) -> Any:
         """An interval that is the same for all choices of objects."""
@@ -43,23 +42,11 @@ class Algebra(Protocol):
     def most(self, v: Any, w: Any) -> Any:
         """The greater of each bound: 'or'."""
 
-    def negated(self, v: Any) -> Any:
-        """Zero minus the interval: 'not'."""
-
-    def known(self, v: Any) -> Any:
-        """Whether anything is known: not [-inf, inf]."""
-
     def held(self, v: Any) -> Any:
         """(surely, possibly) true, each 0 or 1."""
 
-    def choose(self, which: Any, v: Any, w: Any) -> Any:
-        """The first where `which`, else the second."""
-
     def scaled(self, v: Any, factor: float) -> Any:
         """Times a number that is not negative; also of what `held` gives."""
-
-    def added(self, v: Any, w: Any) -> Any:
-        """The sum."""
 
     def tallied(self, v: Any, w: Any) -> Any:
         """The sum of what `held` gives, which is never without end."""
@@ -79,36 +66,33 @@ class Scalars:
         """See `Algebra`."""
         a, b = v
         c, d = w
-        return (a if a < c else c, b if b < d else d)
+        # One of the two where it can be: a window then holds each value once.
+        if a <= c and b <= d:
+            return v
+        return w if c <= a and d <= b else (a if a < c else c, b if b < d else d)
 
     def most(self, v: Interval, w: Interval) -> Interval:
         """See `Algebra`."""
         a, b = v
         c, d = w
-        return (a if a > c else c, b if b > d else d)
+        if a >= c and b >= d:
+            return v
+        return w if c >= a and d >= b else (a if a > c else c, b if b > d else d)
 
     def negated(self, v: Interval) -> Interval:
-        """See `Algebra`."""
+        """Zero minus the interval: 'not'."""
         return (-v[1], -v[0])
-
-    def known(self, v: Interval) -> bool:
-        """See `Algebra`."""
-        return v != UNKNOWN
 
     def held(self, v: Interval) -> Interval:
         """See `Algebra`."""
         return (1.0 if v[0] > 0 else 0.0, 1.0 if v[1] >= 0 else 0.0)
-
-    def choose(self, which: bool, v: Any, w: Any) -> Any:
-        """See `Algebra`."""
-        return v if which else w
 
     def scaled(self, v: Interval, factor: float) -> Interval:
         """See `Algebra`."""
         return (v[0] * factor, v[1] * factor)
 
     def added(self, v: Interval, w: Interval) -> Interval:
-        """See `Algebra`."""
+        """The sum; what is no number becomes unknown."""
         low, high = v[0] + w[0], v[1] + w[1]
         return (-inf if isnan(low) else low, inf if isnan(high) else high)
 
@@ -138,70 +122,19 @@ class Scalars:
 
 
 class Arrays:
-    """(2, ...) arrays of intervals, one for each choice of objects.
-
-    Args:
-        axes: How many object variables there are at most, that is, dimensions after the first.
-    """
-
-    def __init__(self, axes: int) -> None:
-        self.axes = axes
+    """(2, cells) arrays of intervals, one for each choice of objects."""
 
     def constant(self, value: Interval) -> Box:
         """See `Algebra`."""
-        return np.array(value).reshape(2, *(1,) * self.axes)
+        return np.array(value).reshape(2, 1)
 
-    least: Callable[[Any, Box, Box], Box] = staticmethod(np.minimum)  # type: ignore[assignment]
-    most: Callable[[Any, Box, Box], Box] = staticmethod(np.maximum)  # type: ignore[assignment]
-    choose: Callable[..., Box] = staticmethod(np.where)  # type: ignore[assignment]
-    scaled: Callable[[Any, Box, float], Box] = staticmethod(np.multiply)  # type: ignore[assignment]
-    shifted: Callable[[Any, Box, float], Box] = staticmethod(np.add)  # type: ignore[assignment]
-    tallied: Callable[[Any, Box, Box], Box] = staticmethod(np.add)  # type: ignore[assignment]
-
-    def negated(self, v: Box) -> Box:
-        """See `Algebra`."""
-        negative: Box = -v[::-1]
-        return negative
-
-    def known(self, v: Box) -> NDArray[np.bool_]:
-        """See `Algebra`."""
-        known: NDArray[np.bool_] = (v[0] > -inf) | (v[1] < inf)
-        return known
+    # NumPy's functions themselves, since a call costs as much as what they do.
+    least: Any = staticmethod(np.minimum)
+    most: Any = staticmethod(np.maximum)
+    scaled: Any = staticmethod(np.multiply)
+    shifted: Any = staticmethod(np.add)
+    tallied: Any = staticmethod(np.add)
 
     def held(self, v: Box) -> Box:
         """See `Algebra`."""
         return np.array((v[0] > 0, v[1] >= 0), dtype=np.float64)
-
-    def added(self, v: Box, w: Box) -> Box:
-        """See `Algebra`."""
-        with np.errstate(invalid="ignore"):
-            total: Box = v + w
-        return _widened(total)
-
-    def absolute(self, v: Box) -> Box:
-        """See `Scalars`."""
-        low, high = v
-        return np.array((np.maximum(np.maximum(low, -high), 0.0), np.maximum(-low, high)))
-
-    def times(self, v: Box, w: Box) -> Box:
-        """See `Scalars`."""
-        with np.errstate(invalid="ignore"):
-            products = np.stack([p * q for p in v for q in w])
-        products[np.isnan(products)] = 0.0
-        return np.stack((products.min(axis=0), products.max(axis=0)))
-
-    def over(self, v: Box, w: Box) -> Box:
-        """See `Scalars`."""
-        with np.errstate(divide="ignore"):
-            quotient = self.times(v, 1.0 / w[::-1])
-        around = (w[0] <= 0.0) & (w[1] >= 0.0)
-        return np.where(around, self.constant(UNKNOWN), quotient)
-
-
-def _widened(v: Box) -> Box:
-    """What is no number becomes unknown."""
-    unknown = v != v  # NaN is not equal to itself
-    if np.count_nonzero(unknown):
-        v[0][unknown[0]] = -inf
-        v[1][unknown[1]] = inf
-    return v

@@ -16,19 +16,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from math import log, sqrt
+from itertools import chain
+from math import log
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from visup.agent import Region
 from visup.agent.changing import replace
-from visup.rules.geometry import Floats, outline
-from visup.rules.outlines import RECENT, ready
-
-POINTS = 96
-"""Points of a kept outline."""
+from visup.rules.geometry import Floats
+from visup.rules.joint_loops import course, recent_of
+from visup.rules.outline_loops import beside, boxes_of, evenly, laid
+from visup.rules.outlines import EVEN_POINTS, ready
 
 REACH = 12.0
 """How far a point may be from the outline on which it is laid, pixels."""
@@ -96,25 +94,16 @@ def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]
         others: Bodies near it.
         size: (width, height) of the image, pixels.
     """
-    points = evenly(outline(region), POINTS)
+    points = evenly(ready(region).points, EVEN_POINTS)
     tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     length = np.linalg.norm(tangent, axis=1)
     normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
     x, y = points.T
     free = (x > 3) & (y > 3) & (x < size[0] - 4) & (y < size[1] - 4) & (length > 0)
     for other in others:
-        beside = ready(other).tree.query(points, distance_upper_bound=BESIDE)[0]
-        free &= ~np.isfinite(beside)
+        near = ready(other)
+        free &= ~beside(points, near.points, near.boxes, BESIDE)
     return Kept(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
-
-
-def evenly(points: Floats, count: int) -> Floats:
-    """A closed outline (N, 2) as `count` points evenly spaced along it."""
-    closed = np.concatenate([points, points[:1]])
-    steps = np.linalg.norm(np.diff(closed, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    at = np.linspace(0.0, along[-1], count, endpoint=False)
-    return np.stack([np.interp(at, along, closed[:, k]) for k in (0, 1)], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,22 +112,22 @@ class Target:
 
     Attributes:
         points: (M, 2) pixels; points no further apart than a few pixels.
-        tree: Of these.
+        boxes: Of their runs; see `outline_loops.py`.
     """
 
     points: Floats
-    tree: cKDTree
+    boxes: Floats
 
     @classmethod
     def of(cls, points: Floats) -> Target:
         """The target with these points."""
-        return cls(points, cKDTree(points))
+        return cls(points, boxes_of(points))
 
 
-@lru_cache(maxsize=RECENT)
 def target_of(region: Region) -> Target:
     """The outline of a region as a target; one region is the target of several pairs."""
-    return Target.of(evenly(outline(region), max(POINTS, len(outline(region)))))
+    made = ready(region)
+    return Target(made.even, made.even_boxes)
 
 
 def laid_upon(kept: Kept, target: Target) -> Kept | None:
@@ -149,49 +138,12 @@ def laid_upon(kept: Kept, target: Target) -> Kept | None:
         target: The later outline.
 
     Returns:
-        The same with the new shift; None when too little of it finds its place.
+        The same with the new shift; None when too little of it finds its place, or when it has but one
+        direction.
     """
-    x, y = kept.shift
-    for _ in range(4):
-        at = kept.points + np.array((x, y))
-        far, nearest = target.tree.query(at, distance_upper_bound=REACH)
-        normals, found = kept.normals, far < np.inf
-        if not found.all():
-            at, nearest, normals = at[found], nearest[found], normals[found]
-        if len(at) < max(LEAST_POINTS, 0.5 * len(kept.points)):
-            return None
-        step = step_across(normals, target.points[nearest] - at)
-        if step is None:
-            return None
-        x, y = x + step[0], y + step[1]
-        if max(abs(step[0]), abs(step[1])) < 0.02:
-            break
-    return replace(kept, shift=(x, y))
-
-
-def step_across(normals: Floats, off: Floats) -> tuple[float, float] | None:
-    """The move that brings points onto an outline, by weighted least squares across it.
-
-    Args:
-        normals: (N, 2) unit vectors across the outline.
-        off: (N, 2) from each point to its place on the outline, pixels.
-
-    Returns:
-        (x, y) pixels; None where the outline has but one direction, so that nothing is known of
-        motion along it.
-    """
-    nx, ny = normals.T
-    across = off[:, 0] * nx + off[:, 1] * ny
-    weight = 1.0 / np.maximum(np.abs(across), _WILD)
-    wx, wy = weight * nx, weight * ny
-    # Normal equations of two unknowns, solved by hand: they are too small for a library.
-    xx, xy, yy = float(wx @ nx), float(wx @ ny), float(wy @ ny)
-    bx, by = float(wx @ across), float(wy @ across)
-    mean, half = 0.5 * (xx + yy), sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
-    if mean + half > 50.0 * (mean - half):  # the ratio of the eigenvalues
-        return None
-    determinant = xx * yy - xy * xy
-    return (yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant
+    limits = REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _WILD
+    found, x, y = laid(kept.points, kept.normals, kept.shift, target.points, target.boxes, limits)
+    return Kept(kept.points, kept.normals, (x, y)) if found else None
 
 
 def follow(
@@ -302,37 +254,9 @@ def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
     """
     if len(joint.path) <= LEAST_PLACES:
         return None
-    path = np.array(joint.path)
-    inside = int(np.count_nonzero(path[:, 0] > now - window_s - 1e-6))
-    long = int(np.count_nonzero(path[:, 0] > path[-1, 0] - 0.6 * window_s + 1e-6)) + 1
-    recent = path[-max(inside, long, LEAST_PLACES) :]
-    span = float(recent[-1, 0] - recent[0, 0])
+    places = np.fromiter(chain.from_iterable(joint.path), float, 6 * len(joint.path)).reshape(-1, 6)
+    begin = recent_of(places, now, window_s, LEAST_PLACES)
+    span = float(places[-1, 0] - places[begin, 0])
     if span < 0.6 * window_s - 1e-6:
         return None
-    # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
-    # longer, and is believed to be as large.
-    steps = np.diff(path[:, 1:3], axis=0)
-    noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
-    return _motion(recent, noise)
-
-
-def _motion(path: Floats, noise: Floats) -> Motion:
-    """The slope of the places, joined with the mean of the velocities, each by its precision."""
-    t = path[:, 0] - path[:, 0].mean()
-    lever = max(float(t @ t), 1e-9)
-    slope, spread = t @ path[:, 1:3] / lever, noise / lever
-    flow, span = path[np.isfinite(path[:, 5]), 3:], float(path[-1, 0] - path[0, 0])
-    if not len(flow):
-        return Motion(slope, spread, span)
-    independent = max(1.0, span / LASTS_S)
-    precision = _inverse(spread)
-    certain = independent / flow[:, 2].mean() * np.eye(2)
-    spread = _inverse(precision + certain)
-    return Motion(spread @ (precision @ slope + certain @ flow[:, :2].mean(axis=0)), spread, span)
-
-
-def _inverse(matrix: Floats) -> Floats:
-    """Of a (2, 2) matrix, by hand: it is too small for a library."""
-    (a, b), (c, d) = matrix.tolist()
-    inverse: Floats = np.array(((d, -b), (-c, a))) / (a * d - b * c)
-    return inverse
+    return Motion(*course(places, begin, LASTS_S), span)

@@ -8,15 +8,11 @@ one latch holds them all.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import radians
 
 import numpy as np
 
-from visup.rules.direction import directions
-from visup.rules.distance import classes, signed_gap, sizes
-from visup.rules.latch import UNKNOWN, WITHIN, Codes, Floats, hold_sign
-from visup.rules.pairs import pairs
-from visup.rules.qtc import components
-from visup.rules.rcc8 import edge_differences
+from visup.rules.latch import Floats
 
 ORDER, DIRECTION, DISTANCE = slice(0, 8), 8, 9
 AWAY, SIDE = slice(10, 12), slice(12, 14)
@@ -60,85 +56,33 @@ class JudgeSettings:
     motion_minimum_s: float = 0.3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Quantities:
-    """What states are judged by; NaN is unknown.
-
-    Attributes:
-        differences: (8, P) pixels, of the boxes' edges; see `edge_differences`.
-        places: (M, 2) centres of the boxes, pixels.
-        gap: (P,) distance of the boxes, pixels, negative the depth of their overlap.
-        size: (P,) pixels; see `sizes`.
-        speeds: (4, P) pixels per second: of each away from the other, then across; see `components`.
-        sigma: (4, P) their standard deviation.
-    """
-
-    differences: Floats
-    places: Floats
-    gap: Floats
-    size: Floats
-    speeds: Floats
-    sigma: Floats
+Limits = tuple[float, float, float, float, float, float, float, float, float, float, float]
 
 
-def quantities(
-    boxes: Floats,
-    velocities: Floats,
-    spread: Floats,
-    noise_px: float,
-) -> Quantities:
-    """Everything that is judged, of boxes and the velocities of their centres.
+def limits(s: JudgeSettings, diagonal: float) -> Limits:
+    """Thresholds as `judge_loops.judged` takes them.
 
     Args:
-        boxes: (M, 4) x, y, width, height, pixels; NaN for what is not seen.
-        velocities: (M, 2) pixels per second; NaN unknown.
-        spread: (M,) standard deviation of a component.
-        noise_px: Of an edge, pixels.
-    """
-    differences = edge_differences(boxes)
-    places = boxes[:, :2] + 0.5 * boxes[:, 2:]
-    speeds, length = components(places, velocities)
-    # The line between the places is noisy too, the more so the shorter it is.
-    turn = 2.0 * noise_px**2 / np.maximum(length * length, 1.0)
-    speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
-    both = np.array(pairs(len(boxes)) * 2)
-    sigma = np.sqrt((spread * spread)[both] + speed[both] * turn)
-    return Quantities(differences, places, signed_gap(differences), sizes(boxes), speeds, sigma)
-
-
-def wanted(before: Codes, q: Quantities, s: JudgeSettings, diagonal: float) -> Codes:
-    """What the quantities say now, in view of what was believed before.
-
-    Args:
-        before: (JUDGED, P) codes believed so far.
-        q: Quantities.
-        s: Thresholds.
-        diagonal: Image diagonal, pixels.
+        s: Settings.
+        diagonal: Of the image, pixels.
 
     Returns:
-        (JUDGED, P) codes.
+        Level edges, to leave and to be; one place, to come to and to leave; slack of a direction, radians;
+        noise; slack of a class; speeds to move and to rest, in pixels per second and in deviations.
     """
-    codes = np.empty((JUDGED, before.shape[1]), dtype=np.int8)
-    codes[ORDER] = hold_sign(
-        q.differences, before[ORDER], s.level_enter * diagonal, s.level_exit * diagonal
-    )
-    codes[DIRECTION] = directions(
-        q.places,
-        before[DIRECTION],
-        (s.place_enter * diagonal, s.place_exit * diagonal),
-        np.deg2rad(s.cone_slack_deg),
+    return (
+        s.level_enter * diagonal,
+        s.level_exit * diagonal,
+        s.place_enter * diagonal,
+        s.place_exit * diagonal,
+        radians(s.cone_slack_deg),
         s.noise_px,
+        s.class_slack,
+        s.speed_enter * diagonal,
+        s.speed_exit * diagonal,
+        s.sigmas_enter,
+        s.sigmas_exit,
     )
-    codes[DISTANCE] = classes(q.gap, q.size, before[DISTANCE], s.class_slack, s.noise_px)
-    enter = np.maximum(s.speed_enter * diagonal, s.sigmas_enter * q.sigma)
-    leave = np.maximum(s.speed_exit * diagonal, s.sigmas_exit * q.sigma)
-    codes[MOVEMENT] = moving_sign(q.speeds, before[MOVEMENT], enter, leave)
-    return codes
-
-
-def moving_sign(speed: Floats, before: Codes, enter: Floats, leave: Floats) -> Codes:
-    """Signs of speeds: what is not known yet is at rest until the speed exceeds `enter`."""
-    return hold_sign(speed, np.where(before == UNKNOWN, np.int8(WITHIN), before), enter, leave)
 
 
 def least_durations(s: JudgeSettings) -> Floats:

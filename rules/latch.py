@@ -2,7 +2,7 @@
 
 One latch holds many states at once (such as the trend of every pair of objects), as arrays. The
 noise thresholds of entering and leaving a state are the caller's, who knows the quantity behind
-it (`hold_sign` serves for quantities that are compared with zero); the latch adds the least
+it (`judge_loops.hold_sign` serves for quantities that are compared with zero); the latch adds the least
 duration.
 """
 
@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from visup.compiled import compiled
 
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
@@ -53,10 +55,10 @@ class Latch:
         if not known.any():
             return blank
         return Latch(
-            np.where(known, self.state[..., places], blank.state),
-            np.where(known, self.since[..., places], blank.since),
-            np.where(known, self.pending[..., places], blank.pending),
-            np.where(known, self.pending_since[..., places], blank.pending_since),
+            np.where(known, self.state.take(places, axis=-1), blank.state),
+            np.where(known, self.since.take(places, axis=-1), blank.since),
+            np.where(known, self.pending.take(places, axis=-1), blank.pending),
+            np.where(known, self.pending_since.take(places, axis=-1), blank.pending_since),
         )
 
 
@@ -76,53 +78,50 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> 
         latch: The states before.
         wanted: Codes of the same shape, what the measurement says now.
         now: Seconds.
-        minimum_s: Least duration, seconds; one for all, or an array that can be broadcast.
+        minimum_s: Least duration, seconds; one for all, or one for each row.
 
     Returns:
         The states after; `since` is when the believed state began to show.
     """
     if _alike(wanted, latch.pending) and _alike(wanted, latch.state):
         return latch  # Nothing wants to change, as nearly always.
-    same = wanted == latch.pending
-    pending_since = np.where(same, latch.pending_since, now)
-    ripe = (now - pending_since >= minimum_s - 1e-9) | (wanted == UNKNOWN)
-    change = ripe & (wanted != latch.state)
-    return Latch(
-        np.where(change, wanted, latch.state).astype(np.int8),
-        np.where(change, pending_since, latch.since),
-        wanted.astype(np.int8),
-        pending_since,
+    lasts = np.atleast_1d(np.asarray(minimum_s, dtype=float)).reshape(-1)
+    rows, shape = (len(lasts), -1), wanted.shape
+    state, since, pending, waiting = _stepped(
+        latch.state.reshape(rows),
+        latch.since.reshape(rows),
+        latch.pending.reshape(rows),
+        latch.pending_since.reshape(rows),
+        wanted.reshape(rows),
+        now,
+        lasts,
     )
+    return Latch(
+        state.reshape(shape), since.reshape(shape), pending.reshape(shape), waiting.reshape(shape)
+    )
+
+
+@compiled
+def _stepped(
+    state: Codes,
+    since: Floats,
+    pending: Codes,
+    pending_since: Floats,
+    wanted: Codes,
+    now: float,
+    lasts: Floats,
+) -> tuple[Codes, Floats, Codes, Floats]:
+    after, moments, waiting = state.copy(), since.copy(), pending_since.copy()
+    for row in range(len(state)):
+        for k in range(state.shape[1]):
+            if wanted[row, k] != pending[row, k]:
+                waiting[row, k] = now
+            if wanted[row, k] == state[row, k]:
+                continue
+            if wanted[row, k] == UNKNOWN or now - waiting[row, k] >= lasts[row] - 1e-9:
+                after[row, k], moments[row, k] = wanted[row, k], waiting[row, k]
+    return after, moments, wanted.copy(), waiting
 
 
 def _alike(a: Codes, b: Codes) -> bool:
     return a.shape == b.shape and a.tobytes() == b.tobytes()
-
-
-def hold_sign(values: Floats, before: Codes, enter: float | Floats, leave: float | Floats) -> Codes:
-    """The signs of quantities, with hysteresis (a Schmitt trigger on either side of zero).
-
-    A sign begins beyond `enter` and ends within `leave`. One that is not known yet is judged by the
-    middle of the two, so that noise must cross half of the band to change it, wherever in the band
-    the quantity may lie.
-
-    Args:
-        values: Any shape; NaN unknown.
-        before: Same shape: signs so far, `BELOW`, `WITHIN`, `ABOVE` or `UNKNOWN`.
-        enter: Magnitude beyond which a quantity has a sign.
-        leave: Magnitude within which it has none; at most `enter`.
-
-    Returns:
-        Signs of the same shape; `UNKNOWN` for NaN.
-    """
-    sign = (values > 0.0).view(np.int8) * np.int8(2)
-    size = np.abs(values)
-    held = np.where(before == UNKNOWN, size > 0.5 * (enter + leave), before == sign)
-    held &= size > leave
-    held |= size > enter
-    # What is in the band but was on the other side of zero has crossed it: no sign.
-    code = np.where(held, sign, np.int8(WITHIN))
-    unknown = values != values  # NaN is not equal to itself
-    if unknown.any():
-        code[unknown] = UNKNOWN
-    return code

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief
-from visup.rules.distance import signed_gap
-from visup.rules.fit import binned, common_motion, slope_noise, slopes_of_spans, theil_sen
-from visup.rules.geometry import Floats
-from visup.rules.history import History, covered
+from visup.rules.fit_loops import fitted
+from visup.rules.geometry import DIRECTIONS, FAN, Floats
+from visup.rules.history import History
 from visup.rules.judge import JudgeSettings
+from visup.rules.measure_loops import (
+    CONTACT,
+    GAP,
+    RATE,
+    RELATIVE,
+    SIGMA,
+    contact_time,
+    near_pairs,
+    tables,
+)
 from visup.rules.outlines import NEAR, outline_gap
-from visup.rules.pairs import pairs, square
-from visup.rules.parting import parting_speed
-from visup.rules.rcc8 import edge_differences
+from visup.rules.pairs import carried, pairs
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,34 +98,65 @@ class Measured:
 
     Attributes:
         ids: (M,) object ids, increasing.
-        gap: (M, M) distance of the outlines, pixels.
-        rate: (M, M) trend of the distance, pixels per second, negative when closing.
-        rate_sigma: (M, M) its standard deviation.
-        relative_speed: (M, M) pixels per second.
+        tables: (5, M, M) `gap`, `rate`, `rate_sigma`, `relative_speed`, `time_to_contact`.
+        motion: (3, M, 2) velocities over the window of motion, in its first and in its second half,
+            pixels per second in the image.
         speed: (M,) pixels per second in the image.
-        early: (M, 2) velocity in the first half of the window, pixels per second.
-        late: (M, 2) velocity in the second half.
         depth: (M,) in the objects' units.
-        velocity: (M, 2) pixels per second in the image.
-        velocity_sigma: (M,) standard deviation of a component that noise of the outlines makes.
-        time_to_contact: (M, M) seconds until the outlines meet if they go on so; 0 where they meet,
-            infinite where they do not close in.
+        spread: Standard deviation of a component of a velocity that noise of the outlines makes.
         noise_px: Standard deviation of an outline, pixels.
     """
 
     ids: tuple[int, ...] = ()
-    gap: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    rate: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    rate_sigma: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    relative_speed: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    tables: Floats = field(default_factory=lambda: np.zeros((5, 0, 0)))
+    motion: Floats = field(default_factory=lambda: np.zeros((3, 0, 2)))
     speed: Floats = field(default_factory=lambda: np.zeros(0))
-    early: Floats = field(default_factory=lambda: np.zeros((0, 2)))
-    late: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    velocity: Floats = field(default_factory=lambda: np.zeros((0, 2)))
-    velocity_sigma: Floats = field(default_factory=lambda: np.zeros(0))
-    time_to_contact: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    spread: float = float("nan")
     noise_px: float = 0.0
+
+    @property
+    def gap(self) -> Floats:
+        """(M, M) distance of the outlines, pixels."""
+        return self._table(GAP)
+
+    @property
+    def rate(self) -> Floats:
+        """(M, M) trend of the distance, pixels per second, negative when closing."""
+        return self._table(RATE)
+
+    @property
+    def rate_sigma(self) -> Floats:
+        """(M, M) its standard deviation."""
+        return self._table(SIGMA)
+
+    @property
+    def relative_speed(self) -> Floats:
+        """(M, M) pixels per second."""
+        return self._table(RELATIVE)
+
+    @property
+    def time_to_contact(self) -> Floats:
+        """(M, M) seconds until the outlines meet if they go on so.
+
+        0 where they meet, infinite where they do not close in.
+        """
+        return self._table(CONTACT)
+
+    def _table(self, number: int) -> Floats:
+        found: Floats = self.tables[number]
+        return found
+
+    @property
+    def velocity(self) -> Floats:
+        """(M, 2) pixels per second in the image."""
+        found: Floats = self.motion[0]
+        return found
+
+    @property
+    def velocity_sigma(self) -> Floats:
+        """(M,) standard deviation of a component of each velocity, pixels per second."""
+        return np.full(len(self.ids), self.spread)
 
     def pair(self, quantity: str, a: int, b: int) -> float:
         """One quantity of one pair ('gap', 'rate', 'time_to_contact', ...), NaN when unknown."""
@@ -152,7 +189,8 @@ class Measured:
             gap, rate = self.interval("gap", a, b, sigmas), self.interval("rate", a, b, sigmas)
             if value == 0.0 or np.isnan(value):
                 return value, value
-            return tuple(sorted(contact_time(np.array(gap), np.array(rate)).tolist()))
+            soon, late = sorted(map(contact_time, gap, rate))
+            return soon, late
         wide = sigmas * self._sigma(quantity, a, b)
         low = value - wide
         return (low if quantity == "rate" else max(0.0, low)) if low == low else low, value + wide
@@ -161,17 +199,9 @@ class Measured:
         if quantity == "rate":
             return self.pair("rate_sigma", a, b)
         if quantity == "relative_speed":
-            return float(np.hypot(self.one("velocity_sigma", a), self.one("velocity_sigma", b)))
-        return self.noise_px * float(np.sqrt(2.0))
-
-
-def contact_time(gap: Floats, rate: Floats) -> Floats:
-    """Seconds until gaps are closed at these rates; see `Measured.time_to_contact`."""
-    closing = np.full(gap.shape, np.inf)
-    np.divide(gap, -rate, out=closing, where=rate < 0.0)
-    closing[gap <= 0.0] = 0.0
-    closing[(gap != gap) | (rate != rate)] = np.nan  # NaN is not equal to itself
-    return closing
+            both = a in self.ids and b in self.ids
+            return sqrt(2.0) * self.spread if both else float("nan")
+        return self.noise_px * sqrt(2.0)
 
 
 def scale(frame_size: tuple[int, int]) -> float:
@@ -186,153 +216,91 @@ class Measuring:
     settings: RelationSettings
 
     def __call__(
-        self, h: History, objects: tuple[ObjectBelief, ...], mind: Mind, before: Measured
+        self,
+        h: History,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        mind: Mind,
+        before: Measured,
     ) -> Measured:
         """Measure one step.
 
         Args:
             h: Samples up to now.
             objects: The objects of the samples.
+            seen: (M, 8) how they were seen; see `sightings`.
             mind: The mind.
             before: What was measured in the step before.
 
         Returns:
             All quantities; NaN where unknown.
         """
-        m = len(objects)
-        slope, sigma = np.full((m, m), np.nan), np.full((m, m), np.nan)
-        i, j = pairs(m)
-        if covered(h, self.settings.window_s) and len(i):
-            slope[i, j], sigma[i, j] = self._trend(h.times, h.separation[:, i, j], mind)
-            slope[j, i], sigma[j, i] = slope[i, j], sigma[i, j]
-        gaps = self._gaps(objects, h, mind, before)
-        if len(i):
-            slope, sigma = self._parting(slope, sigma, gaps, objects, h, mind)
-        stale = np.array([mind.time - b.last_seen > 0.5 * self.settings.window_s for b in objects])
-        if stale.any():
-            slope[stale, :] = slope[:, stale] = np.nan
-        whole, early, late = self._velocities(h, mind)
-        spread = self._velocity_noise(h, mind)
-        apart = distances(whole)
-        depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
-        return Measured(
-            h.ids,
+        s, diagonal = self.settings, scale(mind.frame_size)
+        noise, strong = s.judge.noise_px, 2.0 * s.rate_enter * diagonal
+        gaps = self._gaps(objects, seen, h, mind, before)
+        windows = s.window_s, s.quick_window_s, s.motion_window_s
+        slope, sigma, motion, spread = fitted(
+            h.times,
+            h.support,
+            h.free,
+            h.separation,
+            DIRECTIONS,
+            (*windows, noise, strong, s.quick_sigmas, s.misfit * diagonal),
+            s.bins,
+            mind.time,
+        )
+        found, speed = tables(
             gaps,
             slope,
             sigma,
-            apart,
-            np.sqrt(whole[:, 0] * whole[:, 0] + whole[:, 1] * whole[:, 1]),
-            early,
-            late,
-            depth,
-            whole,
-            np.full(m, spread),
-            contact_time(gaps, slope),
-            self.settings.judge.noise_px,
+            motion[0],
+            h.support[-1] if len(h.times) else NOWHERE,
+            seen,
+            DIRECTIONS,
+            (s.parting_gap * diagonal, strong, s.quick_sigmas, 0.5 * s.window_s),
         )
-
-    def _trend(self, times: Floats, distance: Floats, mind: Mind) -> tuple[Floats, Floats]:
-        """Slope over the window, or over its last part where that is strong and of another sign."""
-        s = self.settings
-        slope, sigma = theil_sen(*binned(times, distance, s.bins))
-        noise = np.sqrt(2.0) * s.judge.noise_px
-        sigma = np.maximum(sigma, slope_noise(times, noise))
-        recent = int(times.searchsorted(times[-1] - s.quick_window_s, side="right"))
-        times, distance = times[recent:], distance[recent:]
-        quick, spread = theil_sen(*binned(times, distance, s.bins))
-        spread = np.maximum(spread, slope_noise(times, noise))
-        least = 2.0 * s.rate_enter * scale(mind.frame_size)
-        turned = np.abs(quick) > np.maximum(least, s.quick_sigmas * spread)
-        if not turned.any():
-            return slope, sigma
-        turned &= np.sign(quick) != np.sign(slope)
-        return np.where(turned, quick, slope), np.where(turned, spread, sigma)
-
-    def _parting(
-        self,
-        slope: Floats,
-        sigma: Floats,
-        gaps: Floats,
-        objects: tuple[ObjectBelief, ...],
-        h: History,
-        mind: Mind,
-    ) -> tuple[Floats, Floats]:
-        """The trend, or the speed at which bodies in contact surely part."""
-        s, diagonal = self.settings, scale(mind.frame_size)
-        if not len(h.times):
-            return slope, sigma  # nobody has looked for longer than the window
-        if not (gaps <= s.parting_gap * diagonal).any():
-            return slope, sigma
-        speed, spread = parting_speed(objects, h.support[-1], mind.time)
-        with np.errstate(invalid="ignore"):
-            sure = speed > np.maximum(2.0 * s.rate_enter * diagonal, s.quick_sigmas * spread)
-            sure &= (gaps <= s.parting_gap * diagonal) & (slope < speed)
-        return np.where(sure, speed, slope), np.where(sure, spread, sigma)
-
-    def _velocity_noise(self, h: History, mind: Mind) -> float:
-        recent = _recent(h, mind, self.settings.motion_window_s)
-        return slope_noise(h.times[recent:], self.settings.judge.noise_px)
-
-    def _velocities(self, h: History, mind: Mind) -> tuple[Floats, Floats, Floats]:
-        """Over the window of motion, and over its two halves."""
-        m, misfit = len(h.ids), self.settings.misfit * scale(mind.frame_size)
-        unknown = np.full((m, 2), np.nan)
-        if m == 0 or not covered(h, self.settings.window_s):
-            return unknown, unknown, unknown
-        recent = _recent(h, mind, self.settings.motion_window_s)
-        times, support, free = h.times[recent:], h.support[recent:], h.free[recent:]
-        half = len(times) // 2
-        spans = (slice(None), slice(None, half), slice(half, None))
-        found = common_motion(*slopes_of_spans(times, support, free, spans), misfit)
-        return found[:m], found[m : 2 * m], found[2 * m :]
+        depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
+        return Measured(h.ids, found, motion, speed, depth, spread, noise)
 
     def _gaps(
-        self, objects: tuple[ObjectBelief, ...], h: History, mind: Mind, before: Measured
+        self,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        h: History,
+        mind: Mind,
+        before: Measured,
     ) -> Floats:
         """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
         m, near = len(objects), NEAR * scale(mind.frame_size)
+        apart = h.separation[-1] if len(h.times) else np.full((m, m), np.nan)
+        last = before.gap if before.ids == h.ids else _moved(before.gap, before.ids, h.ids)
+        found, asked = near_pairs(seen, apart, last, near, self.settings.hold_s)
         i, j = pairs(m)
-        unseen = np.array([mind.time - b.last_seen for b in objects])
-        longest = np.maximum(unseen[i], unseen[j]) if m else np.zeros(0)
-        boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
-        apart = h.separation[-1][i, j] if len(h.times) else np.full(len(i), np.nan)
-        found = np.where(longest == 0.0, np.maximum(near, apart), np.nan)
-        for k in np.flatnonzero((longest == 0.0) & (signed_gap(edge_differences(boxes)) <= near)):
+        for k in asked.tolist():
             gap = outline_gap(objects[i[k]].region, objects[j[k]].region, near)
             found[k] = found[k] if gap is None else gap
-        for k in np.flatnonzero((longest > 0.0) & (longest <= self.settings.hold_s)):
-            found[k] = before.pair("gap", objects[i[k]].id, objects[j[k]].id)
-        return square(found, m)
+        return found
 
 
-def _recent(h: History, mind: Mind, window_s: float) -> int:
-    """Number of the first sample of a window that ends now."""
-    return int(h.times.searchsorted(mind.time - window_s, side="right"))
+NOWHERE = np.empty((0, FAN))
 
 
-def at_rest(now: Measured, settings: RelationSettings, *diagonals: float) -> NDArray[np.bool_]:
-    """Whether bodies are at rest to each other: over the window, and in both of its halves.
-
-    The halves are looked at so that a body that bounces off, whose mean relative velocity is zero
-    for a moment, is not taken for one that rests.
-
-    Args:
-        now: Velocities.
-        settings: Thresholds.
-        diagonals: Image diagonals, or times as much, pixels; each widens the limits.
-
-    Returns:
-        (K, M, M) bool, for each of them; false where a velocity is unknown.
-    """
-    halves = np.maximum(distances(now.early), distances(now.late))
-    wide = np.array(diagonals)[:, None, None]
-    rest: NDArray[np.bool_] = halves < settings.still_half * wide
-    rest &= now.relative_speed < settings.still_speed * wide
-    return rest
+def _moved(table: Floats, old: tuple[int, ...], new: tuple[int, ...]) -> Floats:
+    """A table of all pairs of other objects; NaN for pairs with a new one."""
+    rows, _ = carried(old, new)
+    wide = np.pad(table, (0, 1), constant_values=np.nan)
+    return np.ascontiguousarray(wide[np.ix_(rows, rows)])
 
 
-def distances(vectors: Floats) -> Floats:
-    """(M, M) lengths of the differences of all pairs of (M, 2) vectors."""
-    x, y = (vectors[:, None] - vectors[None]).transpose(2, 0, 1)
-    apart: Floats = np.sqrt(x * x + y * y)
-    return apart
+def sightings(objects: tuple[ObjectBelief, ...], now: float) -> Floats:
+    """(M, 8) how bodies were seen; see `measure_loops.py`."""
+    rows = []
+    for b in objects:
+        r = b.region
+        told = b.last_seen == now and r.velocity_sigma > 0.0
+        x, y, sigma = (*r.velocity, r.velocity_sigma) if told else UNTOLD
+        rows.append((now - b.last_seen, x, y, sigma, *r.bbox))
+    return np.array(rows, dtype=float).reshape(-1, 8)
+
+
+UNTOLD = (float("nan"),) * 3

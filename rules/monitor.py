@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isnan
 from typing import Any
 
 from visup.agent import Truth
-from visup.rules.formula import Formula, Predicate
+from visup.rules.formula import Formula
 from visup.rules.intervals import UNKNOWN, Interval, Scalars
-from visup.rules.program import Compiler, Moment
-from visup.rules.terms import Measure
+from visup.rules.program import Compiler, Step
 from visup.rules.units import TICKS, ticks
+
+Signals = Mapping[str, float | Interval | None]
+Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
+"""(values of the steps before, states before, states after, microseconds, signals) -> value."""
+
+_ON = Scalars()
 
 
 class Monitor:
@@ -32,13 +37,14 @@ class Monitor:
     """
 
     def __init__(self, formula: Formula) -> None:
-        compiler = Compiler(Scalars())
+        compiler = Compiler()
         place = compiler.formula(formula)
-        self._program, self._at = compiler.program, place.step
+        self._runs = [_run(step, k) for k, step in enumerate(compiler.program.steps)]
+        self._at = place.step
         self.delay = place.delay / TICKS
-        self.state: tuple[Any, ...] = self._program.fresh
+        self.state: tuple[Any, ...] = (None,) * len(self._runs)
 
-    def step(self, time: float, values: Mapping[str, float | Interval | None]) -> Interval:
+    def step(self, time: float, values: Signals) -> Interval:
         """Take in one sample.
 
         Args:
@@ -48,19 +54,12 @@ class Monitor:
         Returns:
             The robustness interval of the formula; see `verdict`.
         """
-
-        def look(node: Predicate | Measure, axes: tuple[int, ...]) -> Interval:
-            value = values.get(node.name)
-            if value.__class__ is float:
-                return UNKNOWN if isnan(value) else (value, value)
-            if value is None:
-                return UNKNOWN
-            return value if isinstance(value, tuple) else (float(value), float(value))
-
-        moment = Moment(ticks(time), self.state, look)
-        result: Interval = self._program.step(moment)[self._at]
-        self.state = tuple(moment.after)
-        return result
+        now, before = ticks(time), self.state
+        after, found = list(before), list[Interval]()
+        for run in self._runs:
+            found.append(run(found, before, after, now, values))
+        self.state = tuple(after)
+        return found[self._at]
 
 
 def verdict(interval: Interval) -> Truth:
@@ -69,3 +68,63 @@ def verdict(interval: Interval) -> Truth:
     if low > 0:
         return Truth.TRUE
     return Truth.FALSE if high < 0 else Truth.UNKNOWN
+
+
+def _run(step: Step, slot: int) -> Run:
+    """How one step of a program is done."""
+    one, other = (*step.reads, -1, -1)[:2]
+    if step.operator is not None:
+        stepped = step.operator.on(_ON)
+        if len(step.reads) == 1:
+
+            def single(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
+                after[slot], value = stepped(before[slot], now, v[one])
+                return value
+
+            return single
+
+        def several(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
+            after[slot], value = stepped(before[slot], now, v[one], v[other])
+            return value
+
+        return several
+    if step.node is not None:
+        name = step.node.name
+        return lambda v, before, after, now, signals: _known(signals.get(name))
+    if step.kind == "number":
+        number = step.numbers[0], step.numbers[0]
+        return lambda v, before, after, now, signals: number
+    function = _function(step)
+    if len(step.reads) == 2:
+        return lambda v, before, after, now, signals: function(v[one], v[other])
+    return lambda v, before, after, now, signals: function(v[one])
+
+
+def _known(value: float | Interval | None) -> Interval:
+    """What a signal says."""
+    if value.__class__ is float:
+        return UNKNOWN if isnan(value) else (value, value)
+    if value is None:
+        return UNKNOWN
+    return value if isinstance(value, tuple) else (float(value), float(value))
+
+
+def _function(step: Step) -> Callable[..., Interval]:
+    """What a step does to the intervals of one moment."""
+    a, numbers = _ON, (*step.numbers, 0.0, 0.0)
+    first, second = numbers[:2]
+    functions: dict[str, Callable[..., Interval]] = {
+        "not": a.negated,
+        "abs": a.absolute,
+        "least": a.least,
+        "most": a.most,
+        "above": lambda v: (v[0] + first + second, v[1] + first + second),
+        "below": lambda v: (-v[1] + first + second, -v[0] + first + second),
+        "compare": lambda v, w: a.shifted(a.added(v, a.negated(w)), first),
+        "+": a.added,
+        "-": lambda v, w: a.added(v, a.negated(w)),
+        "*": a.times,
+        "/": a.over,
+        "rate": lambda v, w: a.scaled(a.added(v, a.negated(w)), first),
+    }
+    return functions[step.kind]

@@ -4,18 +4,19 @@ A sample speaks from its moment to the next one, but for no longer than `REACH`:
 unknown until the next sample, and so is all before the first. Windows are closed; a window holds
 every piece of time that it meets. `docs/rules.md` says it in full, and an oracle in the evaluation
 does it a second time over whole histories.
+
+What keeps but a moment of each choice of objects (`Lasting`, `SoFar`, `Recalling`, `Latching`) is
+done by `machine` for all of them at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-
-from visup.rules.intervals import EQUAL, FALSE, TRUE, UNKNOWN, Algebra, Arrays, Interval
-from visup.rules.sliding import Fold, Queue, Slide, changed, slide
+from visup.rules.intervals import EQUAL, FALSE, TRUE, UNKNOWN, Algebra, Interval, Scalars
+from visup.rules.sliding import Fold, Queue, Slide, changed, fresh, slide
 from visup.rules.units import ticks
 
 REACH = ticks(0.5)
@@ -24,37 +25,39 @@ SPACING = ticks(0.01)
 """Samples closer than this are not taken in, which bounds what a window holds; microseconds."""
 LONG_AGO = -(2**62)
 
+Stepping = Callable[..., tuple[Any, Any]]
+"""(state before or None at the first sample, microseconds, intervals of the parts) -> (state after,
+the interval of the whole)."""
+
 
 def most_samples(span: int) -> int:
     """Most samples of a span in microseconds, with one for each silence and one at either end."""
     return span // SPACING + span // REACH + 2
 
 
-Pick = Callable[..., Any]
-"""(array, what new rows are filled with, dimensions before those of the objects) -> array."""
+Pick = Callable[[Any, Interval], Any]
+"""(intervals, what those of new objects are) -> intervals of the objects there are now."""
 
 
 class Operator(Protocol):
     """What remembers something of one formula or quantity from sample to sample."""
 
-    def step(self, state: Any, now: int, *values: Any) -> tuple[Any, Any]:
-        """Take in the values of the parts at a sample.
-
-        Args:
-            state: The state before, or None at the first sample.
-            now: Microseconds.
-            values: Intervals of the parts.
-
-        Returns:
-            The state after, and the interval of the whole.
-        """
-
-    def rows(self, state: Any, now: int, pick: Pick) -> Any:
-        """The same state for the objects of the sample at `now`; the new ones have no past."""
+    def on(self, algebra: Scalars) -> Stepping:
+        """How it takes in the values of its parts at a sample."""
 
     @property
     def kept(self) -> int:
         """Most intervals that the state holds for one choice of objects."""
+
+
+class Windowed(Protocol):
+    """An operator that keeps a whole window."""
+
+    def on(self, algebra: Algebra) -> Stepping:
+        """See `Operator`."""
+
+    def rows(self, state: Any, pick: Pick) -> Any:
+        """The same state for other objects; the new ones have no past."""
 
 
 @dataclass(frozen=True)
@@ -62,29 +65,42 @@ class Sliding:
     """The least or the greatest over a window, and `since` within one.
 
     Attributes:
-        algebra: Of the intervals.
         kind: 'always' (least), 'once' (greatest), 'since' or 'until'; the last two take two parts.
         low: How long before now the window ends, microseconds.
         high: How long before now it begins.
     """
 
-    algebra: Algebra = field(repr=False)
     kind: str
     low: int
     high: int
 
-    def __post_init__(self) -> None:
-        # Looked up once: a step is a few microseconds.
-        object.__setattr__(self, "_fold", self.fold())
-        unknown = self.algebra.constant(UNKNOWN)
-        pair = self.kind in ("since", "until")
-        object.__setattr__(self, "_pair", pair)
-        object.__setattr__(self, "_copies", isinstance(self.algebra, Arrays))
-        object.__setattr__(self, "_unknown", (unknown, unknown) if pair else unknown)
+    def on(self, algebra: Algebra) -> Stepping:
+        """See `Operator`."""
+        fold, low, high = self._fold(algebra), self.low, self.high
+        nothing = algebra.constant(UNKNOWN)
+        unknown = (nothing, nothing) if self._pair else nothing
 
-    def fold(self) -> Fold:
+        def begun(state: Slide | None, now: int) -> Slide:
+            if state is None:
+                return fresh(now, unknown)
+            if now - state[0] > REACH:
+                return slide(state, state[0] + REACH, unknown, low, high, fold)[0]
+            return state
+
+        def single(state: Slide | None, now: int, value: Any) -> tuple[Slide, Any]:
+            if state is None or now - state[0] > REACH:
+                state = begun(state, now)
+            return slide(state, now, value, low, high, fold)
+
+        def pair(state: Slide | None, now: int, left: Any, right: Any) -> tuple[Slide, Any]:
+            state, joined = slide(begun(state, now), now, (right, left), low, high, fold)
+            return state, joined[0]
+
+        return pair if self._pair else single
+
+    def _fold(self, algebra: Algebra) -> Fold:
         """How the values of neighbouring pieces of time are joined."""
-        least, most = self.algebra.least, self.algebra.most
+        least, most = algebra.least, algebra.most
 
         def since(older: Any, newer: Any) -> Any:
             return most(newer[0], least(older[0], newer[1])), least(older[1], newer[1])
@@ -94,54 +110,20 @@ class Sliding:
 
         return {"always": least, "once": most, "since": since, "until": until}[self.kind]
 
-    def step(self, state: Slide | None, now: int, *values: Any) -> tuple[Slide, Any]:
-        """See `Operator`."""
-        fold, unknown = self._fold, self._unknown  # type: ignore[attr-defined]
-        if self._copies:  # type: ignore[attr-defined]
-            # Values may be those of another step (see `Program.step`). Which ones are must not show in
-            # what is kept: going back and forth gives the same states byte for byte.
-            values = tuple([v.copy() for v in values])
-        if state is None:
-            state = Slide(now, unknown)
-        elif now - state[0] > REACH:
-            state, _ = slide(state, state[0] + REACH, unknown, self.low, self.high, fold)
-        if self._pair:  # type: ignore[attr-defined]
-            state, joined = slide(state, now, (values[1], values[0]), self.low, self.high, fold)
-            return state, joined[0]
-        return slide(state, now, values[0], self.low, self.high, fold)
+    @property
+    def _pair(self) -> bool:
+        return self.kind in ("since", "until")
 
     @property
     def kept(self) -> int:
         """See `Operator`."""
-        each = 2 if self._pair else 1  # type: ignore[attr-defined]
-        return each * (2 * most_samples(self.high) + 2)
+        return (2 if self._pair else 1) * (2 * most_samples(self.high) + 2)
 
-    def rows(self, state: Slide, now: int, pick: Pick) -> Slide:
-        """See `Operator`."""
-        if self._pair:  # type: ignore[attr-defined]
+    def rows(self, state: Slide, pick: Pick) -> Slide:
+        """See `Windowed`."""
+        if self._pair:
             return changed(state, lambda v: (pick(v[0], UNKNOWN), pick(v[1], UNKNOWN)))
         return changed(state, lambda v: pick(v, UNKNOWN))
-
-
-class Ends(NamedTuple):
-    """When what ends a run was last there.
-
-    Attributes:
-        then: Time of the last sample.
-        until: (2, ...) microseconds up to which each bound was not as wanted; of those that are not
-            as wanted now it is told once they are again.
-        broken: (2, ...) whether it is not as wanted now.
-        latest: Latest time of `until`.
-        shown: (2, ...) where either bound was not as wanted within the window, and
-        result: the interval that follows, both as they were last.
-    """
-
-    then: int
-    until: Any
-    broken: Any
-    latest: int
-    shown: Any
-    result: Any
 
 
 @dataclass(frozen=True)
@@ -149,67 +131,21 @@ class Lasting:
     """`for` and `within` of what is no matter of degree: its state is one moment, not a window.
 
     Attributes:
-        algebra: Of the intervals.
         kind: 'always' or 'once'.
         high: Length of the window, microseconds.
     """
 
-    algebra: Arrays = field(repr=False)
     kind: str
     high: int
 
-    def step(self, state: Ends | None, now: int, *values: Any) -> tuple[Ends, Any]:
-        """See `Operator`."""
-        value = values[0]
-        broken = value < 0 if self.kind == "always" else (value > 0)[::-1]
-        if state is None:
-            until = np.full_like(broken, LONG_AGO, dtype=np.int64)
-            until[0] = now  # before the first sample nothing is known: it may have been false
-            latest = now
-        else:
-            # Nearly always all is as it was, and what is not the time can be shared.
-            broken = _shared(broken, state.broken)
-            until, latest = self._ends(state, now, broken)
-        shown = broken if latest <= now - self.high else broken | (until > now - self.high)
-        if state is not None and (shown := _shared(shown, state.shown)) is state.shown:
-            result = state.result
-        else:
-            result = self._result(shown)
-        return Ends(now, until, broken, latest, shown, result), result
-
-    def _ends(self, state: Ends, now: int, broken: Any) -> tuple[Any, int]:
-        """When what ends a run was last there, by the state before and what is so now."""
-        if now - state.then > REACH:
-            until = np.where(state.broken, state.then + REACH, state.until)
-            until[0] = now
-            return until, now
-        if broken is not state.broken:
-            over = state.broken & ~broken
-            if np.count_nonzero(over):
-                return np.where(over, now, state.until), now
-        return state.until, state.latest
-
-    def _result(self, broken: Any) -> Any:
-        low, high = (-np.inf, np.inf) if self.kind == "always" else (np.inf, -np.inf)
-        result = np.where(broken, low, high)
-        return result if self.kind == "always" else result[::-1]
+    def on(self, algebra: Scalars) -> Stepping:
+        """See `Operator`; of single intervals it is a window like any other."""
+        return Sliding(self.kind, 0, self.high).on(algebra)
 
     @property
     def kept(self) -> int:
         """See `Operator`."""
-        return 4
-
-    def rows(self, state: Ends, now: int, pick: Pick) -> Ends:
-        """See `Operator`."""
-        until = pick(state.until, (state.then + REACH, LONG_AGO))
-        broken = pick(state.broken, (True, False))
-        latest = int(until.max(initial=LONG_AGO))
-        return Ends(state.then, until, broken, latest, broken, self._result(broken))
-
-
-def _shared(new: Any, old: Any) -> Any:
-    """The old one of two arrays that are the same, so that whoever kept it need not keep both."""
-    return old if new.shape == old.shape and new.tobytes() == old.tobytes() else new
+        return 1
 
 
 class SoFarState(NamedTuple):
@@ -224,44 +160,38 @@ class SoFar:
     """`always`, `once` and `since` over all that was watched.
 
     Attributes:
-        algebra: Of the intervals.
         kind: 'always', 'once' or 'since'.
     """
 
-    algebra: Algebra = field(repr=False)
     kind: str
 
-    def step(self, state: SoFarState | None, now: int, *values: Any) -> tuple[SoFarState, Any]:
+    def on(self, algebra: Scalars) -> Stepping:
         """See `Operator`."""
-        unknown = self.algebra.constant(UNKNOWN)
-        before = self.algebra.constant(self._empty()) if state is None else state.value
-        if state is not None and now - state.then > REACH:
-            before = self._join(before, (unknown,) * len(values))
-        value = self._join(before, values)
-        return SoFarState(now, value), value
+        least, most = algebra.least, algebra.most
 
-    def _empty(self) -> Interval:
+        def join(before: Interval, values: tuple[Interval, ...]) -> Interval:
+            if self.kind == "since":
+                return most(values[1], least(before, values[0]))
+            return (least if self.kind == "always" else most)(before, values[0])
+
+        def step(state: SoFarState | None, now: int, *values: Interval) -> tuple[Any, Any]:
+            before = self.empty if state is None else state.value
+            if state is not None and now - state.then > REACH:
+                before = join(before, (UNKNOWN,) * len(values))
+            value = join(before, values)
+            return SoFarState(now, value), value
+
+        return step
+
+    @property
+    def empty(self) -> Interval:
+        """What it comes to before the first sample."""
         return TRUE if self.kind == "always" else FALSE
-
-    def _join(self, before: Any, values: tuple[Any, ...]) -> Any:
-        least, most = self.algebra.least, self.algebra.most
-        if self.kind == "since":
-            return most(values[1], least(before, values[0]))
-        return (least if self.kind == "always" else most)(before, values[0])
 
     @property
     def kept(self) -> int:
         """See `Operator`."""
         return 1
-
-    def rows(self, state: SoFarState, now: int, pick: Pick) -> SoFarState:
-        """See `Operator`."""
-        then, value = state
-        if now - then > REACH:
-            # The silence is not part of what was watched of those that are new.
-            unknown = self.algebra.constant(UNKNOWN)
-            then, value = now - REACH, self._join(value, (unknown, unknown))
-        return SoFarState(then, pick(value, self._empty()))
 
 
 MAYBE: Interval = (0.0, 1.0)
@@ -294,42 +224,44 @@ class Counting:
     """`f in 60 % of 2 s`, `f in 3 of 5 samples`: how much above the least it was true.
 
     Attributes:
-        algebra: Of the intervals.
         least: Share of the time, or number of samples.
         span: Length of the window, microseconds, or number of samples.
         samples: Whether samples are counted.
     """
 
-    algebra: Algebra = field(repr=False)
     least: float
     span: int
     samples: bool
 
-    def step(self, state: Tally | None, now: int, *values: Any) -> tuple[Tally, Any]:
+    def on(self, algebra: Algebra) -> Stepping:
         """See `Operator`."""
-        a = self.algebra
-        maybe, held = a.constant(MAYBE), a.held(values[0])
-        if state is None:
-            clock, none = 0 if self.samples else now, a.constant((0.0, 0.0))
-            state = Tally(now, clock, clock, none, maybe, (clock, (none, maybe)), Queue())
-        elif now - state.then > REACH:
-            moment = state.clock + (0 if self.samples else REACH)
-            state = self._added(state, state.then + REACH, moment, maybe)
-        clock = state.clock if self.samples else now
-        state = self._added(state, now, clock, held)
-        start = state.clock - self.span
-        queue, begin = state.queue.advance(start, state.begin)
-        moment, (total, rate) = begin
-        before = a.tallied(total, a.scaled(rate, float(start - moment)))
-        counted = a.tallied(state.total, a.scaled(before, -1.0))
+        a, maybe = algebra, algebra.constant(MAYBE)
         # Counted in whole samples or microseconds, so that what just suffices is told exactly.
-        over = a.shifted(counted, -self.least if self.samples else -round(self.least * self.span))
-        share = over if self.samples else a.scaled(over, 1.0 / self.span)
-        return state._replace(queue=queue, begin=begin), a.shifted(share, EQUAL)
+        enough = -self.least if self.samples else -round(self.least * self.span)
 
-    def _added(self, state: Tally, now: int, clock: int, held: Any) -> Tally:
+        def step(state: Tally | None, now: int, value: Any) -> tuple[Tally, Any]:
+            held = a.held(value)
+            if state is None:
+                clock, none = 0 if self.samples else now, a.constant((0.0, 0.0))
+                state = Tally(now, clock, clock, none, maybe, (clock, (none, maybe)), Queue())
+            elif now - state.then > REACH:
+                moment = state.clock + (0 if self.samples else REACH)
+                state = self._added(a, state, state.then + REACH, moment, maybe)
+            clock = state.clock if self.samples else now
+            state = self._added(a, state, now, clock, held)
+            start = state.clock - self.span
+            queue, begin = state.queue.advance(start, state.begin)
+            moment, (total, rate) = begin
+            before = a.tallied(total, a.scaled(rate, float(start - moment)))
+            counted = a.tallied(state.total, a.scaled(before, -1.0))
+            over = a.shifted(counted, enough)
+            share = over if self.samples else a.scaled(over, 1.0 / self.span)
+            return state._replace(queue=queue, begin=begin), a.shifted(share, EQUAL)
+
+        return step
+
+    def _added(self, a: Algebra, state: Tally, now: int, clock: int, held: Any) -> Tally:
         """The tally with a sample: of samples it counts at once, of time while it stands."""
-        a = self.algebra
         if self.samples:
             clock, total, rate = clock + 1, a.tallied(state.total, held), a.constant((0.0, 0.0))
         else:
@@ -343,8 +275,8 @@ class Counting:
         """See `Operator`."""
         return 2 * ((self.span if self.samples else most_samples(self.span)) + 2)
 
-    def rows(self, state: Tally, now: int, pick: Pick) -> Tally:
-        """See `Operator`."""
+    def rows(self, state: Tally, pick: Pick) -> Tally:
+        """See `Windowed`."""
 
         def total(clock: int, value: Any) -> Any:
             return pick(value, (0.0, float(clock - state.born)))
@@ -364,8 +296,8 @@ class Counting:
 class Remembered(NamedTuple):
     """What was known last, and when; microseconds."""
 
-    value: Any
-    time: Any
+    value: Interval
+    time: int
 
 
 @dataclass(frozen=True)
@@ -373,55 +305,41 @@ class Recalling:
     """`last(x, 0.5 s)`: what was known last, while it is not too old.
 
     Attributes:
-        algebra: Of the intervals.
         age: Microseconds.
     """
 
-    algebra: Algebra = field(repr=False)
     age: int
 
-    def step(self, state: Remembered | None, now: int, *values: Any) -> tuple[Remembered, Any]:
+    def on(self, algebra: Scalars) -> Stepping:
         """See `Operator`."""
-        a, (value,) = self.algebra, values
-        unknown = a.constant(UNKNOWN)
-        old = state or Remembered(unknown, LONG_AGO)
-        known = a.known(value)
-        kept = Remembered(a.choose(known, value, old.value), a.choose(known, now, old.time))
-        return kept, a.choose(now - kept.time <= self.age, kept.value, unknown)
+
+        def step(state: Remembered | None, now: int, value: Interval) -> tuple[Any, Any]:
+            old = state or Remembered(UNKNOWN, LONG_AGO)
+            kept = Remembered(value, now) if value != UNKNOWN else old
+            return kept, kept.value if now - kept.time <= self.age else UNKNOWN
+
+        return step
 
     @property
     def kept(self) -> int:
         """See `Operator`."""
         return 2
 
-    def rows(self, state: Remembered, now: int, pick: Pick) -> Remembered:
-        """See `Operator`."""
-        return Remembered(pick(state.value, UNKNOWN), pick(state.time, LONG_AGO, lead=0))
-
 
 @dataclass(frozen=True)
 class Latching:
-    """A comparison with two thresholds: the second one counts from when it is true to when it is false.
+    """A comparison with two thresholds: the second one counts from when it is true to when it is false."""
 
-    Attributes:
-        algebra: Of the intervals.
-    """
-
-    algebra: Algebra = field(repr=False)
-
-    def step(self, state: Any, now: int, *values: Any) -> tuple[Any, Any]:
+    def on(self, algebra: Scalars) -> Stepping:
         """See `Operator`; the values are those by the threshold to enter and to leave."""
-        entered = self.algebra.constant(FALSE)[0] > 0 if state is None else state
-        enter, leave = values
-        result = self.algebra.choose(entered, leave, enter)
-        low, high = result
-        return (low > 0) | (entered & (high >= 0)), result
+
+        def step(state: bool | None, now: int, enter: Interval, leave: Interval) -> tuple[Any, Any]:
+            result = leave if state else enter
+            return result[0] > 0 or (bool(state) and result[1] >= 0), result
+
+        return step
 
     @property
     def kept(self) -> int:
         """See `Operator`."""
         return 1
-
-    def rows(self, state: Any, now: int, pick: Pick) -> Any:
-        """See `Operator`."""
-        return pick(state, False, lead=0)

@@ -1,4 +1,4 @@
-"""How near outlines of regions are to each other, worked out once for each region and each pair.
+"""How far outlines reach and how near they are to each other, worked out once for each region and each pair.
 
 In one step several thinkers ask about the same regions: who may hide a part of whom, who touches, who
 is within whom. Regions never change, so that what was found of the most recent ones is remembered;
@@ -10,10 +10,25 @@ from __future__ import annotations
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.spatial import cKDTree
+from numpy.typing import NDArray
 
 from visup.agent import Region
-from visup.rules.geometry import Box, Floats, box_gap, dense, masks_overlap, outline
+from visup.rules.geometry import (
+    DIRECTIONS,
+    Floats,
+    box_gap,
+    dense,
+    masks_overlap,
+    outline,
+)
+from visup.rules.outline_loops import (
+    boxes_of,
+    evenly,
+    least_distance,
+    reached,
+    signed_extent,
+    widest_step,
+)
 
 NEAR = 0.05
 """How near outlines must be for anybody to care how near they are, image diagonals."""
@@ -21,8 +36,11 @@ NEAR = 0.05
 RECENT = 128
 """Regions that are remembered: those of two steps with fifty objects."""
 
-ROUGHLY = 8
-"""Each of so many points of an outline is looked at first."""
+EVEN_POINTS = 96
+"""Least points of an outline that another one is laid upon."""
+
+CLOSE = 2.0
+"""Neighbouring points of an outline that are so near each other leave no gap, pixels."""
 
 MOST_POINTS = 200
 """Points of an outline that are measured against another one."""
@@ -39,28 +57,61 @@ class Outline:
     """
 
     def __init__(self, region: Region) -> None:
+        self._region = region
         self.points = outline(region)
+
+    @cached_property
+    def boxes(self) -> Floats:
+        """Of the runs of `points`; see `outline_loops.py`."""
+        return boxes_of(self.points)
 
     @cached_property
     def closed(self) -> Floats:
         """(M, 2) points without wide gaps between neighbours; see `dense`."""
-        return dense(self.points)
+        return self.points if widest_step(self.points) <= CLOSE else dense(self.points, CLOSE)
 
     @cached_property
-    def tree(self) -> cKDTree:
-        """Of `points`."""
-        return cKDTree(self.points)
+    def closed_boxes(self) -> Floats:
+        """Of the runs of `closed`."""
+        return self.boxes if self.closed is self.points else boxes_of(self.closed)
 
     @cached_property
-    def closed_tree(self) -> cKDTree:
-        """Of `closed`."""
-        return self.tree if self.closed is self.points else cKDTree(self.closed)
+    def even(self) -> Floats:
+        """(M, 2) points evenly spaced, as many as it has, `EVEN_POINTS` at least."""
+        return evenly(self.points, max(EVEN_POINTS, len(self.points)))
+
+    @cached_property
+    def even_boxes(self) -> Floats:
+        """Of the runs of `even`."""
+        return boxes_of(self.even)
+
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """(h, w) of the region, in the one layout that loops are compiled for."""
+        mask = self._region.mask
+        plain = mask.flags.c_contiguous and mask.flags.writeable and mask.dtype == np.bool_
+        return mask if plain else np.array(mask, dtype=np.bool_, order="C")
 
 
 @lru_cache(maxsize=RECENT)
 def ready(region: Region) -> Outline:
     """The outline of a region, made ready."""
     return Outline(region)
+
+
+def reach(
+    region: Region, frame_size: tuple[int, int], support: Floats, free: NDArray[np.bool_]
+) -> None:
+    """How far a region's outline reaches.
+
+    Args:
+        region: Any region.
+        frame_size: (width, height), pixels.
+        support: (16,) written, pixels: max over the outline of p . n for each of `DIRECTIONS`.
+        free: (16,) written: whether the furthest point is clear of the image border, so that it
+            belongs to the body and not to where the image ends.
+    """
+    reached(ready(region).points, DIRECTIONS, *frame_size, support, free)
 
 
 def outline_gap(a: Region, b: Region, near: float) -> float | None:
@@ -82,28 +133,14 @@ def outline_gap(a: Region, b: Region, near: float) -> float | None:
 
 @lru_cache(maxsize=8 * RECENT)
 def _gap(a: Region, b: Region, near: float) -> float | None:
-    points, tree = ready(a).points, ready(b).tree
-    # No point is nearest that is farther from the other's box than a few of them are from the other.
-    rough = float(tree.query(points[::ROUGHLY])[0].min())
-    inside = _within(points, b.bbox, min(near, rough))
-    if len(inside) == 0:
-        # One may still lie deep within the other.
-        return 0.0 if masks_overlap(a, b) else None
-    distance = float(tree.query(inside)[0].min())
+    # A pixel is as wide as 1: outlines of neighbours are so far apart.
+    one, two = ready(a), ready(b)
+    distance = least_distance(one.points, one.boxes, two.points, two.boxes, near + 1.0)
+    # One may also lie deep within the other.
     if distance > 1.5 and masks_overlap(a, b):
         return 0.0
     gap = max(0.0, distance - 1.0)
     return gap if gap <= near else None
-
-
-def _within(points: Floats, box: Box, margin: float) -> Floats:
-    """The points that are in a box, or at most `margin` and a pixel from it."""
-    x, y, w, h = box
-    px, py = points.T
-    inside = (px >= x - margin - 1) & (px <= x + w + margin)
-    inside &= (py >= y - margin - 1) & (py <= y + h + margin)
-    found: Floats = points[inside]
-    return found
 
 
 def signed_distances(a: Region, b: Region) -> tuple[float, float]:
@@ -116,12 +153,7 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
     Returns:
         The least and the greatest distance of a's points to b's outline, pixels, negative within b.
     """
-    points = ready(a).closed
-    points = points[:: -(-len(points) // MOST_POINTS)]
-    distance = np.asarray(ready(b).closed_tree.query(points)[0], dtype=float)
-    x, y, w, h = b.bbox
-    at = np.rint(points).astype(int) - (x, y)
-    within = (at >= 0).all(axis=1) & (at[:, 0] < w) & (at[:, 1] < h)
-    within[within] = b.mask[at[within, 1], at[within, 0]]
-    signed = np.where(within, -distance, distance)
-    return float(signed.min()), float(signed.max())
+    points, body = ready(a).closed, ready(b)
+    step = -(-len(points) // MOST_POINTS)
+    x, y, _, _ = b.bbox
+    return signed_extent(points, step, body.closed, body.closed_boxes, body.mask, x, y)

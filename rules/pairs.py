@@ -22,18 +22,6 @@ def pairs(m: int) -> tuple[Indices, Indices]:
     return first, second
 
 
-def of_pairs(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The values of all pairs of an (m, m) table as (P,), the first of each pair the row."""
-    return table.take(_places(len(table)))
-
-
-@lru_cache(maxsize=128)
-def _places(m: int) -> Indices:
-    """Where pairs stand in an (m, m) table; a lookup by one number is quicker than by two."""
-    first, second = pairs(m)
-    return first * m + second
-
-
 @lru_cache(maxsize=32)
 def carried(old: tuple[int, ...], new: tuple[int, ...]) -> tuple[Indices, Indices]:
     """Where objects, and pairs of them, stood among others.
@@ -54,11 +42,3 @@ def carried(old: tuple[int, ...], new: tuple[int, ...]) -> tuple[Indices, Indice
     number = np.where((low >= 0) & (high >= 0), number, -1).astype(np.intp)
     rows.flags.writeable = number.flags.writeable = False
     return rows, number
-
-
-def square(values: NDArray[np.float64], m: int) -> NDArray[np.float64]:
-    """A symmetric (m, m) table from the (P,) values of pairs; NaN on the diagonal."""
-    table = np.full((m, m), np.nan)
-    i, j = pairs(m)
-    table[i, j] = table[j, i] = values
-    return table

@@ -19,14 +19,13 @@ from visup.agent import Hypothesis, Mind, ObjectBelief, Observation, Outcome, Po
 from visup.agent.changing import replace
 from visup.agent.viewing import views
 from visup.rules.interpretation import (
-    NONE,
     Level,
     Tree,
     TreeSettings,
     Turning,
     grown,
     lead,
-    level_of,
+    levels_of,
     look_weight,
     planted,
     rival_gap,
@@ -35,6 +34,7 @@ from visup.rules.objects import hypotheses_by_object
 from visup.rules.presence import visible_share
 from visup.rules.spin import Rate, SpinSettings, measured_rate, spin_of
 from visup.rules.spin_fit import Turns
+from visup.rules.tree_loops import NONE
 from visup.rules.turns import Floats
 
 POSES = "rules.pose"
@@ -87,7 +87,7 @@ class PoseSettings:
     spin_stale_s: float = 8.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Track:
     """What is remembered of one object's views.
 
@@ -200,19 +200,12 @@ class BelievePose:
     ) -> Track:
         """The track after a look."""
         said = _look(hypotheses)
-        levels = self._levels(hypotheses, now)
+        levels = levels_of(hypotheses, now, self.settings.tree)
         track = self._settled(track, name)
         waited = now - track.time
         track = self._rated(self._grown(replace(track, said=said), levels, now), name, now)
         track = self._led(track, name, waited)
         return replace(track, pose=self._pose(track, name))
-
-    def _levels(self, hypotheses: Sequence[Hypothesis], now: float) -> dict[str, Level]:
-        best = max(h.similarity for h in hypotheses)
-        by_name: dict[str, list[Hypothesis]] = {}
-        for h in hypotheses:
-            by_name.setdefault(h.name, []).append(h)
-        return {n: level_of(hs, now, best, self.settings.tree) for n, hs in by_name.items()}
 
     def _grown(self, track: Track, levels: dict[str, Level], now: float) -> Track:
         """The trees with one more level, and what their models have cost."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome
+from visup.agent.changing import replace
 from visup.rules.adoption import adopt
 from visup.rules.entering import enter
 from visup.rules.fragments import FRAGMENTS, Doubt, Doubting, FragmentSettings
@@ -56,9 +57,12 @@ class SeePresence:
         show(work)
         miss(work)
         kept = {i: t for i, t in work.of.items() if i in work.mind.objects}
-        mind = work.mind.remember(TRACKS, Tracks(start, MappingProxyType(kept)))
-        mind = mind.remember(FRAGMENTS, MappingProxyType(dict(work.doubts)))
-        return Outcome(mind, tuple(work.events))
+        told = {
+            TRACKS: Tracks(start, MappingProxyType(kept)),
+            FRAGMENTS: MappingProxyType(dict(work.doubts)),
+        }
+        memory = MappingProxyType({**work.mind.memory, **told})
+        return Outcome(replace(work.mind, memory=memory), tuple(work.events))
 
 
 def _follow(work: Work) -> None:

@@ -25,8 +25,8 @@ How to read them off a mind:
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from math import sqrt
 
 import numpy as np
 
@@ -40,27 +40,19 @@ from visup.agent import (
     RelationTable,
     Truth,
 )
+from visup.agent.cells import Cells, Columns
 from visup.agent.changing import replace
 from visup.rules.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.direction import DIRECTION_NAMES
 from visup.rules.distance import CLASS_NAMES
-from visup.rules.fit import binned, theil_sen
+from visup.rules.fit_loops import trends
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.history import History, covered, sample
-from visup.rules.judge import (
-    AWAY,
-    DIRECTION,
-    DISTANCE,
-    JUDGED,
-    ORDER,
-    SIDE,
-    least_durations,
-    quantities,
-    wanted,
-)
-from visup.rules.latch import UNKNOWN, Codes, Latch, hold_sign, step, unknown_latch
-from visup.rules.measure import Measured, Measuring, RelationSettings, at_rest, scale
-from visup.rules.pairs import carried, of_pairs, pairs
+from visup.rules.judge import AWAY, JUDGED, ORDER, SIDE, least_durations, limits
+from visup.rules.judge_loops import hold_sign, judged
+from visup.rules.latch import UNKNOWN, Codes, Latch, step, unknown_latch
+from visup.rules.measure import Measured, Measuring, RelationSettings, scale, sightings
+from visup.rules.pairs import carried, pairs
 from visup.rules.qtc import text
 from visup.rules.rcc8 import (
     CONVERSE,
@@ -68,9 +60,10 @@ from visup.rules.rcc8 import (
     from_signs,
     outline_differences,
 )
-from visup.rules.smooth import smoothed
+from visup.rules.relation_loops import COUPLED, MERGED, outlines, places, told, wanted
+from visup.rules.smooth import share_of
 from visup.rules.tracks import merged_pairs
-from visup.rules.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES, wanted_trend, with_depth
+from visup.rules.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 
 RELATIONS = "rules.relations"
 DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
@@ -99,6 +92,24 @@ TREND, TOUCH, TOGETHER, DEPTH = range(JUDGED, JUDGED + 4)
 OUTLINE = slice(JUDGED + 4, JUDGED + 7)
 ROWS = JUDGED + 7
 """Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
+
+_SURE, _MOSTLY, _TREND, _GAP, _RATE, _SIGMA, _RELATIVE = range(7)
+COLUMNS = Columns(
+    (
+        Column(TREND_NAMES, (0, 0), _TREND, _RATE, _SIGMA),
+        Column(("", "touching"), (1, 1), _MOSTLY, _GAP),
+        Column(("", "moving_together"), (2, 2), _MOSTLY, _RELATIVE),
+        Column(RCC8, (3, 4), _SURE, listed="one"),
+        Column(("distance",), (5, 5), _SURE, _GAP),
+        Column(OUTLINE_NAMES, (6, 7), _SURE, listed="none"),
+        Column(DEPTH_NAMES, (8, 8), _MOSTLY, listed="none"),
+        Column(TOWARDS_NAMES, (9, 10), _MOSTLY, listed="none"),
+        Column(SIDE_NAMES, (11, 12), _MOSTLY, listed="none"),
+        Column(CLASS_NAMES, (13, 13), _SURE, _GAP, listed="none"),
+        Column(DIRECTION_NAMES, (14, 15), _SURE),
+    )
+)
+"""What the rows of `relation_loops.told` stand for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,8 +207,9 @@ class Relations:
         objects = mind.present()
         before = _of_these(kept, tuple(b.id for b in objects), mind.time)
         history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
-        now = Measuring(s)(history, objects, mind, kept.measured)
-        smooth = self._smooth(before.smooth, now, objects, mind)
+        seen = sightings(objects, mind.time)
+        now = Measuring(s)(history, objects, seen, mind, kept.measured)
+        smooth = self._smooth(before.smooth, now, objects, seen, mind)
         wants = self._wanted(before.latch, history, now, smooth, mind)
         latch = step(before.latch, wants, mind.time, self._lasts)
         rcc8 = before.rcc8
@@ -206,7 +218,7 @@ class Relations:
             held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
             rcc8 = step(rcc8, held, mind.time, 0.0)
         kept = Kept(history, now, latch, rcc8, smooth)
-        table = RelationTable(now.ids, self._columns(kept, mind))
+        table = RelationTable(now.ids, (self._cells(kept, mind),))
         return Outcome(mind.remember(RELATIONS, kept, relations=table))
 
     def _durations(self) -> Floats:
@@ -226,66 +238,72 @@ class Relations:
     ) -> Codes:
         s, diagonal = self.settings, scale(mind.frame_size)
         codes = np.empty(before.state.shape, dtype=np.int8)
-        q = quantities(smooth.boxes, now.velocity, now.velocity_sigma, s.judge.noise_px)
-        codes[:JUDGED] = wanted(before.state[:JUDGED], q, s.judge, diagonal)
-        image = wanted_trend(
-            of_pairs(now.rate),
-            of_pairs(now.rate_sigma),
-            before.state[TREND],
-            before.pending[TREND],
-            s.rate_enter * diagonal,
-            s.rate_exit * diagonal,
-            (s.sigmas, s.pending_sigmas),
-        )
+        bounds = limits(s.judge, diagonal)
+        judged(before.state, smooth.boxes, now.velocity, now.velocity_sigma, bounds, codes)
         codes[DEPTH] = self._depth_trend(h)
-        codes[TREND] = with_depth(image, codes[DEPTH])
-        codes[TOUCH] = self._wanted_touch(now, smooth.gap, before.state[TOUCH], diagonal)
-        codes[TOGETHER] = self._wanted_together(now, before.state[TOGETHER], diagonal)
+        wanted(
+            before.state[TREND:DEPTH],
+            before.pending[TREND:DEPTH],
+            now.tables,
+            now.motion,
+            now.speed,
+            now.depth,
+            smooth.gap,
+            _marks(h.ids, mind),
+            self._limits(diagonal),
+            codes[TREND : DEPTH + 1],
+        )
         level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
         codes[OUTLINE] = hold_sign(smooth.outlines, before.state[OUTLINE], *level)
-        for k in _numbers(h.ids, (c.objects for c in mind.couplings)):
-            # One body that turns changes its outline; it comes apart when its parts no longer touch.
-            if codes[TOUCH, k] == 1 and codes[TREND, k] == DIVERGING:
-                codes[TREND, k] = KEEPING
-        for k in _numbers(h.ids, merged_pairs(mind)):
-            codes[TOUCH, k], codes[TREND, k] = 1, UNKNOWN
         return codes
 
+    def _limits(self, diagonal: float) -> Limits:
+        """Thresholds as `relation_loops.wanted` takes them."""
+        s = self.settings
+        return (
+            (s.rate_enter * diagonal, s.rate_exit * diagonal),
+            (s.sigmas, s.pending_sigmas),
+            (s.touch_enter * diagonal, s.touch_exit * diagonal, s.apart_exit, s.apart_depth),
+            (
+                s.still_speed * diagonal,
+                s.still_half * diagonal,
+                s.together_exit,
+                s.moving_exit,
+            ),
+        )
+
     def _smooth(
-        self, before: Smooth, now: Measured, objects: tuple[ObjectBelief, ...], mind: Mind
+        self,
+        before: Smooth,
+        now: Measured,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        mind: Mind,
     ) -> Smooth:
         """Boxes as they are, or were until a moment ago; gaps; outlines that may meet."""
-        s, seconds = self.settings, mind.time - before.time
-        boxes = np.array([b.region.bbox for b in objects], dtype=float).reshape(-1, 4)
-        boxes[[mind.time - b.last_seen > s.hold_s for b in objects]] = np.nan
-        jump = 6.0 * s.judge.noise_px
-        gap = smoothed(before.gap, of_pairs(now.gap), seconds, jump * np.sqrt(2.0))
-        diagonal = scale(mind.frame_size)
-        near = gap <= 2.0 * s.judge.level_enter * diagonal
-        regions = [b.region for b in objects]
-        apart = outline_differences(regions, near, ~np.isnan(gap), 0.05 * diagonal)
-        return Smooth(
-            mind.time,
-            smoothed(before.boxes, boxes, seconds, jump),
-            gap,
-            smoothed(before.outlines, apart, seconds, jump * np.sqrt(2.0)),
+        s, diagonal = self.settings, scale(mind.frame_size)
+        share, jump = share_of(mind.time - before.time), 6.0 * s.judge.noise_px
+        wide, near = jump * sqrt(2.0), 2.0 * s.judge.level_enter * diagonal
+        boxes, gap, asked = places(
+            before.boxes, before.gap, seen, now.tables, (share, jump, wide, s.hold_s, near)
         )
+        apart = outline_differences([b.region for b in objects], asked.tolist())
+        level = outlines(before.outlines, gap, asked, apart, (share, wide, 0.05 * diagonal))
+        return Smooth(mind.time, boxes, gap, level)
 
     def _depth_trend(self, h: History) -> Codes:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
         i, j = pairs(len(h.ids))
         codes = np.full(len(i), UNKNOWN, dtype=np.int8)
-        if len(i) == 0 or not covered(h, self.settings.window_s):
-            return codes
-        found_at = np.isfinite(h.depth)
-        if not found_at.any():
+        found_at = h.depth == h.depth  # NaN is not equal to itself
+        if not found_at.any() or not covered(h, self.settings.window_s):
             return codes
         known = found_at.mean(axis=0) >= 0.6
         at = np.flatnonzero(known[i] & known[j])
         if len(at) == 0:
             return codes
         first, second = h.depth[:, i[at]], h.depth[:, j[at]]
-        slope, sigma = theil_sen(*binned(h.times, np.abs(first - second), self.settings.bins))
+        slope, sigma = trends(h.times, np.abs(first - second), self.settings.bins)
         typical = 0.5 * np.nanmean(first + second, axis=0)
         least = np.maximum(self.settings.depth_rate * typical, 3.0 * sigma)
         found = np.full(len(at), KEEPING, dtype=np.int8)
@@ -294,80 +312,29 @@ class Relations:
         codes[at] = found
         return codes
 
-    def _wanted_touch(self, now: Measured, gap: Floats, before: Codes, diagonal: float) -> Codes:
-        """By the gap, and not where depth tells the two apart."""
-        s = self.settings
-        i, j = pairs(len(now.ids))
-        wanted = (gap <= _limit(before, s.touch_enter, s.touch_exit) * diagonal).astype(np.int8)
-        first, second = now.depth[i], now.depth[j]
-        apart = np.abs(first - second) / np.minimum(first, second)
-        wanted[apart > _limit(before, s.apart_exit, s.apart_depth)] = 0
-        wanted[np.isnan(gap)] = UNKNOWN
-        return wanted
-
-    def _wanted_together(self, now: Measured, before: Codes, diagonal: float) -> Codes:
-        """Both move and neither moves relative to the other."""
-        s = self.settings
-        i, j = pairs(len(now.ids))
-        held = before == 1
-        least = 2 * s.still_speed * diagonal * np.where(held, s.moving_exit, 1.0)
-        moves = np.minimum(now.speed[i], now.speed[j]) > least
-        rest, nearly = at_rest(now, s, diagonal, diagonal * s.together_exit)[:, i, j]
-        wanted: Codes = ((rest | (held & nearly)) & moves).view(np.int8)
-        wanted[np.isnan(of_pairs(now.relative_speed))] = UNKNOWN
-        return wanted
-
-    def _columns(self, kept: Kept, mind: Mind) -> tuple[Column, ...]:
-        now, latch = kept.measured, kept.latch
-        i, j = pairs(len(now.ids))
-        known = np.isfinite(now.depth)
-        cap = np.where(known[i] & known[j], 1.0, self.settings.image_only_confidence)[None]
-        gap, rate = of_pairs(now.gap)[None], of_pairs(now.rate)[None]
-        sigma = of_pairs(now.rate_sigma)[None]
-        relative = of_pairs(now.relative_speed)[None]
-        sure, certain = np.ones((2, len(i))), np.minimum(cap, 0.9)
-        each = certain.repeat(2, axis=0)
-        trend = np.minimum(cap, self._trend_confidence(rate, sigma, mind))
-        there: Codes = np.where(np.isnan(gap), np.int8(UNKNOWN), np.int8(0))
-
-        def column(
-            names: tuple[str, ...],
-            row: int | slice,
-            confidence: Floats,
-            value: Floats | None = None,
-            sigma: Floats | None = None,
-            listed: str = "none",
-        ) -> Column:
-            rows = row if isinstance(row, slice) else slice(row, row + 1)
-            return Column(
-                names, latch.state[rows], latch.since[rows], confidence, value, sigma, listed
-            )
-
-        def with_converse(
-            names: tuple[str, ...], of: Latch, row: int, converse: Codes, listed: str
-        ) -> Column:
-            code, since = of.state[row], of.since[row]
-            state, since = np.array((code, converse[code])), np.array((since, since))
-            return Column(names, state, since, sure, listed=listed)
-
-        return (
-            column(TREND_NAMES, TREND, trend, rate, sigma, "each"),
-            column(("", "touching"), TOUCH, certain, gap, listed="each"),
-            column(("", "moving_together"), TOGETHER, certain, relative, listed="each"),
-            with_converse(RCC8, kept.rcc8, 0, CONVERSE, "one"),
-            Column(("distance",), there, np.full_like(gap, mind.time), sure, gap, listed="each"),
-            with_converse(OUTLINE_NAMES, kept.rcc8, 1, CONVERSE, "none"),
-            column(DEPTH_NAMES, DEPTH, certain),
-            column(TOWARDS_NAMES, AWAY, each),
-            column(SIDE_NAMES, SIDE, each),
-            column(CLASS_NAMES, DISTANCE, sure, gap),
-            with_converse(DIRECTION_NAMES, latch, DIRECTION, DIRECTION_CONVERSE, "each"),
+    def _cells(self, kept: Kept, mind: Mind) -> Cells:
+        s, now = self.settings, kept.measured
+        floor = s.rate_enter * scale(mind.frame_size) / 3.0
+        found = told(
+            kept.latch.state,
+            kept.latch.since,
+            kept.rcc8.state,
+            kept.rcc8.since,
+            now.tables,
+            now.depth,
+            CONVERSE,
+            DIRECTION_CONVERSE,
+            (mind.time, s.image_only_confidence, floor),
         )
+        return Cells(COLUMNS, *found)
 
-    def _trend_confidence(self, rate: Floats, sigma: Floats, mind: Mind) -> Floats:
-        floor = self.settings.rate_enter * scale(mind.frame_size) / 3.0
-        z = rate / np.hypot(sigma, floor)
-        return np.where(np.isnan(z), 0.0, 1.0 - 0.5 * np.exp(-np.abs(z) / 3.0))
+
+Limits = tuple[
+    tuple[float, float],
+    tuple[float, float],
+    tuple[float, float, float, float],
+    tuple[float, float, float, float],
+]
 
 
 def _of_these(kept: Kept, ids: tuple[int, ...], now: float) -> Kept:
@@ -379,19 +346,22 @@ def _of_these(kept: Kept, ids: tuple[int, ...], now: float) -> Kept:
         kept.smooth.time,
         np.append(kept.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
         np.append(kept.smooth.gap, np.nan)[numbers],
-        np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1)[:, numbers],
+        np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1).take(numbers, axis=1),
     )
     latch, rcc8 = kept.latch.select(numbers, now), kept.rcc8.select(numbers, now)
     return replace(kept, latch=latch, rcc8=rcc8, smooth=smooth)
 
 
-def _limit(before: Codes, enter: float, leave: float) -> Floats:
-    """Up to which value a state is begun or kept; by the middle while it is not known yet."""
-    middle = 0.5 * (enter + leave)
-    return np.where(before == 1, leave, np.where(before == UNKNOWN, middle, enter))
-
-
-def _numbers(ids: tuple[int, ...], of: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """Numbers of pairs of object ids; pairs with an object that is not there are left out."""
+def _marks(ids: tuple[int, ...], mind: Mind) -> Codes:
+    """(P,) marks of pairs that are coupled, or merged in one region."""
     table = RelationTable(ids)
-    return tuple(k for a, b in of if (k := table.pair(a, b)[0]) >= 0)
+    marks = np.zeros(len(ids) * (len(ids) - 1) // 2, dtype=np.int8)
+    for mark, found in (
+        (COUPLED, [c.objects for c in mind.couplings]),
+        (MERGED, merged_pairs(mind)),
+    ):
+        for pair in found:
+            k, _ = table.pair(*pair)
+            if k >= 0:
+                marks[k] |= mark
+    return marks

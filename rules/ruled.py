@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from itertools import combinations
 from typing import Any
 
-from visup.rules.bounds import variables_of
+import numpy as np
+
 from visup.rules.facts import RELATION_NAMES, Facts
 from visup.rules.formula import (
     Comparison,
@@ -21,30 +22,37 @@ from visup.rules.formula import (
     mark,
     named,
 )
-from visup.rules.intervals import Arrays
+from visup.rules.layout import Layout
+from visup.rules.machine import CHOICE_BITS, Whole, bits
 from visup.rules.program import Compiler, Place, Program, Scope
+from visup.rules.relations import NAMES
+from visup.rules.states import States
 from visup.rules.terms import Measure, Term
 from visup.rules.vocabulary import RULES, Quantity, Word
 
-FactKey = tuple[int, tuple[int, ...]]
-"""By which a step finds a fact: its node, and the axes of its objects."""
+Key = tuple[str, frozenset[int]]
+"""Name of a rule, and objects."""
+MOST_KEYS = 16
+"""Of so many sets of objects it is remembered what may be found of them."""
 
 
 @dataclass(frozen=True, slots=True)
-class Fact:
-    """A fact that rules look up.
+class Look:
+    """A fact or quantity that rules look up.
 
     Attributes:
-        key: By which a step finds it.
-        codes: Of all objects.
-        axes: Axes of its objects.
+        step: The step that does.
         name: Its word.
+        ask: What it is of all objects.
+        turned: Whether its objects stand along the axes in the other order.
+        axes: How many objects it is about.
     """
 
-    key: FactKey
-    codes: Callable[[Facts], Any]
-    axes: tuple[int, ...]
+    step: int
     name: str
+    ask: Callable[[Facts], Any]
+    turned: bool
+    axes: int
 
 
 def asked(node: Predicate | Measure) -> Callable[[Facts], Any]:
@@ -59,6 +67,39 @@ def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
     return look(facts, *others)
 
 
+class Keys:
+    """What stands for whatever rules may be true of, for some objects; found once for each.
+
+    Args:
+        prepared: The rules.
+        ids: The objects.
+    """
+
+    def __init__(self, prepared: Ruled, ids: tuple[int, ...]) -> None:
+        self._prepared, self._ids = prepared, ids
+        self._known: dict[int, Key] = {}
+        # What was found is nearly always what was found a step ago, in whichever mind.
+        self._latest: tuple[list[int], Mapping[Key, int]] = ([], {})
+
+    def of(self, hits: list[int]) -> Mapping[Key, int]:
+        """Each key of what `machine.choices` found, with the first choice that it stands for."""
+        latest, found = self._latest
+        if latest != hits:
+            found = self._of(hits)
+            self._latest = hits, found
+        return found
+
+    def _of(self, hits: list[int]) -> Mapping[Key, int]:
+        found: dict[Key, int] = {}
+        for hit in hits:
+            key = self._known.get(hit)
+            if key is None:
+                rule, chosen = self._prepared.choice(hit, self._ids)
+                key = self._known.setdefault(hit, (rule.name, frozenset(chosen)))
+            found.setdefault(key, hit)
+        return found
+
+
 @dataclass(frozen=True, eq=False)
 class Ruled:
     """Rules made ready to run.
@@ -67,6 +108,7 @@ class Ruled:
         rules: The rules.
         compiler: Knows where the value of every formula is found.
         places: Of each rule: `when`, and `unless` if there is one.
+        lines: What `explain` remembers of the texts of evidence, by rule and names of objects.
     """
 
     rules: tuple[Rule, ...]
@@ -76,6 +118,12 @@ class Ruled:
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
     _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
+    _layouts: dict[int, Layout] = field(default_factory=dict, repr=False)
+    _verdicts: dict[int, tuple[Whole, int]] = field(default_factory=dict, repr=False)
+    lines: dict[tuple[str, tuple[str, ...]], tuple[Any, ...]] = field(
+        default_factory=dict, repr=False
+    )
+    _keys: dict[tuple[int, ...], Keys] = field(default_factory=dict, repr=False)
 
     @property
     def program(self) -> Program:
@@ -121,24 +169,84 @@ class Ruled:
         return known[id(node)]
 
     @cached_property
-    def relations(self) -> tuple[str, ...]:
-        """Relations that the rules name."""
-        named = {n.name for n, _ in self.program.looks if n.name in RELATION_NAMES}
-        return tuple(sorted(named))
+    def relations(self) -> Mapping[str, int]:
+        """Relations that the rules name, with their places among each other."""
+        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
+        named = {n.name for _, n in self.program.looks() if n.name in NAMES}
+        return {name: k for k, name in enumerate(sorted(named))}
 
     @cached_property
-    def verdicts(self) -> tuple[tuple[Rule, tuple[Place, ...], tuple[tuple[int, int], ...]], ...]:
-        """Each rule with its places, and the pairs of its variables that must not be one object."""
-        return tuple(
-            (rule, places, tuple(_apart(rule)))
-            for rule, places in zip(self.rules, self.places, strict=True)
-        )
+    def facts(self) -> tuple[Look, ...]:
+        """What the rules look up that is true, false or unknown; without these relations."""
+        return tuple(self._looks(Predicate))
 
     @cached_property
-    def facts(self) -> tuple[Fact, ...]:
-        """What the rules look up that is true, false or unknown."""
-        looks = ((node, axes) for node, axes in self.program.looks if isinstance(node, Predicate))
-        return tuple(Fact((id(node), axes), asked(node), axes, node.name) for node, axes in looks)
+    def quantities(self) -> tuple[Look, ...]:
+        """What the rules look up that is a number."""
+        return tuple(self._looks(Measure))
+
+    def _looks(self, kind: type) -> Iterator[Look]:
+        for number, node in self.program.looks():
+            if isinstance(node, kind) and node.name not in self.relations:
+                order = self.program.steps[number].order
+                turned = len(order) == 2 and order[0] > order[1]
+                yield Look(number, node.name, asked(node), turned, len(order))
+
+    def layout(self, n: int) -> Layout:
+        """The program laid out for a number of objects; relations stand before all other facts."""
+        if n not in self._layouts:
+            begin, places = len(self.relations) * n * n, {}
+            for look in self.facts:
+                places[look.step] = begin
+                begin += n**look.axes
+            for step, node in self.program.looks():
+                if node.name in self.relations:
+                    places[step] = self.relations[node.name] * n * n
+            self._layouts[n] = Layout(self.program, n, places, begin)
+        return self._layouts[n]
+
+    @cached_property
+    def rules_by_name(self) -> Mapping[str, Rule]:
+        """The rules by name."""
+        return {rule.name: rule for rule in self.rules}
+
+    def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
+        """The rule and the objects of something that `machine.choices` found of some objects."""
+        rule, rows = self.rules[hit >> CHOICE_BITS], hit & (1 << CHOICE_BITS) - 1
+        chosen = []
+        for _ in rule.variables:
+            rows, row = divmod(rows, len(ids))
+            chosen.append(ids[row])
+        return rule, tuple(chosen[::-1])
+
+    def keys(self, ids: tuple[int, ...]) -> Keys:
+        """What stands for whatever rules may be true of, for some objects."""
+        known = self._keys.get(ids)
+        if known is None:
+            if len(self._keys) >= MOST_KEYS:
+                self._keys.clear()
+            known = self._keys.setdefault(ids, Keys(self, ids))
+        return known
+
+    def fresh(self, n: int) -> States:
+        """What is remembered before the first sample."""
+        return self.layout(n).fresh
+
+    def verdicts(self, n: int) -> tuple[Whole, int]:
+        """Of each rule where its values stand for a number of objects, and how many may be found.
+
+        See `machine.choices`.
+        """
+        if n not in self._verdicts:
+            layout, rows = self.layout(n), []
+            for rule, places in zip(self.rules, self.places, strict=True):
+                at = [(layout.places[p.step], bits(p.axes)) for p in places]
+                when, unless = (*at, (-1, 0))[:2]
+                apart = sum(1 << i + j - 1 for i, j in _apart(rule))
+                rows.append((*when, *unless, len(rule.variables), apart))
+            most = sum(n ** len(rule.variables) for rule in self.rules)
+            self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6), most
+        return self._verdicts[n]
 
 
 def _told(formula: Formula) -> Iterator[Formula]:
@@ -158,7 +266,7 @@ def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
 @lru_cache(maxsize=16)
 def ruled(rules: tuple[Rule, ...]) -> Ruled:
     """Rules made ready to run; the same object for the same rules."""
-    compiler = Compiler(Arrays(max(map(variables_of, rules), default=0)))
+    compiler = Compiler()
     return Ruled(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
 
 

@@ -77,14 +77,21 @@ class Slide(NamedTuple):
         back: Newer samples, newest first: (time, value, rest).
         fold: Fold of all of the back, or None when there are none.
         waiting: Samples that are too new for a window that ends before now.
+        head: Fold of the current value and all of the front.
     """
 
     then: int
     current: Any
-    front: Cell = None
-    back: Cell = None
-    fold: Any = None
-    waiting: Queue = Queue()
+    front: Cell
+    back: Cell
+    fold: Any
+    waiting: Queue
+    head: Any
+
+
+def fresh(now: int, value: Any) -> Slide:
+    """The state before any sample, with what is known of the time before."""
+    return Slide(now, value, None, None, None, Queue(), value)
 
 
 def slide(state: Slide, now: int, value: Any, low: int, high: int, fold: Fold) -> tuple[Slide, Any]:
@@ -101,7 +108,7 @@ def slide(state: Slide, now: int, value: Any, low: int, high: int, fold: Fold) -
     Returns:
         The state after, and the fold of all values that stood at any time of the window.
     """
-    _, current, front, back, newer, waiting = state
+    _, current, front, back, newer, waiting, head = state
     if low:
         waiting = waiting.push(now, value)
         while True:
@@ -119,13 +126,13 @@ def slide(state: Slide, now: int, value: Any, low: int, high: int, fold: Fold) -
             if back is None:
                 break
             front, back, newer = _turned(back, fold), None, None
+            head = fold(current, front[2])
         if front[0] > limit:
             break
-        current, front = front[1], front[3]
-    result = current if front is None else fold(current, front[2])
-    if back is not None:
-        result = fold(result, newer)
-    return Slide(now, current, front, back, newer, waiting), result
+        # What was folded of it and all that follow it is the fold of all that is left now.
+        _, current, head, front = front
+    result = head if back is None else fold(head, newer)
+    return Slide(now, current, front, back, newer, waiting, head), result
 
 
 def _next(queue: Queue, limit: int) -> tuple[Queue, tuple[int, Any] | None]:
@@ -165,6 +172,7 @@ def changed(state: Slide, change: Change) -> Slide:
         back,
         None if back is None else change(state.fold),
         state.waiting.changed(lambda _, value: change(value)),
+        change(state.head),
     )
 
 

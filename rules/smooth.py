@@ -10,6 +10,7 @@ from math import exp
 
 import numpy as np
 
+from visup.compiled import compiled
 from visup.rules.latch import Floats
 
 TAU_S = 0.15
@@ -28,9 +29,19 @@ def smoothed(before: Floats, now: Floats, seconds: float, jump: float) -> Floats
     Returns:
         The means now; NaN where unknown now.
     """
-    step = now - before
-    share = 1.0 - exp(-seconds / TAU_S)
-    steady = np.abs(step) <= jump
-    step *= share
-    step += before
-    return np.where(steady, step, now)
+    flat = _smoothed(before.reshape(-1), now.reshape(-1), share_of(seconds), jump)
+    return flat.reshape(now.shape)
+
+
+def share_of(seconds: float) -> float:
+    """Share of a new value in the mean, so many seconds after the value before."""
+    return 1.0 - exp(-seconds / TAU_S)
+
+
+@compiled
+def _smoothed(before: Floats, now: Floats, share: float, jump: float) -> Floats:
+    means = np.empty(len(now))
+    for k in range(len(now)):
+        step = now[k] - before[k]
+        means[k] = share * step + before[k] if abs(step) <= jump else now[k]
+    return means

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
 
-import numpy as np
-
 from visup.agent import Mind, Region
 from visup.agent.changing import replace
 from visup.rules.geometry import Box, box_overlap, grow, shared_pixels, shift
@@ -25,7 +23,7 @@ Fix = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Track:
     """What is remembered of one object's sightings.
 
@@ -96,7 +94,7 @@ def tracks(mind: Mind) -> Tracks:
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
     """Pairs of objects that are seen as one region now."""
     found = [(i, t.merged_with) for i, t in tracks(mind).of.items() if t.merged_with is not None]
-    return tuple(sorted(found))
+    return tuple(sorted(found)) if found else ()
 
 
 def visible_share(mind: Mind, object_id: int) -> float:
@@ -237,7 +235,8 @@ def _reference(track: Track, region: Region, dt: float, crowded: bool) -> float:
 def _fixes(fixes: tuple[Fix, ...], fix: Fix) -> tuple[Fix, ...]:
     if fixes and fix[0] - fixes[-1][0] < 1.0 / 16.0:
         return fixes
-    return (*(f for f in fixes if f[0] > fix[0] - 1.0), fix)[-16:]
+    since = fix[0] - 1.0
+    return (*[f for f in fixes if f[0] > since], fix)[-16:]
 
 
 def _drift(track: Track, region: Region, fixes: tuple[Fix, ...], dt: float) -> tuple[float, float]:
@@ -252,7 +251,8 @@ def _drift(track: Track, region: Region, fixes: tuple[Fix, ...], dt: float) -> t
     if len(fixes) < 3:
         # Too few places tell nothing: what is known stays.
         return track.drift
-    t, x, y = np.array(fixes).T
-    t = t - t.mean()
-    lever = float((t**2).sum())
-    return float((t * x).sum() / lever), float((t * y).sum() / lever)
+    middle = sum([t for t, _, _ in fixes]) / len(fixes)
+    lever = sum([(t - middle) ** 2 for t, _, _ in fixes])
+    along = sum([(t - middle) * x for t, x, _ in fixes])
+    down = sum([(t - middle) * y for t, _, y in fixes])
+    return along / lever, down / lever

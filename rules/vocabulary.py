@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from visup.agent import HealthStatus, ObjectBelief, Presence
+from visup.agent import HealthStatus, ObjectBelief, Presence, Region
 from visup.rules.facts import (
     CODE,
     MAYBE,
@@ -25,8 +26,9 @@ from visup.rules.facts import (
     exactly,
 )
 from visup.rules.measure import RelationSettings, scale
+from visup.rules.pair_loops import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.sentences import believed_name
-from visup.rules.tracks import at_border, tracks
+from visup.rules.tracks import tracks
 from visup.rules.units import LENGTH, SHARE, SPEED, TIME, TURNING, Dimension
 from visup.rules.zones import QUESTIONS, asked
 
@@ -103,13 +105,12 @@ class Vocabulary:
 
 def expected(facts: Facts, name: str) -> Codes:
     """Whether an active task expects a relation between two objects now."""
-    codes, fine = facts.pairs(NO), IMPLIED.get(name, frozenset({name}))
+    codes, fine, row = facts.pairs(NO), IMPLIED.get(name) or {name}, facts.row
     for task in facts.mind.tasks:
         for e in task.expected:
-            if e.relation in fine:
-                pair = set(e.objects)
-                if len(pair) == 2 and pair <= facts.row.keys():
-                    i, j = (facts.row[o] for o in pair)
+            if e.relation in fine and len(e.objects) == 2:
+                i, j = (row.get(o, -1) for o in e.objects)
+                if i >= 0 and j >= 0 and i != j:
                     codes[i, j] = codes[j, i] = YES
     return codes
 
@@ -117,19 +118,20 @@ def expected(facts: Facts, name: str) -> Codes:
 def engaged(facts: Facts) -> Codes:
     """Whether an active task expects something of an object and another one now."""
     wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
-    return facts.each(lambda b: code(b.id in wanted))
+    return facts.among(wanted)
 
 
 def unexpected(facts: Facts) -> Codes:
     """Whether no active task explains an object; without a task nothing is unexpected."""
-    tasks = facts.mind.tasks
-    return facts.each(lambda b: code(bool(tasks) and all(b.id in t.unexplained for t in tasks)))
+    told = [task.unexplained for task in facts.mind.tasks]
+    nobody = set(told[0]).intersection(*told[1:]) if told else ()
+    return facts.among(nobody)
 
 
 def is_actor(facts: Facts) -> Codes:
     """Whether an object plays an actor of an active task."""
     bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
-    return facts.each(lambda b: code(b.id in bound))
+    return facts.among(bound)
 
 
 def is_named(facts: Facts, name: str) -> Codes:
@@ -143,37 +145,32 @@ def is_named(facts: Facts, name: str) -> Codes:
 
 def moving(facts: Facts) -> Codes:
     """Whether an object moves in the image."""
-    speed = facts.one("speed")
     still = STILL_SPEED * scale(facts.mind.frame_size)
-    return np.where(np.isnan(speed), MAYBE, np.where(speed > still, YES, NO)).astype(np.int8)
+    speeds = facts.one("speed").tolist()
+    codes = [MAYBE if v != v else code(v > still) for v in speeds]  # NaN is not equal to itself
+    return np.array(codes, dtype=np.int8)
 
 
 def whole(facts: Facts) -> Codes:
     """Whether an object is clear of the image border."""
-    return facts.each(lambda b: code(not at_border(b.region, facts.mind.frame_size, 0)))
+    width, height = facts.mind.frame_size
+
+    def clear(region: Region) -> bool:
+        x, y, w, h = region.bbox
+        return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
+
+    return facts.each(lambda b: code(clear(b.region)))
 
 
 def first_contact(facts: Facts) -> Codes:
     """Whether the second is what the first would meet first."""
-    times = facts.contact[1].copy()
-    known = times == times  # NaN is not equal to itself
-    np.fill_diagonal(known, False)
-    codes: Codes = known.astype(np.int8)
-    if not codes.any():
-        return codes  # MAYBE
-    np.negative(codes, out=codes)  # what is known is NO until it is first
-    times[~known] = np.inf
-    # Of several that are never met, the first one counts, so that one always does.
-    first = np.where(np.isfinite(times.min(axis=1)), times.argmin(axis=1), known.argmax(axis=1))
-    some = known.any(axis=1).nonzero()[0]
-    codes[some, first[some]] = YES
-    return codes
+    return facts.first_contact
 
 
 def lost(facts: Facts) -> Codes:
     """Whether an object is out of sight and nothing tells why."""
     known = tracks(facts.mind).of
-    return facts.each(lambda b: code(b.id in known and known[b.id].told == "lost"))
+    return facts.among([i for i in facts.ids if i in known and known[i].told == "lost"])
 
 
 def stale(facts: Facts, kind: str) -> Codes:
@@ -189,7 +186,7 @@ def healthy(facts: Facts) -> Codes:
 def depth_difference(facts: Facts) -> Floats:
     """Difference of depth as a share of the smaller one; both depths within their deviations."""
     depth = facts.one("depth")
-    if not (depth == depth).any():  # NaN is not equal to itself
+    if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
         return facts.unknown(2)
     spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
     apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
@@ -214,21 +211,25 @@ def spin(facts: Facts) -> Floats:
 
 
 def _since(moment: str) -> Callable[[Facts], Floats]:
+    read = attrgetter(moment)
+
     def look(facts: Facts) -> Floats:
-        return exactly(np.array([facts.mind.time - getattr(b, moment) for b in facts.beliefs]))
+        now = facts.mind.time
+        seconds = [now - read(b) for b in facts.beliefs]
+        return np.array((seconds, seconds))
 
     return look
 
 
 def _presence(wanted: Presence) -> Callable[[Facts], Codes]:
-    return lambda facts: facts.each(lambda b: code(b.presence is wanted))
+    return lambda facts: facts.among([b.id for b in facts.beliefs if b.presence is wanted])
 
 
 def in_forbidden_zone(facts: Facts) -> Codes:
     """Whether some part of an object is in a zone that is forbidden to all."""
     zones = [z.name for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
     if not zones:
-        return facts.each(lambda _: NO)
+        return facts.among(())
     codes: Codes = np.max([_zone("reaching")(facts, name) for name in zones], axis=0)
     return codes
 
@@ -278,15 +279,11 @@ WORDS: MappingProxyType[str, Word] = MappingProxyType(
 QUANTITIES: MappingProxyType[str, Quantity] = MappingProxyType(
     {
         "time_to_contact": Quantity(
-            _TWO, TIME, lambda f: between(f.contact[0], f.contact[2]), "until the outlines meet"
+            _TWO, TIME, lambda f: f.of_pairs(CONTACT), "until the outlines meet"
         ),
-        "gap": Quantity(_TWO, LENGTH, lambda f: exactly(f.pair("gap")), "between the outlines"),
-        "closing_speed": Quantity(
-            _TWO, SPEED, lambda f: between(f.closing[0], f.closing[2]), "of the distance"
-        ),
-        "relative_speed": Quantity(
-            _TWO, SPEED, lambda f: exactly(f.pair("relative_speed")), "in the image"
-        ),
+        "gap": Quantity(_TWO, LENGTH, lambda f: f.of_pairs(GAP), "between the outlines"),
+        "closing_speed": Quantity(_TWO, SPEED, lambda f: f.of_pairs(CLOSING), "of the distance"),
+        "relative_speed": Quantity(_TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"),
         "speed": Quantity(_ONE, SPEED, lambda f: exactly(f.one("speed")), "in the image"),
         "depth_difference": Quantity(_TWO, SHARE, depth_difference, "of the smaller depth"),
         "spin": Quantity(_ONE, TURNING, spin, "about itself"),

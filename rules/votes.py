@@ -93,7 +93,7 @@ class VoteSettings:
     settle_s: float = 0.8
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Ballot:
     """What is remembered of one object's votes.
 

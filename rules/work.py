@@ -68,22 +68,32 @@ class Work:
     doubts: Mapping[int, Doubt]
     settings: PresenceSettings
     events: list[Event] = field(default_factory=list)
+    _sorted: tuple[Mapping[int, ObjectBelief], list[ObjectBelief]] | None = None
 
     @property
     def now(self) -> float:
         """Seconds."""
         return self.observation.time
 
+    def objects(self) -> list[ObjectBelief]:
+        """All objects, by id."""
+        if self._sorted is None or self._sorted[0] is not self.mind.objects:
+            of = self.mind.objects
+            self._sorted = of, [of[i] for i in sorted(of)]
+        return self._sorted[1]
+
     def seen(self) -> list[ObjectBelief]:
         """Objects with a region now, confirmed or not, by id."""
-        return [b for _, b in sorted(self.mind.objects.items()) if b.last_seen == self.now]
+        now = self.now
+        return [b for b in self.objects() if b.last_seen == now]
 
     def missing(self) -> list[ObjectBelief]:
         """Confirmed objects without a region of their own now, unless they left."""
+        now, left = self.now, Presence.LEFT
         return [
             b
-            for _, b in sorted(self.mind.objects.items())
-            if b.confirmed and b.last_seen < self.now and b.presence is not Presence.LEFT
+            for b in self.objects()
+            if b.last_seen < now and b.confirmed and b.presence is not left
         ]
 
     def doubted(self, new: ObjectBelief, body: ObjectBelief | None = None) -> bool:
@@ -106,7 +116,12 @@ class Work:
     def near(self, a: Region, b: Region) -> bool:
         """Whether two regions are so close that one may hide a part of the other."""
         contact = self.settings.contact_px
-        if box_gap(a.bbox, b.bbox) > contact:
+        x, y, width, height = a.bbox
+        left, top, w, h = b.bbox
+        # Most pairs are far apart along one of the axes already.
+        if not (-w - contact <= left - x <= width + contact):
+            return False
+        if not (-h - contact <= top - y <= height + contact) or box_gap(a.bbox, b.bbox) > contact:
             return False
         # As far as relations look in the same step, so that the gap is worked out once.
         gap = outline_gap(a, b, max(contact, NEAR * scale(self.mind.frame_size)))

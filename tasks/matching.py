@@ -22,12 +22,16 @@ CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two act
 
 def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
     """Model names that an actor stands for: the user's word, else the task's, else its own name."""
-    return tuple(mind.actors.get(actor, ())) or task.models(actor)
+    return mind.actors.get(actor) or task.models(actor)
 
 
 def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
     """How strongly an object is believed to be one of some models, 0 to 1."""
-    return min(1.0, sum(c.share for c in belief.candidates if c.name in models))
+    total = 0.0
+    for candidate in belief.candidates:  # plain loops: this is asked many times in each step
+        if candidate.name in models:
+            total += candidate.share
+    return min(1.0, total)
 
 
 def match(

@@ -9,12 +9,12 @@ from visup.tasks.activity import ALONE, Activity
 from visup.tasks.readings import Reading
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TaskMemory:
     """What is remembered of one task from step to step.
 
     Attributes:
-        time: Seconds of the last step.
+        time: Seconds of the step in which it was last followed.
         readings: The courses followed; empty until its first actors are found.
         belief: What was last believed.
         interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
@@ -26,7 +26,8 @@ class TaskMemory:
         rival_since: Since when it has been the better one.
         lasting: Since when what is no plain relation of the mind has been true, by key.
         activity: Whether it is going on, where several tasks are given.
-        gain: The evidence of the last step that it is.
+        gain: The evidence that it is, of each second, as it was seen last.
+        inferred: Seconds of the step in which it was last inferred whether it is.
     """
 
     time: float
@@ -41,3 +42,4 @@ class TaskMemory:
     lasting: tuple[tuple[str, float], ...] = ()
     activity: Activity = ALONE
     gain: float = 0.0
+    inferred: float = 0.0

@@ -43,7 +43,7 @@ NEARER, OVER, BEGUN = 1, 2, 3
 See = Callable[[Step], Sighting]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Reading:
     """One course that what was seen may have taken.
 
@@ -187,26 +187,25 @@ class Follower:
         )
         return min(1.0, sum(hopes))
 
-    def gain(self, reading: Reading, see: See, dt: float) -> float:
-        """The evidence of `dt` seconds that a task is going on, as a reading has it.
+    def gain(self, reading: Reading, see: See) -> float:
+        """The evidence of a second that a task is going on, as a reading has it.
 
         The logarithm of how much likelier what is seen is than in a scene where none of it is asked
         for: there what holds is as seldom as here its contrary.
         """
         if reading.finished is not None:
             return 0.0
-        return sum(self._gain(x, see(x.step), dt) for x in leaves(reading.state))
+        return sum(self._gain(x, see(x.step)) for x in leaves(reading.state))
 
-    def _gain(self, leaf: Leaf[Watch], seen: Sighting, dt: float) -> float:
+    def _gain(self, leaf: Leaf[Watch], seen: Sighting) -> float:
+        fit = self.process.fit
         if not seen.observed or self._over(leaf):
             return 0.0
         if seen.contrary is not None and (seen.stern or seen.holds is not Truth.TRUE):
-            return math.log(self.process.fit(Seen.CONTRARY, seen.contrary.confidence, dt))
+            return math.log(fit(Seen.CONTRARY, seen.contrary.confidence, 1.0))
         if seen.helps is not None:
-            return -math.log(self.process.fit(Seen.CONTRARY, seen.helps.confidence, dt))
-        return (
-            0.0 if leaf.watch.begun is None else math.log(self.process.fit(Seen.NEITHER, 1.0, dt))
-        )
+            return -math.log(fit(Seen.CONTRARY, seen.helps.confidence, 1.0))
+        return 0.0 if leaf.watch.begun is None else math.log(fit(Seen.NEITHER, 1.0, 1.0))
 
     def place(self, reading: Reading) -> Place:
         """Where a reading is by the model: its phases are read off what is kept of its steps."""

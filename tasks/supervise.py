@@ -45,6 +45,7 @@ MEMORY = "tasks"
 OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
 LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
+SILENT_S = 0.2  # a task that is not told about is looked at no more often than this
 
 
 def task_thinker(
@@ -71,8 +72,9 @@ def task_thinker(
 
     def think(mind: Mind, observation: Observation) -> Outcome:
         before = _recall(mind, followers)
-        seen = tuple(_follow(f, m, mind) for f, m in zip(followers, before, strict=True))
-        new = _inferred(before, seen)
+        each = zip(followers, before, strict=True)
+        seen = tuple(_follow(f, m, mind) if _due(m, mind.time) else m for f, m in each)
+        new = _inferred(before, seen, mind.time)
         believed = mind.remember(MEMORY, new, tasks=tuple(m.belief for m in new))
         steps = list(zip(followers, before, new, strict=True))
         events = tuple(e for step in steps for e in _events(*step, mind))
@@ -115,27 +117,37 @@ def _blank(follower: Follower, now: float, activity: Activity) -> TaskMemory:
     stages = tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task))
     belief = TaskBelief(follower.task.name, Verdict.UNKNOWN, stages, active=activity.chance)
     broken = (None,) * len(follower.task.invariants)
-    return TaskMemory(now, (), belief, broken_since=broken, activity=activity)
+    return TaskMemory(now, (), belief, broken_since=broken, activity=activity, inferred=now)
+
+
+def _due(memory: TaskMemory, now: float) -> bool:
+    """Whether a task is followed in this step.
+
+    One that is told about is, in each step. Those that are not are looked at together, so that none
+    of some rivals has a lead, at their own pace: it costs that one of them is told so much later.
+    """
+    return memory.activity.audible or not 0.0 < now - memory.time < SILENT_S - 1e-9
 
 
 def _inferred(
-    before: tuple[TaskMemory, ...], seen: tuple[TaskMemory, ...]
+    before: tuple[TaskMemory, ...], seen: tuple[TaskMemory, ...], now: float
 ) -> tuple[TaskMemory, ...]:
     """What is remembered of tasks once it is inferred which of them are going on."""
     if len(seen) == 1:
         return seen
+    dt = now - before[0].inferred
     cast = [
         frozenset(b.object_id for b in m.belief.bindings if b.object_id is not None) for m in seen
     ]
     activities = weighed(
         [m.activity for m in before],
-        [m.gain for m in seen],
+        [m.gain * dt for m in seen],
         cast,
-        seen[0].time - before[0].time,
+        dt,
         [a.belief.verdict in OVER or _ends(a, b) for a, b in zip(before, seen, strict=True)],
     )
     each = zip(before, seen, activities, strict=True)
-    return tuple(_heard(old.belief, new, activity) for old, new, activity in each)
+    return tuple([_heard(old.belief, new, activity, now) for old, new, activity in each])
 
 
 def _ends(before: TaskMemory, now: TaskMemory) -> bool:
@@ -143,22 +155,25 @@ def _ends(before: TaskMemory, now: TaskMemory) -> bool:
     return before.activity.audible and now.belief.verdict in OVER
 
 
-def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity) -> TaskMemory:
+def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity, now: float) -> TaskMemory:
     """A memory with its activity; of a task that is not going on nothing is believed but that.
 
     What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
     what interrupts it, which is no matter of the task.
     """
+    if memory.belief is told and memory.activity == activity:
+        return replace(memory, inferred=now)
     belief = replace(memory.belief, active=activity.chance)
     over = told.verdict in OVER or any(s.status in BAD for s in told.stages)
     if activity.audible or over or memory.interrupted:
-        return replace(memory, activity=activity, belief=belief)
+        return replace(memory, activity=activity, belief=belief, inferred=now)
     readings = memory.readings
     if memory.activity.begun and not activity.begun:
         readings = ()  # a rival has ended; what follows is another matter
     if any(x.watch.status in BAD for r in readings[:1] for x in leaves(r.state)):
         readings = ()  # if it begins yet, it begins from its beginning
-    return replace(memory, activity=activity, belief=hushed(belief, activity), readings=readings)
+    belief = hushed(belief, activity)
+    return replace(memory, activity=activity, belief=belief, readings=readings, inferred=now)
 
 
 def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:
@@ -170,7 +185,7 @@ def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:
     if readings:
         dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.readings else 0.0
         readings = follower.follow(readings, scene.see, now, dt)
-        gain = follower.gain(readings[0], scene.see, dt)
+        gain = follower.gain(readings[0], scene.see) if memory.readings else 0.0
     broken = broken_since(follower, scene, memory)
     strange = _strange(follower, scene, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
@@ -194,6 +209,7 @@ def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:
         scene.since,
         memory.activity,
         gain,
+        memory.inferred,
     )
 
 

@@ -14,7 +14,7 @@ from visup.tasks.settings import TaskSettings
 BAD = (Status.FAILING, Status.FAILED)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Watch:
     """What is kept about a step under way; times in seconds.
 

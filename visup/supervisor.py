@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from visup.agent import Behaviour, Mind, Severity, Verdict
+from visup.agent import Behaviour, Contract, Mind, Severity, Verdict
 from visup.agent.agent import Agent, Observer, Thinkers
 from visup.agent.errors import SettingsError
 from visup.agent.limits import Limits
@@ -18,8 +18,9 @@ from visup.percepts.shape.database import ModelDatabase
 from visup.percepts.video import Source, open_source
 from visup.plugins import plug_ins
 from visup.rules.attention import Attend
-from visup.rules.language import load_rules
+from visup.rules.language import load_rules, shipped_rules
 from visup.rules.thinkers import default_thinkers
+from visup.rules.waking import Wake, wakeful, waking_rules
 from visup.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.structure import sizes, task_actors, undrawn
@@ -28,6 +29,7 @@ from visup.troubles import tell_troubles
 from visup.zones import load_zones
 
 if TYPE_CHECKING:
+    from visup.rules.formula import Rule
     from visup.tasks.tree import Task
 
 LIVE_HANG_S = 20.0
@@ -76,14 +78,16 @@ def build_agent(
     _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
+    behaviours = [*_behaviours(settings, database, sizes(tasks, settings.actors)), *also]
+    contracts = [b.contract for b in behaviours]
     return Agent(
-        behaviours=[*_behaviours(settings, database, sizes(tasks, settings.actors)), *also],
-        thinkers=_thinkers(settings, tasks),
+        behaviours=behaviours,
+        thinkers=_thinkers(settings, tasks, contracts),
         actors=settings.actors,
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
-        limits=_limits(settings, live),
+        limits=replace(_limits(settings, live), wakeful=wakeful(contracts, _rules(settings))),
     )
 
 
@@ -141,12 +145,18 @@ def _behaviours(
     return [*seeing, *plug_ins(settings)]
 
 
-def _thinkers(settings: WatchSettings, tasks: Sequence[Task]) -> Thinkers:
-    rules = tuple(rule for path in settings.rules for rule in load_rules(path))
-    interpreting = default_thinkers(rules=rules or None)
+def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
+    return tuple(r for path in settings.rules for r in load_rules(path)) or shipped_rules()
+
+
+def _thinkers(
+    settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
+) -> Thinkers:
+    interpreting = default_thinkers(rules=_rules(settings))
     following = (task_thinker(tasks),) if tasks else ()
     attending = (Attend(),) if settings.attention else ()
-    match = (*following, *attending, tell_troubles)
+    waking = waking_rules(contracts)
+    match = (*following, *attending, *((Wake(waking),) if waking else ()), tell_troubles)
     return Thinkers(interpreting.update, interpreting.cogitate, match)
 
 

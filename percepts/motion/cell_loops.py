@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.compiled import compiled
+from visup.compiled import compiled
 from visup.percepts.motion.image import Floats
 
 Labels = NDArray[np.int32]

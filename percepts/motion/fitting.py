@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.compiled import compiled
+from visup.compiled import compiled
 from visup.percepts.motion.image import Floats
 
 WINDOW = 21  # pixels: side of the window whose tones are compared

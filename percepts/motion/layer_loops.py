@@ -7,7 +7,7 @@ from math import log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.compiled import compiled
+from visup.compiled import compiled
 from visup.percepts.motion.image import Floats
 
 Doubles = NDArray[np.float64]

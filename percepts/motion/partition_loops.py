@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.compiled import compiled
+from visup.compiled import compiled
 from visup.percepts.motion.image import Floats
 
 Labels = NDArray[np.int32]

@@ -7,7 +7,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.compiled import compiled
+from visup.compiled import compiled
 from visup.percepts.motion.image import Floats
 
 MOST = 60.0  # grey levels by which a pixel may speak against a shift

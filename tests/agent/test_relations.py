@@ -8,29 +8,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Column, Mind, Relation, RelationTable, Truth
+from visup.agent.cells import Cells, Columns
 from visup.agent.encode import plain
 
 IDS = (2, 5, 9)
 PAIRS = ((2, 5), (2, 9), (5, 9))
 
 
-def column(
-    names: tuple[str, ...], state: list[list[int]], listed: str, value: float = np.nan
-) -> Column:
-    codes = np.array(state, dtype=np.int8)
-    ones = np.ones(codes.shape)
-    return Column(names, codes, 3.0 * ones, 0.5 * ones, np.full(codes.shape, value), None, listed)
-
-
-TABLE = RelationTable(
-    IDS,
+NAMES = (("closing", "steady"), ("left_of", "right_of"), ("", "seldom"))
+COLUMNS = Columns(
     (
-        column(("closing", "steady"), [[0, 1, -1]], "each", 7.0),
-        column(("left_of", "right_of"), [[0, 1, 0], [1, 0, 1]], "one"),
-        column(("", "seldom"), [[1, 0, 1]], "none"),
-    ),
-    (Relation("coupled", (2, 9), Truth.TRUE, 1.0),),
+        Column(NAMES[0], (0, 0), 0, 1),
+        Column(NAMES[1], (1, 2), 0, listed="one"),
+        Column(NAMES[2], (3, 3), 0, listed="none"),
+    )
 )
+STATE = np.array([[0, 1, -1], [0, 1, 0], [1, 0, 1], [1, 0, 1]], dtype=np.int8)
+CELLS = Cells(COLUMNS, STATE, np.full((4, 3), 3.0), np.array([[0.5] * 3, [7.0] * 3]))
+TABLE = RelationTable(IDS, (CELLS,), (Relation("coupled", (2, 9), Truth.TRUE, 1.0),))
 
 
 def test_a_table_lists_what_its_columns_list_and_what_was_given() -> None:

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from visup.compiled import compiled
 from visup.percepts.motion.cell_loops import weighed
-from visup.percepts.motion.compiled import compiled
 from visup.percepts.motion.layer_loops import (
     likelihoods,
     median,

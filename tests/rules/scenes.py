@@ -17,6 +17,7 @@ from visup.agent import (
     Report,
     ReportState,
 )
+from visup.rules.outlines import reach
 
 SIZE = (640, 480)
 Rect = tuple[float, float, float, float]
@@ -78,3 +79,10 @@ def seen(
         (Percept("health", Health(health), now, "health"),),
     )
     return Observation(index, now, SIZE, (seeing, fit))
+
+
+def reach_of(region: Region) -> tuple[np.ndarray, np.ndarray]:
+    """How far a region's outline reaches in each direction, and whether it is clear of the border there."""
+    support, free = np.empty(16), np.empty(16, dtype=bool)
+    reach(region, SIZE, support, free)
+    return support, free

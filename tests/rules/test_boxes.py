@@ -17,13 +17,15 @@ from visup.evaluation.relations import (
     rcc8_wrong,
 )
 from visup.rules.boxes import Boxes, BoxSettings, watch_boxes
-from visup.rules.direction import CONVERSE, DIRECTION_NAMES, directions
-from visup.rules.distance import CLASS_NAMES, classes, signed_gap, sizes
+from visup.rules.direction import CONVERSE, DIRECTION_NAMES
+from visup.rules.distance import CLASS_NAMES
 from visup.rules.geometry import RCC8, Floats
 from visup.rules.judge import AWAY, DIRECTION, DISTANCE, SIDE, JudgeSettings
+from visup.rules.judge_loops import box_gaps, components, direction, distance_class, size_of
 from visup.rules.latch import UNKNOWN
-from visup.rules.qtc import components, text
-from visup.rules.rcc8 import edge_differences, rcc8
+from visup.rules.pairs import pairs
+from visup.rules.qtc import text
+from visup.rules.rcc8 import rcc8
 
 A = (100.0, 200.0, 80.0, 60.0)
 MIRROR = {"converging": "diverging", "diverging": "converging"}
@@ -62,8 +64,8 @@ def test_qtc_of_published_figures(
 ) -> None:
     at, v = np.array(places), np.array(velocities)
     assert qtc_by_definition(at, v) == expected
-    speeds, _ = components(at.astype(float), v.astype(float))
-    assert text(*(int(s) + 1 for s in np.sign(speeds[:, 0]))) == expected
+    speeds = components(at.astype(float), v.astype(float), 0, 1)[:4]
+    assert text(*(int(s) + 1 for s in np.sign(speeds))) == expected
 
 
 @settings(max_examples=60, deadline=None)
@@ -94,9 +96,10 @@ def test_time_that_runs_backwards_turns_every_movement_round(seed: int) -> None:
     frames = moving_boxes(3, 60, seed, noise=0.0)
     there, back = watched(frames), watched(frames[::-1])
     assert np.allclose(there.velocity, -back.velocity)
-    places = frames[0, :, :2]
-    speeds, _ = components(places, there.velocity)
-    assert np.allclose(components(places, back.velocity)[0], -speeds)
+    places = frames[0, :, :2].copy()
+    for i, j in zip(*pairs(len(places)), strict=True):
+        speeds = np.array(components(places, there.velocity, i, j)[:4])
+        assert np.allclose(components(places, back.velocity, i, j)[:4], -speeds)
 
 
 @pytest.mark.parametrize(("speed", "name"), [(-40, "converging"), (40, "diverging")])
@@ -161,11 +164,9 @@ def test_a_box_out_of_sight_is_unknown_and_another_comes_as_unknown() -> None:
 def test_directions_are_cones_about_their_axes(turn: int) -> None:
     angle = np.pi / 4 * turn
     for off in (-0.35, 0.0, 0.35):
-        at = np.array([(100 * np.cos(angle + off), 100 * np.sin(angle + off)), (0.0, 0.0)])
-        code = directions(at, np.array([UNKNOWN], dtype=np.int8), (1.0, 2.0), 0.0, 0.0)
-        back = directions(at[::-1], np.array([UNKNOWN], dtype=np.int8), (1.0, 2.0), 0.0, 0.0)
-        assert code[0] == turn
-        assert back[0] == CONVERSE[turn]
+        x, y = 100 * np.cos(angle + off), 100 * np.sin(angle + off)
+        assert direction(x, y, UNKNOWN, (1.0, 2.0), 0.0, 0.0) == turn
+        assert direction(-x, -y, UNKNOWN, (1.0, 2.0), 0.0, 0.0) == CONVERSE[turn]
     assert CONVERSE[UNKNOWN] == UNKNOWN
     assert DIRECTION_NAMES[6] == "north_of"
 
@@ -173,19 +174,23 @@ def test_directions_are_cones_about_their_axes(turn: int) -> None:
 def test_directions_are_kept_a_little_beyond_their_cone() -> None:
     edge = np.pi / 8
     for beyond, kept in ((0.04, 0), (0.12, 1)):
-        at = np.array([(100 * np.cos(edge + beyond), 100 * np.sin(edge + beyond)), (0.0, 0.0)])
-        before = np.zeros(1, dtype=np.int8)
-        assert directions(at, before, (1.0, 2.0), np.deg2rad(5.0), 0.0)[0] == kept
+        x, y = 100 * np.cos(edge + beyond), 100 * np.sin(edge + beyond)
+        assert direction(x, y, 0, (1.0, 2.0), np.deg2rad(5.0), 0.0) == kept
 
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.floats(0.2, 5.0))
 def test_distance_classes_grow_with_the_gap_and_not_with_the_scale(seed: int, scale: float) -> None:
     boxes = moving_boxes(6, 1, seed)[0]
-    gap, size = signed_gap(edge_differences(boxes)), sizes(boxes)
-    new = np.full(len(gap), UNKNOWN, dtype=np.int8)
-    code = classes(gap, size, new, 0.1, 0.5)
-    assert (classes(gap * scale, size * scale, new, 0.1, 0.5) == code).all()
+    gap, two = box_gaps(boxes), zip(*pairs(len(boxes)), strict=True)
+    size = np.array([size_of(boxes, i, j) for i, j in two])
+
+    def classes(scale: float) -> np.ndarray:
+        found = zip(scale * gap, scale * size, strict=True)
+        return np.array([distance_class(g, s, UNKNOWN, 0.1, 0.5) for g, s in found])
+
+    code = classes(1.0)
+    assert (classes(scale) == code).all()
     order = np.argsort(gap / size)
     assert (np.diff(code[order]) >= 0).all()
     assert set(code.tolist()) <= set(range(len(CLASS_NAMES)))
@@ -197,7 +202,7 @@ def test_gaps_are_the_distances_of_boxes_and_the_depth_of_their_overlap() -> Non
         ((183, 264, 10, 10), 5.0),
         ((170, 210, 80, 20), -10.0),
     ):
-        assert signed_gap(edge_differences(np.array([A, other], float)))[0] == pytest.approx(gap)
+        assert box_gaps(np.array([A, other], float))[0] == pytest.approx(gap)
 
 
 def test_states_are_rows_of_codes_that_the_calculi_have() -> None:

@@ -23,6 +23,7 @@ from visup.rules.facts import Facts
 from visup.rules.language import parse_rules, shipped_rules
 from visup.rules.safety import SAFETY, RuleThinker
 from visup.rules.thinkers import default_thinkers
+from visup.rules.vocabulary import RULES
 from visup.rules.zones import SeeZones
 
 NOTHING = Observation(0, 0.0, (640, 480))
@@ -261,8 +262,9 @@ def test_facts_of_pairs_stand_in_the_order_of_their_objects() -> None:
     facts = Facts(mind)
     assert facts.ids == (1, 2)
     assert facts.related("converging").tolist() == [[-1, 1], [1, -1]]
-    assert facts.contact[1, 0, 1] == facts.contact[1, 1, 0] > 0
-    assert facts.contact[0, 0, 1] <= facts.contact[1, 0, 1] <= facts.contact[2, 0, 1]
+    soonest, latest = RULES.quantities["time_to_contact"].look(facts)
+    assert 0 < soonest[0, 1] == soonest[1, 0] <= latest[0, 1] == latest[1, 0]
+    assert facts.first_contact.tolist() == [[0, 1], [1, 0]]
 
 
 def test_the_command_checks_and_lists_rules(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import binary_dilation, binary_erosion
 
-from tests.rules.scenes import SIZE, box_region
+from tests.rules.scenes import SIZE, box_region, reach_of
 from visup.agent import Region
 from visup.evaluation.relation_oracles import rcc8_by_definition
 from visup.rules.geometry import (
@@ -15,10 +15,10 @@ from visup.rules.geometry import (
     hull_separation,
     moved,
     pixels_in,
-    reach,
     shared_pixels,
 )
-from visup.rules.latch import UNKNOWN, hold_sign
+from visup.rules.judge_loops import hold_sign
+from visup.rules.latch import UNKNOWN
 from visup.rules.outlines import outline_gap
 from visup.rules.rcc8 import from_outline_signs, outline_differences, rcc8
 
@@ -90,7 +90,7 @@ def test_hull_separation_is_signed_symmetric_and_moves_at_most_as_far_as_a_body(
     one, two = box_region(1, a), box_region(2, b)
     assert one is not None
     assert two is not None
-    support = np.stack([reach(one, SIZE).support, reach(two, SIZE).support])
+    support = np.stack([reach_of(one)[0], reach_of(two)[0]])
     apart = hull_separation(support)
     assert apart[0, 1] == pytest.approx(apart[1, 0])
     other = support.copy()
@@ -101,14 +101,14 @@ def test_hull_separation_is_signed_symmetric_and_moves_at_most_as_far_as_a_body(
 @pytest.mark.parametrize(("x", "expected"), [(140, 21), (119, 0), (99, -20)])
 def test_hull_separation_of_boxes_side_by_side(x: int, expected: float) -> None:
     regions = [box_region(1, (20, 20, 100, 60)), box_region(2, (x, 20, 50, 60))]
-    support = np.stack([reach(r, SIZE).support for r in regions if r is not None])
+    support = np.stack([reach_of(r)[0] for r in regions if r is not None])
     assert hull_separation(support)[0, 1] == pytest.approx(expected)
 
 
 def test_reach_knows_where_the_border_cuts() -> None:
     region = box_region(1, (-20, 100, 80, 40))
     assert region is not None
-    free = reach(region, SIZE).free
+    free = reach_of(region)[1]
     assert not free[8]
     assert free[0]
 
@@ -155,7 +155,7 @@ def test_rcc8_of_outlines_is_that_of_masks(a: tuple[int, ...], b: tuple[int, ...
     regions = [box_region(n, rect) for n, rect in enumerate(rects)]
     one, two = (r for r in regions if r is not None)
     for first, second in ((one, two), (two, one)):
-        apart = outline_differences((first, second), np.ones(1, bool), np.ones(1, bool), 40.0)
+        apart = outline_differences((first, second), (0,))
         signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
         assert RCC8[from_outline_signs(signs)[0]] == by_masks(first, second, 2)
 
@@ -170,6 +170,6 @@ def test_outlines_of_an_l_hold_a_box_in_their_corner_that_their_boxes_do_not() -
     assert box is not None
     boxes = np.array([hook.bbox, box.bbox], dtype=float)
     assert RCC8[rcc8(boxes)[1, 0]] == "non_tangential_proper_part"
-    apart = outline_differences((hook, box), np.ones(1, bool), np.ones(1, bool), 40.0)
+    apart = outline_differences((hook, box), (0,))
     signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
     assert RCC8[from_outline_signs(signs)[0]] == "disconnected"

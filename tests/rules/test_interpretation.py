@@ -16,15 +16,15 @@ from scipy.spatial.transform import Rotation
 from visup.agent import Hypothesis
 from visup.agent.viewing import views
 from visup.rules.interpretation import (
-    NONE,
     Tree,
     TreeSettings,
     Turning,
     grown,
-    level_of,
+    levels_of,
     planted,
     rival_gap,
 )
+from visup.rules.tree_loops import NONE
 
 WIDE = TreeSettings(most_paths=10_000)
 Look = tuple[float, tuple[Hypothesis, ...]]
@@ -86,8 +86,7 @@ def ranked(hypotheses: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
 def grow(looks: Sequence[Look], turning: Turning, s: TreeSettings) -> Tree:
     tree = planted(s)
     for time, hs in looks:
-        best = max((h.similarity for h in hs), default=0.0)
-        level = level_of(hs, time, best, s) if hs else None
+        level = levels_of(hs, time, s)[hs[0].name] if hs else None
         tree = grown(tree, level, time, turning, s)
     return tree
 
@@ -151,7 +150,7 @@ def test_memory_is_bounded_whatever_is_hypothesised(seed: int) -> None:
     s = TreeSettings()
     tree = planted(s)
     for time, hs in random_looks(seed, 300, 12):
-        level = level_of(hs, time, 1.0, s) if hs else None
+        level = levels_of(hs, time, s)[hs[0].name] if hs else None
         assert level is None or len(level.views) <= s.most_hypotheses
         tree = grown(tree, level, time, Turning(), s)
         assert len(tree.cost) <= s.most_paths
@@ -228,10 +227,10 @@ def test_between_two_views_lies_what_both_tell() -> None:
     s = TreeSettings()
     sides = [(1.0, 0.0, 0.0), (np.cos(0.3), np.sin(0.3), 0.0)]
     said = [Hypothesis(1, "m", k, 0.8, 0.0, direction=d) for k, d in enumerate(sides)]
-    level = level_of(said, 0.0, 0.8, s)
+    level = levels_of(said, 0.0, s)["m"]
     told = -level.between[0][2]
     assert degrees(np.arctan2(told[1], told[0])) == pytest.approx(degrees(0.15), abs=0.01)
-    better = level_of([said[0], replace(said[1], similarity=0.6)], 0.0, 0.8, s)
+    better = levels_of([said[0], replace(said[1], similarity=0.6)], 0.0, s)["m"]
     assert np.arctan2(*(-better.between[0][2])[[1, 0]]) < 0.02
 
 
@@ -246,5 +245,5 @@ def test_between_views_that_stand_wider_apart_greater_differences_tell_as_much(
         Hypothesis(1, "m", 0, 0.8, 0.0, direction=(1.0, 0.0, 0.0)),
         Hypothesis(1, "m", 1, lower, 0.0, direction=(np.cos(apart), np.sin(apart), 0.0)),
     ]
-    told = -level_of(said, 0.0, 0.8, s).between[0][2]
+    told = -levels_of(said, 0.0, s)["m"].between[0][2]
     assert np.arctan2(told[1], told[0]) / apart == pytest.approx(0.378, abs=0.02)

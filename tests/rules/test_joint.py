@@ -10,7 +10,8 @@ from scipy.stats import multivariate_normal
 
 from tests.rules.scenes import SIZE, box_region
 from visup.agent import Region
-from visup.rules.joint import Joint, Kept, Motion, begun, follow, motion, step_across
+from visup.rules.joint import Joint, Kept, Motion, begun, follow, motion
+from visup.rules.outline_loops import step_across
 
 STILL, MOVING = 2.0, 10.0
 speeds = st.floats(-40.0, 40.0)
@@ -69,8 +70,8 @@ def test_a_step_onto_an_outline_is_that_of_weighted_least_squares(seed: int, wid
     across = (off * normals).sum(axis=1)
     weight = 1.0 / np.maximum(np.abs(across), 1.5)
     square = (normals * weight[:, None]).T @ normals
-    found = step_across(normals, off)
-    if found is None:
+    known, *found = step_across(normals, off, len(off), 1.5)
+    if not known:
         assert np.linalg.cond(square) > 49.0
     else:
         assert np.linalg.cond(square) < 51.0
@@ -114,6 +115,44 @@ def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
     found = motion(joint(path), path[-1][0], 0.3) if path else None
     assert (found is not None) == known
     assert found is None or found.span >= 0.6 * 0.3 - 1e-6
+
+
+def by_arrays(path: np.ndarray, now: float, window: float) -> Motion:
+    """`motion` by matrices."""
+    steps = np.diff(path[:, 1:3], axis=0)
+    noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
+    inside = int((path[:, 0] > now - window - 1e-6).sum())
+    long = int((path[:, 0] > path[-1, 0] - 0.6 * window + 1e-6).sum()) + 1
+    recent = path[-max(inside, long, 5) :]
+    span = float(recent[-1, 0] - recent[0, 0])
+    t = recent[:, 0] - recent[:, 0].mean()
+    slope, spread = t @ recent[:, 1:3] / (t @ t), noise / (t @ t)
+    flow = recent[np.isfinite(recent[:, 5]), 3:]
+    if not len(flow):
+        return Motion(slope, spread, span)
+    certain = max(1.0, span / 0.2) / flow[:, 2].mean() * np.eye(2)
+    both = np.linalg.inv(np.linalg.inv(spread) + certain)
+    mean = np.linalg.solve(spread, slope) + certain @ flow[:, :2].mean(axis=0)
+    return Motion(both @ mean, both, span)
+
+
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.sampled_from([0.0, 0.1, 1.0]))
+def test_motion_is_that_of_matrices(seed: int, told: bool, later: float) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(6, 30))
+    path = np.full((count, 6), np.nan)
+    path[:, 0] = np.cumsum(rng.choice([0.04, 0.08, 0.12], count))
+    path[:, 1:3] = np.cumsum(rng.normal(0.0, 1.0, (count, 2)), axis=0)
+    if told:
+        path[:, 3:] = rng.uniform(0.1, 2.0, (count, 3))
+        path[rng.random(count) < 0.3, 3:] = np.nan
+    now = float(path[-1, 0]) + later
+    found = motion(joint([tuple(p) for p in path.tolist()]), now, 0.3)
+    expected = by_arrays(path, now, 0.3)
+    assert found is not None
+    assert found.span == pytest.approx(expected.span)
+    assert np.allclose(found.velocity, expected.velocity)
+    assert np.allclose(found.covariance, expected.covariance)
 
 
 @pytest.mark.parametrize("count", range(6))

@@ -17,13 +17,14 @@ from visup.evaluation.rule_formulas import (
 from visup.evaluation.rule_oracle import robustness
 from visup.evaluation.rules import alike
 from visup.rules.formula import Formula, Predicate
-from visup.rules.intervals import Arrays, Interval
+from visup.rules.intervals import Interval
 from visup.rules.language import parse_formula
+from visup.rules.layout import Layout
 from visup.rules.monitor import Monitor, verdict
 from visup.rules.operators import most_samples
-from visup.rules.program import Compiler, Moment
+from visup.rules.program import Compiler
 from visup.rules.ruled import Ruled
-from visup.rules.terms import Measure
+from visup.rules.states import States
 from visup.rules.units import ticks
 from visup.rules.verdicts import rerowed
 from visup.rules.vocabulary import signals
@@ -60,33 +61,35 @@ def cast(rng: Random, count: int) -> Iterator[tuple[int, ...]]:
         yield tuple(sorted(here))
 
 
-def looking(objects: dict[int, dict[str, Interval]], ids: tuple[int, ...]) -> Any:
-    def look(node: Predicate | Measure, axes: tuple[int, ...]) -> Any:
-        values = [objects[i][node.name] for i in ids]
-        return np.array(values, dtype=float).reshape(len(ids), 2).T
-
-    return look
+def sampled(
+    layout: Layout, states: States, now: int, objects: dict[int, dict[str, Interval]]
+) -> tuple[States, Any]:
+    """One sample of the signals of some objects: the states after it, and all intervals."""
+    arena = np.full(layout.size, np.nan)
+    for step, node in layout.program.looks():
+        values = [objects[i][node.name] for i in sorted(objects)]
+        at = layout.places[step]
+        arena[at : at + 2 * layout.n] = np.array(values, dtype=float).reshape(layout.n, 2).T.ravel()
+    return layout.step(states, now, np.zeros(0, np.int8), arena), arena
 
 
 def by_arrays(
     formula: Formula, times: list[float], seen: list[dict[int, dict[str, Interval]]]
 ) -> list[dict[int, Interval]]:
     """The formula of `a` for all objects at once, as rules are judged."""
-    compiler = Compiler(Arrays(1))
+    compiler = Compiler()
     place = compiler.formula(formula, (("a", False),))
     prepared = Ruled((), compiler, ())
-    states, ids = prepared.program.fresh, tuple[int, ...]()
+    ids = tuple(sorted(seen[0]))
+    states = prepared.fresh(len(ids))
     told: list[dict[int, Interval]] = []
     for time, objects in zip(times, seen, strict=True):
         now = tuple(sorted(objects))
-        if told and now != ids:
+        if now != ids:
             states = rerowed(prepared, states, ticks(time), ids, now)
-        ids = now
-
-        moment = Moment(ticks(time), states, looking(objects, ids))
-        value = np.broadcast_to(prepared.program.step(moment)[place.step], (2, len(ids)))
-        states = tuple(moment.after)
-        told.append({i: (float(value[0, k]), float(value[1, k])) for k, i in enumerate(ids)})
+        ids, layout = now, prepared.layout(len(now))
+        states, arena = sampled(layout, states, ticks(time), objects)
+        told.append({i: layout.interval(place.step, (k,), arena) for k, i in enumerate(ids)})
     return told
 
 
@@ -134,15 +137,15 @@ def test_facts_keep_one_moment_and_are_judged_as_the_oracle_judges_numbers_witho
         truth = robustness(
             formula, [(ticks(t), {"x": bounds[c]}) for t, c in zip(times, codes, strict=True)]
         )
-        compiler = Compiler(Arrays(1))
+        compiler = Compiler()
         place = compiler.formula(fact_for(formula), (("a", False),))
-        states: tuple[Any, ...] = compiler.program.fresh
+        layout = Ruled((), compiler, ()).layout(1)
+        states = layout.fresh
         for time, code, expected in zip(times, codes, truth, strict=True):
-            value = np.array(bounds[code]).reshape(2, 1)
-            moment = Moment(ticks(time), states, lambda node, axes, v=value: v)  # type: ignore[misc]
-            found = compiler.program.step(moment)[place.step]
-            states = tuple(moment.after)
-            assert (found[0, 0], found[1, 0]) == expected, f"{seed}: {formula}"
+            arena = np.full(layout.size, np.nan)
+            states = layout.step(states, ticks(time), np.array([code], np.int8), arena)
+            found = layout.interval(place.step, (0,), arena)
+            assert found == expected, f"{seed}: {formula}"
 
 
 def fact_for(formula: Formula) -> Formula:

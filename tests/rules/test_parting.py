@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.rules.runs import Thought, think
-from tests.rules.scenes import SIZE, box_region, seen
+from tests.rules.scenes import box_region, reach_of, seen
 from visup.agent import ObjectBelief, Presence, Region, Truth
-from visup.rules.geometry import reach
-from visup.rules.parting import parting_speed
+from visup.rules.geometry import DIRECTIONS
+from visup.rules.measure import sightings
+from visup.rules.measure_loops import parting
 from visup.rules.thinkers import default_thinkers
 
 Velocity = tuple[float, float]
@@ -26,7 +27,8 @@ def body(id_: int, left: float, velocity: Velocity, sigma: float = 0.5) -> Regio
 
 def pair(a: Region, b: Region) -> tuple[np.ndarray, np.ndarray]:
     objects = tuple(ObjectBelief(r.id, r, Presence.SEEN, 0.0, 1.0) for r in (a, b))
-    return parting_speed(objects, np.array([reach(r, SIZE).support for r in (a, b)]), 1.0)
+    support = np.array([reach_of(r)[0] for r in (a, b)])
+    return parting(support, sightings(objects, 1.0), DIRECTIONS)
 
 
 @settings(max_examples=40, deadline=None)

@@ -8,9 +8,10 @@ import pytest
 from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Relation, Truth
+from visup.rules.relation_loops import trend, with_depth
 from visup.rules.relations import measured
 from visup.rules.thinkers import default_thinkers
-from visup.rules.trend import CONVERGING, DIVERGING, KEEPING, wanted_trend, with_depth
+from visup.rules.trend import CONVERGING, DIVERGING, KEEPING
 
 Place = Callable[[float], float]
 
@@ -169,27 +170,31 @@ def test_time_runs_out_of_a_bounded_memory() -> None:
 
 
 def test_trend_thresholds_have_hysteresis() -> None:
-    before = np.array([[KEEPING, CONVERGING, CONVERGING, DIVERGING, KEEPING]], dtype=np.int8)
-    rate = np.array([[-1.2, -1.2, -0.5, 1.2, np.nan]])
-    wanted = wanted_trend(rate, np.full((1, 5), 0.1), before, before, 1.6, 0.8, (3.0, 2.0))
-    assert wanted.tolist() == [[KEEPING, CONVERGING, KEEPING, DIVERGING, -1]]
+    before = [KEEPING, CONVERGING, CONVERGING, DIVERGING, KEEPING]
+    rates = [-1.2, -1.2, -0.5, 1.2, np.nan]
+    wanted = [
+        trend(rate, 0.1, was, was, (1.6, 0.8), (3.0, 2.0))
+        for rate, was in zip(rates, before, strict=True)
+    ]
+    assert wanted == [KEEPING, CONVERGING, KEEPING, DIVERGING, -1]
 
 
 def test_a_trend_that_waits_is_not_taken_back_by_one_wide_deviation() -> None:
-    rate, keeping = np.full((1, 2), 5.0), np.full((1, 2), KEEPING, dtype=np.int8)
-    pending = np.array([[KEEPING, DIVERGING]], dtype=np.int8)
+    def found(rate: float, sigma: float) -> list[int]:
+        limits = (1.6, 0.8), (3.0, 2.0)
+        return [trend(rate, sigma, KEEPING, pending, *limits) for pending in (KEEPING, DIVERGING)]
+
     for sigma, expected in (
         (1.0, [DIVERGING, DIVERGING]),
         (2.0, [KEEPING, DIVERGING]),
         (3.0, [KEEPING, KEEPING]),
     ):
-        found = wanted_trend(rate, np.full((1, 2), sigma), keeping, pending, 1.6, 0.8, (3.0, 2.0))
-        assert found.tolist() == [expected]
-    other = wanted_trend(-rate, np.full((1, 2), 2.0), keeping, pending, 1.6, 0.8, (3.0, 2.0))
-    assert other.tolist() == [[KEEPING, KEEPING]]
+        assert found(5.0, sigma) == expected
+    assert found(-5.0, 2.0) == [KEEPING, KEEPING]
 
 
 def test_depth_joins_the_image() -> None:
-    image = np.array([CONVERGING, CONVERGING, KEEPING, KEEPING, DIVERGING, -1], dtype=np.int8)
-    depth = np.array([-1, DIVERGING, CONVERGING, -1, CONVERGING, CONVERGING], dtype=np.int8)
-    assert with_depth(image, depth).tolist() == [CONVERGING, -1, CONVERGING, KEEPING, -1, -1]
+    image = [CONVERGING, CONVERGING, KEEPING, KEEPING, DIVERGING, -1]
+    depth = [-1, DIVERGING, CONVERGING, -1, CONVERGING, CONVERGING]
+    joined = [with_depth(i, d) for i, d in zip(image, depth, strict=True)]
+    assert joined == [CONVERGING, -1, CONVERGING, KEEPING, -1, -1]

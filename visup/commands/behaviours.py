@@ -154,5 +154,6 @@ def _row(contract: Contract | None) -> Iterator[str]:
         return
     yield " ".join(contract.gives)
     yield " ".join(contract.needs) or "-"
-    yield f"{contract.every_s:g} s" if contract.every_s else "frame"
+    pace = f"{contract.every_s:g} s" if contract.every_s else "frame"
+    yield f"{pace}, when called" if contract.awake else pace
     yield f"{contract.cost_ms:g} ms" if contract.cost_ms else "-"

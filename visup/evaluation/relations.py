@@ -11,7 +11,8 @@ import numpy as np
 from visup.evaluation.relation_oracles import plain_relations, qtc_by_definition, rcc8_by_definition
 from visup.rules.boxes import Boxes, BoxSettings, watch_boxes
 from visup.rules.geometry import RCC8, Floats
-from visup.rules.qtc import SIGNS, components
+from visup.rules.judge_loops import components
+from visup.rules.qtc import SIGNS
 from visup.rules.rcc8 import rcc8
 
 Progress = Callable[[str], None]
@@ -168,9 +169,9 @@ def qtc_wrong(draws: int, seed: int) -> int:
         places, velocities = rng.integers(-6, 7, (2, 2)), rng.integers(-3, 4, (2, 2))
         if (places[0] == places[1]).all():
             continue
-        speeds, _ = components(places.astype(float), velocities.astype(float))
+        speeds = components(places.astype(float), velocities.astype(float), 0, 1)[:4]
         # Whole numbers: what is 0 is 0 but for rounding.
-        signs = np.where(np.abs(speeds[:, 0]) < 1e-9, 0, np.sign(speeds[:, 0])).astype(int)
+        signs = np.where(np.abs(speeds) < 1e-9, 0, np.sign(speeds)).astype(int)
         wrong += "".join(SIGNS[s + 1] for s in signs) != qtc_by_definition(places, velocities)
     return wrong
 

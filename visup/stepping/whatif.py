@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from visup.agent import (
     Candidate,
-    Column,
     Coupling,
     Event,
     Mind,
@@ -26,8 +27,8 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.agent import Thinkers
+from visup.agent.cells import UNKNOWN_CODE, Cells, Columns
 from visup.agent.mind import UNKNOWN_OBJECT
-from visup.agent.relations import UNKNOWN_CODE
 from visup.rules.formula import Rule
 from visup.rules.safety import RuleThinker
 from visup.tasks.supervise import MEMORY, task_thinker
@@ -171,14 +172,14 @@ def with_relation(
     """Relations of which one is as told."""
     if not isinstance(relations, RelationTable):
         return (*_others(relations, told), told)
-    for number, column in enumerate(relations.columns):
-        if told.name in column.names:
+    for number, cells in enumerate(relations.parts):
+        if told.name in cells.columns.named:
             k, row = relations.pair(*told.objects) if len(told.objects) == 2 else (-1, 0)
             if k < 0:
                 return relations
-            columns = list(relations.columns)
-            columns[number] = _with_cell(column, told, min(row, len(column.state) - 1), k)
-            return replace(relations, columns=tuple(columns))
+            parts = list(relations.parts)
+            parts[number] = _with_cell(cells, told, row, k)
+            return replace(relations, parts=tuple(parts))
     return replace(relations, extra=(*_others(relations.extra, told), told))
 
 
@@ -187,23 +188,19 @@ def _others(relations: Iterable[Relation], told: Relation) -> tuple[Relation, ..
     return tuple(r for r in relations if r.name != told.name or frozenset(r.objects) != who)
 
 
-def _with_cell(column: Column, told: Relation, row: int, k: int) -> Column:
-    code = column.names.index(told.name)
+def _with_cell(cells: Cells, told: Relation, row: int, k: int) -> Cells:
+    column, code = cells.columns.named[told.name]
     if told.truth is Truth.UNKNOWN:
         code = UNKNOWN_CODE
     elif told.truth is Truth.FALSE:
         others = [c for c in range(len(column.names)) if c != code]
         # A code without a name says nothing else; else what is next to it.
         code = min(others, key=lambda c: (column.names[c] != "", abs(c - code)))
-
-    def changed(table: Any, value: float) -> Any:
-        table = table.copy()
-        table[row, k] = value
-        return table
-
-    return replace(
-        column,
-        state=changed(column.state, code),
-        since=changed(column.since, told.since),
-        confidence=changed(column.confidence, told.confidence),
-    )
+    state, since, at = cells.state.copy(), cells.since.copy(), column.rows[row]
+    state[at, k], since[at, k] = code, told.since
+    # Other columns may be as sure as this one was: it has a row of its own from now on.
+    numbers = np.concatenate([cells.numbers, cells.numbers[column.confidence][None]])
+    numbers[-1, k] = told.confidence
+    own = replace(column, confidence=len(numbers) - 1)
+    each = tuple(own if c is column else c for c in cells.columns.each)
+    return Cells(Columns(each), state, since, numbers)

@@ -22,6 +22,7 @@ from visup.agent.isolation import parcel
 from visup.agent.limits import Limits
 from visup.agent.loading import checked
 from visup.agent.perceive import in_order, perceive
+from visup.rules.waking import waking_rules
 from visup.testing.clips import CLIPS, Shot
 from visup.testing.scripted import Says, stand_ins
 
@@ -130,6 +131,17 @@ def _conduct(
         yield Finding("keeps its budget", taken <= contract.cost_ms, said)
     if contract.isolate:
         yield _sendable(make)
+    if contract.awake:
+        yield _wakes(contract)
+
+
+def _wakes(contract: Contract) -> Finding:
+    said = "says when it is awake"
+    try:
+        waking_rules([contract])
+    except BehaviourError as fault:
+        return Finding(said, False, str(fault))
+    return Finding(said, True, contract.awake)
 
 
 def _sendable(make: Make) -> Finding:
@@ -146,7 +158,8 @@ def _outing(make: Make, shots: Sequence[Shot], provide: Mapping[str, Says] | Non
     outing, behaviour = _Outing(), make()
     own = behaviour.contract.name
     others = stand_ins(behaviour.contract.needs, shots, provide)
-    slots = in_order([*others, behaviour], Limits(hang_s=None, here=True))
+    here = Limits(hang_s=None, here=True, wakeful=frozenset({own}))
+    slots = in_order([*others, behaviour], here)
     for shot in shots:
         image = shot.frame.image.copy()
         frame = Frame(shot.frame.index, shot.frame.time, image)

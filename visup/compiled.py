@@ -1,7 +1,7 @@
-"""Loops over pixels, cells and constraints that are compiled, because they are measured to be hot.
+"""Loops that are compiled, because they are measured to be hot.
 
 What NumPy does in a dozen passes over an image a compiled loop does in one; what it does in
-hundreds of small calls on a few constraints costs next to nothing. Results do not depend on the
+hundreds of small calls on a few numbers costs next to nothing. Results do not depend on the
 number of threads, and sums are taken in the order that is written: no reordering is allowed.
 """
 

@@ -1,0 +1,347 @@
+"""Robust fits over time, compiled: trends of distances, velocities of outlines.
+
+A dozen objects are some fifty pairs with thirty samples each: little for loops, and hundreds of calls
+for arrays. NaN stands for what is missing or unknown, and every comparison with it fails.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@compiled
+def _below(part: Floats, pivot: float, other: float) -> int:
+    """Puts those below a pivot, or at another one, first; how many they are. Without a branch."""
+    count = 0
+    for k in range(len(part)):
+        value = part[k]
+        part[k] = part[count]
+        part[count] = value
+        count += (value < pivot) | (value == other)
+    return count
+
+
+@compiled
+def median(values: Floats, count: int) -> float:
+    """Median of the first values, which it puts into another order; NaN for none."""
+    if count == 0:
+        return np.nan
+    at, low, high = count // 2, 0, count
+    while high - low > 32:  # quickselect (Hoare 1961)
+        pivot = values[(low + high) // 2]
+        end = low + _below(values[low:high], pivot, np.nan)
+        if at < end:
+            high = end
+            continue
+        low = end + _below(values[end:high], pivot, pivot)
+        if at < low:
+            low, high = at, at + 1
+    few, middle = values[low:high], values[low]
+    for i in range(len(few)):  # among a few, counting is quicker
+        less = most = 0
+        for k in range(len(few)):
+            less += few[k] < few[i]
+            most += few[k] <= few[i]
+        if less <= at - low < most:
+            middle = few[i]
+    if count % 2:
+        return float(middle)
+    fewer, below = 0, -np.inf
+    for k in range(count):
+        fewer += values[k] < middle
+        below = max(below, values[k] if values[k] < middle else -np.inf)
+    return float(0.5 * ((below if fewer == at else middle) + middle))
+
+
+@compiled
+def line(times: Floats, values: Floats, count: int, rises: Floats) -> tuple[float, float]:
+    """Slope of a line through samples, by the median of the slopes of all pairs of samples.
+
+    Up to 29 % of the samples may be wild without moving it far (Theil 1950, Sen 1968).
+
+    Args:
+        times: Seconds, increasing; written over.
+        values: Any unit; NaN where there is no sample; written over.
+        count: How many samples there are.
+        rises: Room for a number of each pair of them.
+
+    Returns:
+        Slope and its standard deviation, in units per second; NaN where fewer than four samples stand.
+        The deviation comes from the spread of the residuals (their median absolute deviation) as if
+        they were independent, so that it is too small for slow wobbles.
+    """
+    n = 0
+    for k in range(count):
+        if np.isfinite(values[k]):
+            times[n], values[n] = times[k], values[k]
+            n += 1
+    if n < 4:
+        return np.nan, np.nan
+    pairs, middle, lever = 0, 0.0, 0.0
+    for i in range(n):
+        middle += times[i]
+        for j in range(i + 1, n):
+            rises[pairs] = (values[j] - values[i]) / (times[j] - times[i])
+            pairs += 1
+    slope, middle = median(rises, pairs), middle / n
+    for k in range(n):
+        rises[k] = values[k] = values[k] - slope * times[k]
+        lever += (times[k] - middle) ** 2
+    offset = median(rises, n)
+    for k in range(n):
+        values[k] = abs(values[k] - offset)
+    spread = 1.4826 * median(values, n) * np.sqrt(n / (n - 2))
+    # Medians need pi/2 times as many samples as means for the same variance of their result.
+    return slope, np.sqrt(np.pi / 2) * spread / max(np.sqrt(lever), 1e-9)
+
+
+@compiled
+def binned(times: Floats, values: Floats, bins: int, moments: Floats, means: Floats) -> int:
+    """Means of neighbouring samples, so that a fit over all pairs of them stays cheap.
+
+    Args:
+        times: (T,) seconds, increasing.
+        values: (T,) any unit; NaN where there is no sample.
+        bins: Most samples wanted.
+        moments: (bins,) written: times of means of equally many neighbours; the newest bin is full.
+        means: (bins,) written: their values, NaN where a whole bin has no sample.
+
+    Returns:
+        How many means there are.
+    """
+    size = max(1, (len(times) + bins - 1) // bins)
+    count, begin, end = 0, 0, len(times) % size
+    if end == 0:
+        end = size
+    while begin < len(times):
+        moment = total = 0.0
+        known = 0
+        for k in range(begin, end):
+            moment += times[k]
+            if np.isfinite(values[k]):
+                total += values[k]
+                known += 1
+        moments[count] = moment / (end - begin)
+        means[count] = total / known if known else np.nan
+        count += 1
+        begin, end = end, end + size
+    return count
+
+
+@compiled
+def trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
+    """Lines through binned samples (T, N): their slopes and deviations, (N,) each; see `line`."""
+    count = values.shape[1]
+    slope, sigma, series = np.empty(count), np.empty(count), np.empty(len(times))
+    moments, means, rises = np.empty(bins), np.empty(bins), np.empty(bins * bins)
+    for k in range(count):
+        for t in range(len(times)):
+            series[t] = values[t, k]
+        found = binned(times, series, bins, moments, means)
+        slope[k], sigma[k] = line(moments, means, found, rises)
+    return slope, sigma
+
+
+@compiled
+def slope_noise(times: Floats, noise: float) -> float:
+    """Deviation of the slope of a line through samples (T,) of that noise; NaN for fewer than two."""
+    count = len(times)
+    if count < 2:
+        return np.nan
+    middle = lever = 0.0
+    for k in range(count):
+        middle += times[k]
+    middle /= count
+    for k in range(count):
+        lever += (times[k] - middle) ** 2
+    return float(noise / np.sqrt(lever))
+
+
+@compiled
+def _reach_slope(
+    times: Floats, support: Floats, free: Flags, span: tuple[int, int], at: tuple[int, int]
+) -> tuple[float, bool]:
+    """How fast one body's reach in one direction changes over a span of samples, if that is known."""
+    begin, end = span
+    i, k = at
+    middle, count = 0.0, 0
+    for t in range(begin, end):
+        if free[t, i, k] and np.isfinite(support[t, i, k]):
+            middle += times[t]
+            count += 1
+    if count < max(4.0, 0.5 * (end - begin)):
+        return 0.0, False
+    middle /= count
+    rise = lever = 0.0
+    for t in range(begin, end):
+        if free[t, i, k] and np.isfinite(support[t, i, k]):
+            off = times[t] - middle
+            rise += off * support[t, i, k]
+            lever += off * off
+    return rise / max(lever, 1e-12), True
+
+
+@compiled
+def common_motion(
+    slopes: Floats, usable: Flags, directions: Floats, misfit: float
+) -> tuple[float, float]:
+    """The velocity that explains best how the reach of one outline changes.
+
+    A body that moves by v changes its reach in direction n by v . n; v is fitted over the directions
+    robustly (iteratively reweighted least squares, one norm), so that a hidden side or a turning corner
+    has little say.
+
+    Args:
+        slopes: (K,) pixels per second, and
+        usable: whether each is known, in
+        directions: (K, 2) unit vectors.
+        misfit: Mean deviation of the directions from a common motion up to which the outline moves as
+            one, pixels per second; a third of the speed is allowed anyway.
+
+    Returns:
+        (x, y) pixels per second; NaN where fewer than three directions serve, or where the outline does
+        not move as one, as when one body passes before another.
+    """
+    count = 0
+    for k in range(len(slopes)):
+        count += usable[k]
+    if count < 3:
+        return np.nan, np.nan
+    weight, vx, vy, wrong = np.ones(len(slopes)), 0.0, 0.0, 0.0
+    for _ in range(5):
+        xx = yy = 1e-9
+        xy = bx = by = wrong = 0.0
+        for k in range(len(slopes)):
+            if usable[k]:
+                nx, ny = directions[k, 0], directions[k, 1]
+                wx, wy = weight[k] * nx, weight[k] * ny
+                xx, xy, yy = xx + wx * nx, xy + wx * ny, yy + wy * ny
+                bx, by = bx + wx * slopes[k], by + wy * slopes[k]
+        determinant = xx * yy - xy * xy
+        vx, vy = (yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant
+        for k in range(len(slopes)):
+            if usable[k]:
+                off = abs(slopes[k] - (vx * directions[k, 0] + vy * directions[k, 1]))
+                weight[k] = 1.0 / max(off, 0.3)
+                wrong += off
+    if wrong / count <= max(misfit, np.hypot(vx, vy) / 3.0):
+        return vx, vy
+    return np.nan, np.nan
+
+
+@compiled
+def velocities(
+    times: Floats,
+    support: Floats,
+    free: Flags,
+    spans: NDArray[np.int64],
+    directions: Floats,
+    misfit: float,
+) -> Floats:
+    """(S, M, 2) velocities of all bodies over spans of samples (first, one after the last), (S, 2)."""
+    count = support.shape[1]
+    found = np.empty((len(spans), count, 2))
+    slopes = np.empty(len(directions))
+    usable = np.empty(len(directions), np.bool_)
+    for s in range(len(spans)):
+        span = spans[s, 0], spans[s, 1]
+        for i in range(count):
+            for k in range(len(directions)):
+                slopes[k], usable[k] = _reach_slope(times, support, free, span, (i, k))
+            x, y = common_motion(slopes, usable, directions, misfit)
+            found[s, i, 0], found[s, i, 1] = x, y
+    return found
+
+
+@compiled
+def quick_trend(
+    times: Floats, values: Floats, recent: int, limits: tuple[float, float, float], room: Floats
+) -> tuple[float, float]:
+    """Slope over the window, or over its last part where that is strong and of another sign.
+
+    Args:
+        times: (T,) seconds.
+        values: (T,) pixels.
+        recent: First sample of the last part.
+        limits: Noise of a sample, pixels; the least slope that is strong, pixels per second; how many
+            of its deviations it must be, too.
+        room: (bins + 2, bins) for the means to which lines are fitted, and the slopes of their pairs.
+
+    Returns:
+        Pixels per second, and its deviation.
+    """
+    noise, least, sigmas = limits
+    bins = room.shape[1]
+    moments, means, rises = room[0], room[1], room[2:].reshape(-1)
+    slope, sigma = line(moments, means, binned(times, values, bins, moments, means), rises)
+    floor = slope_noise(times, noise)
+    if sigma < floor:
+        sigma = floor
+    found = binned(times[recent:], values[recent:], bins, moments, means)
+    quick, spread = line(moments, means, found, rises)
+    floor = slope_noise(times[recent:], noise)
+    if spread < floor:
+        spread = floor
+    turned = abs(quick) > least and abs(quick) > sigmas * spread
+    if turned and np.sign(quick) != np.sign(slope):
+        return quick, spread
+    return slope, sigma
+
+
+@compiled
+def fitted(
+    times: Floats,
+    support: Floats,
+    free: Flags,
+    separation: Floats,
+    directions: Floats,
+    limits: tuple[float, float, float, float, float, float, float],
+    bins: int,
+    now: float,
+) -> tuple[Floats, Floats, Floats, float]:
+    """All lines of one step.
+
+    Args:
+        times: (T,) seconds.
+        support: (T, M, K) pixels; see `History`.
+        free: (T, M, K).
+        separation: (T, M, M) pixels.
+        directions: (K, 2) unit vectors.
+        limits: The window, its last part and the window of motion, seconds; noise of an outline, pixels;
+            the least slope that is strong, pixels per second, and in deviations; misfit, pixels per
+            second.
+        bins: Most means to which lines are fitted.
+        now: Seconds.
+
+    Returns:
+        (P,) trends of the distances and (P,) their deviations; (3, M, 2) velocities over the window of
+        motion and in its halves; the deviation that noise makes of a component of a velocity.
+    """
+    window, quick, moving, noise, strong, sigmas, misfit = limits
+    samples, count = len(times), support.shape[1]
+    pairs = count * (count - 1) // 2
+    slope, sigma = np.full(pairs, np.nan), np.full(pairs, np.nan)
+    motion = np.full((3, count, 2), np.nan)
+    recent = np.searchsorted(times, now - moving, side="right")
+    spread = slope_noise(times[recent:], noise)
+    if samples < 6 or times[samples - 1] - times[0] < 0.6 * window:
+        return slope, sigma, motion, spread
+    half = recent + (samples - recent) // 2
+    spans = np.array([[recent, samples], [recent, half], [half, samples]])
+    motion = velocities(times, support, free, spans, directions, misfit)
+    recent = np.searchsorted(times, times[samples - 1] - quick, side="right")
+    strength = np.sqrt(2.0) * noise, strong, sigmas
+    series, room, number = np.empty(samples), np.empty((bins + 2, bins)), 0
+    for i in range(count):
+        for j in range(i + 1, count):
+            for t in range(samples):
+                series[t] = separation[t, i, j]
+            slope[number], sigma[number] = quick_trend(times, series, recent, strength, room)
+            number += 1
+    return slope, sigma, motion, spread

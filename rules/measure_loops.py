@@ -1,0 +1,152 @@
+"""From fits to quantities of all objects and pairs, compiled; see `measure.py`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+GAP, RATE, SIGMA, RELATIVE, CONTACT = range(5)
+"""Tables of all pairs; see `Measured`."""
+
+
+@compiled
+def near_pairs(
+    seen: Floats, separation: Floats, before: Floats, near: float, hold: float
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Gaps of all pairs as far as boxes and hulls tell them, and the pairs whose outlines must be asked.
+
+    Args:
+        seen: (M, 8) of each body: seconds since it was seen; its image motion (x, y), pixels per second,
+            and the deviation of that, NaN where it is not seen or not known; its box, pixels.
+        separation: (M, M) signed distances of the hulls, pixels; NaN unknown.
+        before: (M, M) gaps of the step before, pixels.
+        near: Gap beyond which outlines are not looked at, pixels.
+        hold: For how long the last gap stands for what is not seen, seconds.
+
+    Returns:
+        (P,) pixels, and numbers of pairs.
+    """
+    pairs = len(seen) * (len(seen) - 1) // 2
+    gaps, asked = np.empty(pairs), np.empty(pairs, np.int64)
+    number, count = -1, 0
+    for i in range(len(seen)):
+        for j in range(i + 1, len(seen)):
+            number += 1
+            longest = max(seen[i, 0], seen[j, 0])
+            gaps[number] = np.nan
+            if longest > 0.0:
+                if longest <= hold:
+                    gaps[number] = before[i, j]
+                continue
+            apart = separation[i, j]
+            gaps[number] = np.nan if np.isnan(apart) else max(near, apart)
+            dx = max(
+                seen[j, 4] - seen[i, 4] - seen[i, 6], seen[i, 4] - seen[j, 4] - seen[j, 6], 0.0
+            )
+            dy = max(
+                seen[j, 5] - seen[i, 5] - seen[i, 7], seen[i, 5] - seen[j, 5] - seen[j, 7], 0.0
+            )
+            if dx * dx + dy * dy <= near * near:
+                asked[count] = number
+                count += 1
+    return gaps, asked[:count]
+
+
+@compiled
+def _parting(support: Floats, seen: Floats, i: int, j: int, directions: Floats) -> float:
+    """How fast body j goes away from body i by their image motion, pixels per second.
+
+    That is along the direction, from i to j, in which the hulls overlap least.
+    """
+    half, least, at = len(directions) // 2, np.inf, 0
+    for k in range(len(directions)):
+        reach = support[i, k] + support[j, (k + half) % (2 * half)]
+        if reach < least:
+            least, at = reach, k
+    x, y = seen[j, 1] - seen[i, 1], seen[j, 2] - seen[i, 2]
+    return float(x * directions[at, 0] + y * directions[at, 1])
+
+
+@compiled
+def parting(support: Floats, seen: Floats, directions: Floats) -> tuple[Floats, Floats]:
+    """(M, M) speeds at which pairs part by their image motion, and their deviations; see `tables`."""
+    count = len(seen)
+    speed, spread = np.empty((count, count)), np.empty((count, count))
+    for i in range(count):
+        for j in range(count):
+            speed[i, j] = _parting(support, seen, i, j, directions)
+            spread[i, j] = np.hypot(seen[i, 3], seen[j, 3])
+    return speed, spread
+
+
+@compiled
+def contact_time(gap: float, rate: float) -> float:
+    """Seconds until a gap is closed at a rate; see `Measured.time_to_contact`."""
+    if np.isnan(gap) or np.isnan(rate):
+        return np.nan
+    if gap <= 0.0:
+        return 0.0
+    return gap / -rate if rate < 0.0 else np.inf
+
+
+@compiled
+def tables(
+    gaps: Floats,
+    slope: Floats,
+    sigma: Floats,
+    velocity: Floats,
+    support: Floats,
+    seen: Floats,
+    directions: Floats,
+    limits: tuple[float, float, float, float],
+) -> tuple[Floats, Floats]:
+    """Quantities of all pairs.
+
+    While one body reaches in front of another, the distance of their hulls says little: its noise is
+    large, and nothing of a gap shows yet. The image motion of each region is known much better. So for
+    bodies near each other, a speed of parting that is far above its noise is taken for the trend of
+    their distance. It is not asked about coming closer, which is seen well before contact.
+
+    Args:
+        gaps: (P,) pixels.
+        slope: (P,) trends of the distances, pixels per second.
+        sigma: (P,) their deviations.
+        velocity: (M, 2) pixels per second.
+        support: (M, K) reach of the outlines at the last sample, pixels; no rows when there is none.
+        seen: (M, 8) of each body; see `near_pairs`.
+        directions: (K, 2) unit vectors.
+        limits: Gap up to which the motion of two bodies tells that they part, pixels; the least speed
+            that is strong, pixels per second, and in deviations; for how long a trend outlasts the
+            sight of a body, seconds.
+
+    Returns:
+        (5, M, M) tables and (M,) speeds.
+    """
+    contact, strong, sigmas, lasts = limits
+    count, number = len(seen), -1
+    found, speeds = np.full((5, count, count), np.nan), np.empty(count)
+    for i in range(count):
+        for j in range(i + 1, count):
+            number += 1
+            stale = max(seen[i, 0], seen[j, 0]) > lasts
+            for a, b in ((i, j), (j, i)):
+                rate, wide = slope[number], sigma[number]
+                if gaps[number] <= contact and len(support):
+                    speed = _parting(support, seen, a, b, directions)
+                    known = np.hypot(seen[a, 3], seen[b, 3])
+                    if speed > strong and speed > sigmas * known and rate < speed:
+                        rate, wide = speed, known
+                found[GAP, a, b], found[SIGMA, a, b] = gaps[number], wide
+                found[RATE, a, b] = np.nan if stale else rate
+    for i in range(count):
+        x, y = velocity[i, 0], velocity[i, 1]
+        speeds[i] = np.sqrt(x * x + y * y)
+        for j in range(count):
+            x, y = velocity[i, 0] - velocity[j, 0], velocity[i, 1] - velocity[j, 1]
+            found[RELATIVE, i, j] = np.sqrt(x * x + y * y)
+            found[CONTACT, i, j] = contact_time(found[GAP, i, j], found[RATE, i, j])
+    return found, speeds
