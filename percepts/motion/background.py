@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from visup.percepts.motion.constraints import Constraints
 from visup.percepts.motion.dominant import GRID, fit_dominant, spread_weights
 from visup.percepts.motion.image import Floats
+from visup.percepts.motion.layer_loops import median
 from visup.percepts.motion.layers import STILL, Affine, distances, fit_bent, log_likelihood
 
 
@@ -20,7 +21,7 @@ def slack_of(model: Affine, c: Constraints) -> float:
     if not len(c):
         return 0.1
     # One in four tells the median well enough.
-    return 0.1 + 0.03 * float(np.median(np.hypot(*model.at(c.xy[::4]).T)))
+    return 0.1 + 0.03 * median(np.hypot(*model.at(c.xy[::4]).T))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,7 +186,7 @@ def _camera(
     model = fit_dominant(c, weight, guesses, seed)
     if not _spans(c, model, outside, shape, 0.15):
         return None
-    moved = float(np.median(np.hypot(*model.at(c.xy).T)))
+    moved = median(np.hypot(*model.at(c.xy).T))
     return fit_bent(c, weight * 20, model) if moved > 0.5 else model
 
 

@@ -50,73 +50,14 @@ def gathered(
 
 @compiled
 def totals(labels: Labels, values: Floats, count: int) -> Floats:
-    """Sum of a (h, w) map in each cell, (count,) float32."""
+    """Sum of a (h, w) map, most of it 0, in each cell, (count,) float32."""
     height, width = labels.shape
     out = np.zeros(count, np.float32)
     for y in range(height):
         for x in range(width):
-            out[labels[y, x]] += values[y, x]
+            if values[y, x] != 0:
+                out[labels[y, x]] += values[y, x]
     return out
-
-
-@compiled
-def borders(labels: Labels, count: int) -> tuple[Labels, Labels, Labels]:
-    """Pairs of cells that touch, and along how many pixels.
-
-    Args:
-        labels: (h, w) cells, 0 to count - 1.
-        count: How many cells.
-
-    Returns:
-        (N,) the lower and (N,) the higher cell of each pair, in their order, and (N,) pixels.
-    """
-    low, high = _steps(labels)
-    room = np.zeros(count + 1, np.int64)
-    for n in range(len(low)):
-        room[low[n] + 1] += 1
-    begin = np.cumsum(room)
-    filled, other = begin.copy(), np.empty(len(low), np.int32)
-    for n in range(len(low)):
-        other[filled[low[n]]] = high[n]
-        filled[low[n]] += 1
-    one, two = np.empty(len(low), np.int32), np.empty(len(low), np.int32)
-    along, pixels, pairs = np.zeros(count, np.int32), np.empty(len(low), np.int32), 0
-    for k in range(count):
-        first = pairs
-        for n in range(begin[k], begin[k + 1]):
-            b = other[n]
-            if not along[b]:
-                # Neighbours are few: each goes to its place among those before it.
-                place = pairs
-                while place > first and two[place - 1] > b:
-                    two[place] = two[place - 1]
-                    place -= 1
-                two[place], one[pairs] = b, k
-                pairs += 1
-            along[b] += 1
-        for n in range(first, pairs):
-            pixels[n], along[two[n]] = along[two[n]], 0
-    return one[:pairs], two[:pairs], pixels[:pairs]
-
-
-@compiled
-def _steps(labels: Labels) -> tuple[Labels, Labels]:
-    """The lower and the higher cell wherever one pixel and the next, or that below it, differ."""
-    height, width = labels.shape
-    low, high = np.empty(2 * labels.size, np.int32), np.empty(2 * labels.size, np.int32)
-    count = 0
-    # Written always and kept when they differ: which do cannot be foreseen.
-    for y in range(height):
-        for x in range(width - 1):
-            a, b = labels[y, x], labels[y, x + 1]
-            low[count], high[count] = min(a, b), max(a, b)
-            count += a != b
-    for y in range(height - 1):
-        for x in range(width):
-            a, b = labels[y, x], labels[y + 1, x]
-            low[count], high[count] = min(a, b), max(a, b)
-            count += a != b
-    return low[:count], high[:count]
 
 
 @compiled
@@ -147,7 +88,7 @@ def spread_to(
 
 @compiled
 def brought(
-    old: Labels, new: Labels, flow: Floats, shares: Floats, count: int, every: int
+    old: Labels, new: Labels, flow: Floats, shares: Floats, area: Floats, every: int
 ) -> Floats:
     """Shares of cells of an older image as they come to those of a newer one, along the flow.
 
@@ -156,7 +97,7 @@ def brought(
         new: (h, w) cells of the newer one.
         flow: (h, w, 2) float32, from the newer back to the older.
         shares: (old count, K) float32.
-        count: How many cells the newer one has.
+        area: (count,) float32, how many pixels each cell of the newer one has.
         every: One in so many pixels of a cell, its first one always, is asked where it comes from.
 
     Returns:
@@ -164,15 +105,12 @@ def brought(
     """
     height, width = new.shape
     kinds = shares.shape[1]
-    seen, asked = np.zeros(count, np.int32), np.zeros(count, np.int32)
-    out = np.zeros((count, kinds), np.float32)
-    for y in range(height):
-        for x in range(width):
-            seen[new[y, x]] += 1
+    count = len(area)
+    asked, out = np.zeros(count, np.int32), np.zeros((count, kinds), np.float32)
     # A mean is summed up share by share, so that what is whole stays whole within rounding.
     part = np.empty(count, np.float32)
     for c in range(count):
-        part[c] = np.float32(1) / np.float32(max((seen[c] + every - 1) // every, 1))
+        part[c] = np.float32(1) / np.float32(max((int(area[c]) + every - 1) // every, 1))
     for y in range(height):
         for x in range(width):
             c = new[y, x]
@@ -319,3 +257,47 @@ def beside_points(
             for i in range(kinds):
                 totals[k, i] += likelihood[n, i]
     return totals, number
+
+
+@compiled
+def weighed(
+    totals: NDArray[np.float64],
+    number: NDArray[np.float64],
+    more: Floats,
+    prior: Floats,
+    least: float,
+    clip: float,
+) -> tuple[Floats, Floats]:
+    """Shares of the labels of each cell after what its points and its pixels say.
+
+    Args:
+        totals: (count, K) float64 sums of log likelihoods over points.
+        number: (count,) float64, of how many.
+        more: (count, K) float32 dense log likelihood; all 0 where nothing is known.
+        prior: (count, K) float32 shares before.
+        least: What is added to those.
+        clip: Log likelihood ratio that counts as sure.
+
+    Returns:
+        (count, K) float32 shares; (count,) float32 weight of the evidence, 0 to 1.
+    """
+    count, kinds = prior.shape
+    share, sure = np.empty((count, kinds), np.float32), np.zeros(count, np.float32)
+    each = np.empty(kinds)
+    for c in range(count):
+        scale, told, highest = max(np.sqrt(number[c]), 1.0), number[c] > 0, -np.inf
+        for k in range(kinds):
+            each[k] = totals[c, k] / scale + more[c, k]
+            told |= more[c, k] != 0
+            highest = max(highest, each[k])
+        lowest, whole = 0.0, 0.0
+        for k in range(kinds):
+            off = each[k] - highest
+            lowest = min(lowest, off)
+            each[k] = (prior[c, k] + np.float32(least)) * np.exp(max(off, -2 * clip))
+            whole += each[k]
+        for k in range(kinds):
+            share[c, k] = each[k] / whole
+        if told:
+            sure[c] = min(-lowest, clip) / clip
+    return share, sure

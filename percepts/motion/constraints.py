@@ -261,7 +261,9 @@ def with_flow(
     Returns:
         The constraints with those of the flow behind them.
     """
-    lost = np.setdiff1d(np.arange(len(points)), c.index)
+    missing = np.ones(len(points), dtype=bool)
+    missing[c.index] = False
+    lost = np.flatnonzero(missing)
     if not len(lost):
         return c
     x, y = points.xy[lost].astype(np.int64).T

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from visup.percepts.motion.appearance import appearance
-from visup.percepts.motion.cell_loops import beside_points
+from visup.percepts.motion.cell_loops import beside_points, weighed
 from visup.percepts.motion.constraints import Points
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.settings import MotionSettings
@@ -53,13 +53,7 @@ def gather(
     totals, number = beside_points(
         cells.labels, points.xy[has], points.normal[has], likelihood[has], REACH, cells.count
     )
-    totals /= np.maximum(np.sqrt(number), 1)[:, None]
-    totals += more
-    totals -= totals.max(axis=1, keepdims=True)
-    sure = np.minimum(-totals.min(axis=1), CLIP) / CLIP
-    share = (prior + LEAST) * np.exp(np.maximum(totals, -2 * CLIP))
-    share /= share.sum(axis=1, keepdims=True)
-    return share.astype(np.float32), (sure * ((number > 0) | more.any(axis=1))).astype(np.float32)
+    return weighed(totals, number, more, prior, LEAST, CLIP)
 
 
 def spread(
@@ -144,12 +138,19 @@ def _system(
     return sparse.csc_matrix((data, rows, columns), shape=(m, m)), beyond
 
 
+def looks(cells: Superpixels, prior: Floats) -> Floats:
+    """Shares of the labels (count, K) that are expected, after the tones of the superpixels."""
+    look = prior * appearance(cells, prior)
+    return np.asarray(look / np.maximum(look.sum(axis=1, keepdims=True), 1e-6))
+
+
 def label(
     cells: Superpixels,
     points: Points,
     likelihood: Floats,
     has: NDArray[np.bool_],
     prior: Floats,
+    look: Floats,
     more: Floats,
     stay: NDArray[np.bool_],
     settings: MotionSettings,
@@ -162,6 +163,7 @@ def label(
         likelihood: (N, K) float32 log likelihood of labels at the points.
         has: (N,) bool, whether a point says what is seen there.
         prior: (count, K) float32 label shares expected.
+        look: (count, K) float32, the same by what cells look like; see `looks`.
         more: (count, K) float32 dense log likelihood.
         stay: (count,) bool, where an object rests: motion tells nothing there.
         settings: Weights.
@@ -170,8 +172,6 @@ def label(
         (count, K) float32.
     """
     share, weight = gather(cells, points, likelihood, has, prior, more)
-    look = prior * appearance(cells, prior)
-    look /= np.maximum(look.sum(axis=1, keepdims=True), 1e-6)
     trust = np.full(cells.count, settings.persistence, dtype=np.float32)
     bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
     bias[_border(cells.labels)] *= 10

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.constraints import Constraints
 from visup.percepts.motion.image import Floats
+from visup.percepts.motion.layer_loops import median
 from visup.percepts.motion.layers import Affine, distances, fit_affine
 from visup.percepts.motion.tracking import Rate
 
@@ -82,7 +83,8 @@ def slack_of(model: Affine, where: tuple[float, float] = (0.0, 0.0)) -> float:
 def middle(c: Constraints, index: NDArray[np.int64]) -> Affine:
     """Constant motion to start from: the median over the constraints."""
     matrix = np.zeros((2, 3))
-    matrix[:, 2] = np.median(c.moved[index], axis=0)
+    moved = c.moved[index]
+    matrix[:, 2] = median(moved[:, 0].copy()), median(moved[:, 1].copy())
     return Affine(matrix)
 
 
@@ -112,4 +114,4 @@ def same_motion(
         return None
     both = fit_affine(c, (in_a | in_b).astype(np.float32), start, slack=slack)
     m2 = distances(both, c, slack)
-    return bool(np.median(m2[in_a]) < ALIKE and np.median(m2[in_b]) < ALIKE)
+    return median(m2[in_a]) < ALIKE and median(m2[in_b]) < ALIKE

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from visup.percepts.motion.discovery import middle, rate_of, same_motion, slack_of
+from visup.percepts.motion.layer_loops import quantile
 from visup.percepts.motion.layers import Affine, distances, fit_affine
 from visup.percepts.motion.salience import LITTLE_BORDER, border_share
 from visup.percepts.motion.scene import Measured, Scene, least_area, moves_like
@@ -255,7 +256,7 @@ def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:
     """Whether these constraints tell that something moves against the background."""
     if np.count_nonzero(which) < 4:
         return False
-    return bool(np.quantile(m.background.distances(m.constraints)[which], 0.7) > 9)
+    return quantile(m.background.distances(m.constraints)[which], 0.7) > 9
 
 
 def joined(a: Track, b: Track) -> Track:

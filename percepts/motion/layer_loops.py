@@ -155,3 +155,22 @@ def _solve(normal: Doubles, right: Doubles) -> None:
         for k in range(i + 1, size):
             right[i] -= normal[k, i] * right[k]
         right[i] /= normal[i, i]
+
+
+@compiled
+def median(values: Floats) -> float:
+    """The median of (N,) float32 with one or more, as `np.median` rounds it."""
+    half = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, half)[half])
+    parts = np.partition(values, half)
+    return float((parts[:half].max() + parts[half]) / np.float32(2))
+
+
+@compiled
+def quantile(values: Floats, share: float) -> float:
+    """What a share of (N,) float32 with one or more lie below, between two of them in proportion."""
+    ordered, at = np.sort(values), share * (len(values) - 1)
+    low = int(at)
+    high = min(low + 1, len(values) - 1)
+    return float(ordered[low]) + (at - low) * (float(ordered[high]) - float(ordered[low]))

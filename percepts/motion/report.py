@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,7 @@ def report(
     scene: Scene,
     size: tuple[int, int],
     settings: MotionSettings,
+    beside: Executor,
 ) -> tuple[Region, ...]:
     """Regions of the confirmed tracks that are in view.
 
@@ -98,19 +100,24 @@ def report(
         scene: The frame.
         size: (width, height) of the frame.
         settings: Gives the least area.
+        beside: Draws every other outline meanwhile.
 
     Returns:
         Regions by id.
     """
     scale = scene.image.scale
     least = least_area(scene, settings) / scale**2
-    out = []
-    for t in tracks:
-        if t.id > 0 and t.seen == scene.time:
-            others = [o.share for o in tracks if o is not t and o.id > 0]
-            shape = _shape(t, others, scene, size, least)
-            if shape is not None:
-                out.append(_region(t, shape, scale))
+    told = [t for t in tracks if t.id > 0]
+
+    def drawn(t: Track) -> Outline | None:
+        return _shape(t, [o.share for o in told if o is not t], scene, size, least)
+
+    told_now = [t for t in told if t.seen == scene.time]
+    later = [beside.submit(drawn, t) for t in told_now[1::2]]
+    shapes: list[Outline | None] = [None] * len(told_now)
+    shapes[::2] = [drawn(t) for t in told_now[::2]]
+    shapes[1::2] = [shape.result() for shape in later]
+    out = [_region(t, s, scale) for t, s in zip(told_now, shapes, strict=True) if s is not None]
     return tuple(sorted(out, key=lambda r: r.id))
 
 

@@ -24,7 +24,7 @@ from visup.percepts.motion.constraints import (
     track,
     with_flow,
 )
-from visup.percepts.motion.dense import label
+from visup.percepts.motion.dense import label, looks
 from visup.percepts.motion.discovery import rate_of
 from visup.percepts.motion.image import Floats, History, WorkImage, prepare
 from visup.percepts.motion.joining import absorb, merge, release
@@ -114,28 +114,32 @@ class MotionSegmenter:
         image = prepare(frame, self.settings.work_size)
         self._history.push(image)
         self._count += 1
-        coming = self._beside.submit(superpixels, image, self.settings.cell, self.settings.contrast)
         before = self._cells
         if before is None:
-            self._cells = coming.result()
+            self._cells = superpixels(image, self.settings.cell, self.settings.contrast)
             self._ground = bare_ground(image.shape)
             return ()
-        scene, tracks = self._look(image, before, coming)
+        scene, carried, prior = self._look(image, before)
         cells = self._cells = scene.cells
-        tracks = fit_tracks(tracks, scene)
-        tracks = bear(tracks, scene, self.settings, self._born)
+        known = fit_tracks(carried, scene)
+        tracks = bear(known, scene, self.settings, self._born)
         self._born = max([self._born, *(t.key for t in tracks)])
-        prior = priors(tracks, cells)
+        if tracks != known:  # what was seen before is expected where it was
+            prior = priors(tracks, cells)
         near = reach_of(scene, tracks, prior)
+        old = self._history.back(scene.measured[-1].constraints.lag)
+        dense = self._beside.submit(warped, scene, tracks, old, near, self.settings.noise)
         likelihood, has = explain(scene, tracks, near, self.settings)
         likelihood = obey(directives, scene, likelihood)
-        old = self._history.back(scene.measured[-1].constraints.lag)
-        more = warped(scene, tracks, old, near, self.settings.noise)
+        look = looks(cells, prior)
+        more = dense.result()
         stay = np.zeros(cells.count, dtype=bool)
         for t in tracks:
             if rests(t, scene):
                 stay |= t.share > 0.5
-        posterior = label(cells, scene.points, likelihood, has, prior, more, stay, self.settings)
+        posterior = label(
+            cells, scene.points, likelihood, has, prior, look, more, stay, self.settings
+        )
         keys = tuple(t.key for t in tracks)
         winner = posterior.argmax(axis=1)
         tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
@@ -150,27 +154,35 @@ class MotionSegmenter:
         tracks, self._ids = confirm(tracks, scene, self._ids, self.settings, wanted)
         self._tracks = tracks
         self.looked = Looked(scene, tracks, keys, posterior)
-        seen = report(tracks, scene, self._size, self.settings)
+        seen = report(tracks, scene, self._size, self.settings, self._beside)
         seen, self._ids = self._resting.step(frame, scene, seen, self._ids, self.settings, evidence)
         return chosen(seen, directives)
 
-    def _look(
-        self, image: WorkImage, before: Superpixels, coming: Future[Superpixels]
-    ) -> tuple[Scene, Tracks]:
-        """Measure motion, and carry the tracks to the newest image."""
-        old = self._history.back(1)
+    def _look(self, image: WorkImage, before: Superpixels) -> tuple[Scene, Tracks, Floats]:
+        """Measure motion, and carry the tracks to the newest image, with where they are expected."""
+        cell, old = self.settings.cell, self._history.back(1)
         seconds = image.time - old.time
-        points = find_points(image, self.settings.cell, self.settings.noise)
+        found = self._beside.submit(find_points, image, cell, self.settings.noise)
+        coming = self._beside.submit(superpixels, image, cell, self.settings.contrast)
         flow = flow_back(image.grey, old.grey, self._engine)
+        carried = self._beside.submit(self._carried, flow, before, coming, seconds)
+        points = found.result()
         first = self._follow(points, flow, old, image)
-        cells = coming.result()
-        tracks = carry(self._tracks, flow, before, cells, seconds)
-        owner = priors(tracks, cells).argmax(axis=1)
+        cells, tracks, prior = carried.result()
+        owner = prior.argmax(axis=1)
         scene = Scene(image, points, cells, owner, seconds, ())
         later = [self._later(scene, tracks, lag) for lag in self._turn(image)]
         measured = [self._measure(scene, first)]
         measured += [self._measure(scene, c.result()) for c in later]
-        return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks
+        return Scene(image, points, cells, owner, seconds, tuple(measured)), tracks, prior
+
+    def _carried(
+        self, flow: Floats, before: Superpixels, coming: Future[Superpixels], seconds: float
+    ) -> tuple[Superpixels, Tracks, Floats]:
+        """The newest cells, the tracks carried there, and the labels expected of the cells."""
+        cells = coming.result()  # one worker does one thing after the other: it is there
+        tracks = carry(self._tracks, flow, before, cells, seconds)
+        return cells, tracks, priors(tracks, cells)
 
     def _turn(self, image: WorkImage) -> list[int]:
         """The longer baseline whose turn it is: they are measured one in each frame.

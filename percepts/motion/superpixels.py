@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from visup.percepts.motion.cell_loops import (
-    borders,
     bounds,
     covered,
     flattest,
@@ -24,6 +23,7 @@ from visup.percepts.motion.cell_loops import (
     totals,
 )
 from visup.percepts.motion.image import Floats, WorkImage
+from visup.percepts.motion.partition_loops import borders, flooded, linked
 
 STIFF = 15.0  # flat cells of one tone are nearly one: a whole sky, a whole face of a box
 CALM = 1.0  # mean gradient up to which a cell is flat, grey levels per pixel
@@ -116,7 +116,8 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     busy = np.abs(image.gx) + np.abs(image.gy)
     # A seed sits on no edge, and the watershed has nothing to find in a cell that is flat all over.
     seeds, count = flattest(_smoothed(busy), cell, FLAT)
-    labels = _settled(np.asarray(cv2.watershed(image.tone, seeds), np.int32))
+    flooded(*_edges(image.tone), seeds)
+    labels = _settled(seeds)
     number, sums, corners = gathered(labels, image.tone, busy, count)
     area = np.maximum(number, 1)
     mean = np.asarray(sums / area[:, None], dtype=np.float32)
@@ -129,6 +130,19 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
 
 def _smoothed(busy: Floats) -> Floats:
     return np.asarray(cv2.boxFilter(busy, -1, (3, 3)), dtype=np.float32)
+
+
+def _edges(tone: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """How far each pixel of (h, w, 3) differs from the next, (h, w), and from that below, (h - 1, w)."""
+    right = np.zeros(tone.shape[:2], dtype=np.uint8)
+    right[:, :-1] = _unlike(tone[:, 1:], tone[:, :-1])
+    return right, _unlike(tone[1:], tone[:-1])
+
+
+def _unlike(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """By how much the tones of two images differ, (h, w): the channel that differs most counts."""
+    first, second, third = cv2.split(cv2.absdiff(one, other))
+    return np.asarray(cv2.max(cv2.max(first, second), third), dtype=np.uint8)
 
 
 def _settled(found: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -145,9 +159,11 @@ def _links(
 ) -> sparse.csr_matrix:
     count = len(tone)
     i, j, pixels = borders(labels, count)
-    unlike = np.abs(tone[i] - tone[j]).max(axis=1)
+    # Maxima along short rows are slow, column by column they are not.
+    gaps = np.abs(tone[i] - tone[j])
+    unlike = np.maximum(np.maximum(gaps[:, 0], gaps[:, 1]), gaps[:, 2])
     stiff = 1 + STIFF * calm[i] * calm[j]
     alike = stiff * np.exp(-0.5 * (unlike / contrast) ** 2) + LOOSE
     value = (np.minimum(pixels / cell, 2.0) * alike).astype(np.float32)
-    both = np.concatenate([value, value]), (np.concatenate([i, j]), np.concatenate([j, i]))
-    return sparse.coo_matrix(both, shape=(count, count)).tocsr()
+    ends, columns, data = linked(i, j, value, count)
+    return sparse.csr_matrix((data, columns, ends), shape=(count, count))

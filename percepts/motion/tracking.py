@@ -256,7 +256,7 @@ def carry(
     before = [t.share for t in tracks]
     before += [t.share if t.recent is None else t.recent for t in tracks]
     shares = np.stack(before, axis=1).astype(np.float32, copy=False)
-    found = brought(old.labels, new.labels, flow, np.ascontiguousarray(shares), new.count, EVERY)
+    found = brought(old.labels, new.labels, flow, np.ascontiguousarray(shares), new.area, EVERY)
     moved = np.ascontiguousarray(found.T)
     return tuple(
         _carried(t, share, np.float32(FADE**seconds) * recent, old, new, seconds)

@@ -1,14 +1,17 @@
 """Superpixels against the slow way to say the same."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse
 
 from visup.agent import Frame
-from visup.percepts.motion.cell_loops import borders, brought
+from visup.percepts.motion.cell_loops import brought
 from visup.percepts.motion.image import prepare
-from visup.percepts.motion.superpixels import Superpixels, superpixels
+from visup.percepts.motion.partition_loops import borders, flooded, linked
+from visup.percepts.motion.superpixels import Superpixels, _edges, superpixels
 
 
 def cells_of(seed: int) -> Superpixels:
@@ -72,7 +75,7 @@ def test_shares_come_with_every_nth_pixel_of_a_cell(seed: int, shift: int, every
     shares = np.random.default_rng(seed).random((old.count, 3)).astype(np.float32)
     flow = np.zeros((*old.labels.shape, 2), np.float32)
     flow[..., 0] = shift + 0.3
-    found = brought(old.labels, new.labels, flow, shares, new.count, every)
+    found = brought(old.labels, new.labels, flow, shares, new.area, every)
     width = old.labels.shape[1]
     for k in range(new.count):
         ys, xs = np.nonzero(new.labels == k)
@@ -107,3 +110,32 @@ def test_borders_are_counted_pixel_by_pixel(seed: int) -> None:
                     slow[a, b] = slow.get((a, b), 0) + 1
     found = [tuple(map(int, row)) for row in zip(*borders(labels, 9), strict=True)]
     assert found == [(*pair, n) for pair, n in sorted(slow.items())]
+
+
+@given(st.integers(0, 999), st.integers(1, 12), st.sampled_from([2, 16, 256]))
+@settings(deadline=None, max_examples=25)
+def test_the_watershed_is_that_of_opencv(seed: int, seeds: int, levels: int) -> None:
+    rng = np.random.default_rng(seed)
+    tone = (rng.integers(0, levels, (19, 23, 3)) * (255 // (levels - 1))).astype(np.uint8)
+    marks = np.zeros(tone.shape[:2], np.int32)
+    for k in range(1, seeds + 1):
+        y, x = rng.integers(0, 17), rng.integers(0, 21)
+        marks[y : y + 2, x : x + 2] = k
+    expected = cv2.watershed(tone, marks.copy())
+    flooded(*_edges(tone), marks)
+    assert np.array_equal(marks, expected)
+
+
+@given(st.integers(0, 999))
+@settings(deadline=None, max_examples=10)
+def test_linked_pairs_are_a_symmetric_matrix(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = 9
+    i, j = np.nonzero(np.triu(rng.random((count, count)) < 0.4, 1))
+    values = rng.random(len(i)).astype(np.float32)
+    ends, columns, data = linked(i.astype(np.int32), j.astype(np.int32), values, count)
+    both = np.concatenate([i, j]), np.concatenate([j, i])
+    expected = sparse.coo_matrix((np.tile(values, 2), both), shape=(count, count)).tocsr()
+    assert np.array_equal(ends, expected.indptr)
+    assert np.array_equal(columns, expected.indices)
+    assert np.array_equal(data, expected.data)

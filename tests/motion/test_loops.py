@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.percepts.motion.layer_loops import likelihoods, misfits, reweighted
+from visup.percepts.motion.cell_loops import weighed
+from visup.percepts.motion.layer_loops import (
+    likelihoods,
+    median,
+    misfits,
+    quantile,
+    reweighted,
+)
 from visup.percepts.motion.picture import FAR, NOISE, RARE, SETTLE_S, Picture, learnt
 from visup.percepts.motion.point_loops import strongest, tensors
 from visup.percepts.motion.template_loops import best_shift
@@ -169,3 +176,28 @@ def test_where_nothing_can_be_kept_loops_are_compiled_all_the_same() -> None:
     made: dict[str, Callable[[float], float]] = {}
     exec("def twice(value):\n    return 2.0 * value", made)  # no file, so nowhere to keep it
     assert compiled(made["twice"])(4.0) == 8.0
+
+
+@given(st.integers(0, 999), st.integers(1, 40))
+@settings(deadline=None, max_examples=25)
+def test_medians_and_quantiles_are_those_of_numpy(seed: int, count: int) -> None:
+    values = np.random.default_rng(seed).normal(0, 9, count).astype(np.float32)
+    assert median(values) == np.median(values)
+    assert quantile(values, 0.7) == pytest.approx(np.quantile(values, 0.7), rel=1e-5, abs=1e-5)
+
+
+@given(st.integers(0, 999), st.integers(2, 6))
+@settings(deadline=None, max_examples=15)
+def test_shares_are_priors_times_likelihoods(seed: int, kinds: int) -> None:
+    rng = np.random.default_rng(seed)
+    number = rng.integers(0, 4, 12).astype(np.float64)
+    totals = rng.normal(0, 3, (12, kinds)) * (number > 0)[:, None]
+    more = (rng.normal(0, 2, (12, kinds)) * (rng.random(12) < 0.5)[:, None]).astype(np.float32)
+    prior = rng.dirichlet(np.ones(kinds), 12).astype(np.float32)
+    share, weight = weighed(totals, number, more, prior, 0.03, 5.0)
+    logs = totals / np.sqrt(np.maximum(number, 1))[:, None] + more
+    logs -= logs.max(axis=1, keepdims=True)
+    expected = (prior + 0.03) * np.exp(np.maximum(logs, -10))
+    assert share == pytest.approx(expected / expected.sum(axis=1, keepdims=True), abs=1e-5)
+    told = (number > 0) | (more != 0).any(axis=1)
+    assert weight == pytest.approx(np.minimum(-logs.min(axis=1), 5) / 5 * told, abs=1e-5)
