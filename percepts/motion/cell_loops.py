@@ -64,25 +64,31 @@ def totals(labels: Labels, values: Floats, count: int) -> Floats:
 def spread_to(
     ends: Labels, neighbours: Labels, members: NDArray[np.bool_], steps: int
 ) -> NDArray[np.bool_]:
-    """Cells within some steps of (count, K) members; `ends` and `neighbours` as in CSR matrices."""
+    """Cells within some steps of (count, K) members.
+
+    `ends` and `neighbours` are as in CSR matrices; who is a neighbour of one has it as a neighbour. Only
+    from cells that were come to last is gone on: most sets are small.
+    """
     count, kinds = members.shape
-    near = np.empty((count, kinds), np.bool_)
-    now, before = np.empty(count, np.uint64), np.empty(count, np.uint64)
-    # Up to 64 of the K are the bits of one number.
-    for first in range(0, kinds, 64):
-        some = min(64, kinds - first)
+    near = members.copy()
+    come_to = np.empty(count, np.int32)
+    for k in range(kinds):
+        begin, end = 0, 0
         for i in range(count):
-            now[i] = 0
-            for k in range(some):
-                now[i] |= np.uint64(members[i, first + k]) << np.uint64(k)
+            if members[i, k]:
+                come_to[end] = i
+                end += 1
         for _ in range(steps):
-            before[:] = now
-            for i in range(count):
-                for n in range(ends[i], ends[i + 1]):
-                    now[i] |= before[neighbours[n]]
-        for i in range(count):
-            for k in range(some):
-                near[i, first + k] = (now[i] >> np.uint64(k)) & np.uint64(1) != 0
+            last = end
+            for n in range(begin, last):
+                i = come_to[n]
+                for at in range(ends[i], ends[i + 1]):
+                    other = neighbours[at]
+                    if not near[other, k]:
+                        near[other, k] = True
+                        come_to[end] = other
+                        end += 1
+            begin = last
     return near
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from visup.agent.changing import replace
 from visup.percepts.motion.discovery import middle, rate_of, same_motion, slack_of
 from visup.percepts.motion.layer_loops import quantile
 from visup.percepts.motion.layers import Affine, distances, fit_affine

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.changing import replace
 from visup.percepts.motion.dense import CLIP
 from visup.percepts.motion.discovery import discover, rate_of, slack_of
 from visup.percepts.motion.image import Floats

@@ -10,13 +10,13 @@ apart the images are.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
+from visup.agent.changing import replace
 from visup.percepts.motion.image import Floats, WorkImage, prepare
 
 SIZE = 400  # longer side of what is kept, pixels

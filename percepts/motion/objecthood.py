@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 
+from visup.agent.changing import replace
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.picture import edges
 from visup.percepts.motion.silhouette import Silhouette, Silhouettes, cut

@@ -9,12 +9,13 @@ after Horprasert, Harwood, Davis, A statistical approach for robust background s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.changing import replace
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.picture_loops import (
     Pace,

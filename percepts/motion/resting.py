@@ -9,12 +9,12 @@ not know: what was there, and slow, when the picture was made.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from visup.agent import Frame, Region
+from visup.agent.changing import replace
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.objecthood import is_deep_shadow, is_ghost, joined
 from visup.percepts.motion.picture import (

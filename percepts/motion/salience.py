@@ -11,12 +11,12 @@ fitted to the ring around it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.changing import replace
 from visup.percepts.motion.background import slack_of
 from visup.percepts.motion.discovery import middle
 from visup.percepts.motion.image import Floats

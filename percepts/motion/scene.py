@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.changing import replace
 from visup.percepts.motion.background import Background
 from visup.percepts.motion.constraints import Constraints, Points
 from visup.percepts.motion.discovery import middle, rate_of, slack_of

@@ -9,13 +9,13 @@ is while others hide it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from visup.agent.changing import replace
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.silhouette import (
     Mask,

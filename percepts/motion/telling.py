@@ -6,12 +6,13 @@ An object that both have found is told as its silhouette, under the id under whi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from visup.agent import Region
+from visup.agent.changing import replace
 from visup.percepts.motion.contour import describe
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.objecthood import is_salient

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import dist, hypot
 from types import MappingProxyType
 
@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.changing import replace
 from visup.percepts.motion.cell_loops import brought
 from visup.percepts.motion.image import Floats
 from visup.percepts.motion.layers import Affine, Doubles
@@ -383,8 +384,9 @@ def remember(
         pace = (float(velocity[0]), float(velocity[1]))
     taken = (winner > 0) & ~mine
     covered = taken & (track.own > 0.5 if track.own is not None else False)
+    lost = cells.area[covered].sum()
     # A cell or two beside another object is no occlusion; nor is what was never told remembered.
-    much = track.id > 0 and cells.area[covered].sum() > max(0.05 * area, 0.3 * least)
+    much = track.id > 0 and lost > max(0.05 * area, 0.3 * least)
     hidden = cells.paint(covered) if much else None
     if much and track.whole_map is not None and track.own is not None:
         # By pixels, for cells are others in each frame: by those it would wear away at its edges.
@@ -398,6 +400,6 @@ def remember(
         seen=now if seen else track.seen,
         frames=track.frames + int(seen),
         centre=track.centre if track.mostly_hidden else centre,
-        mostly_hidden=bool(cells.area[covered].sum() > 0.5 * area),
+        mostly_hidden=bool(lost > 0.5 * area),
         pace=pace,
     )
