@@ -38,7 +38,8 @@ def _rule(contract: Contract) -> Rule:
     name = f"{_PREFIX}{contract.name}"
     say = f"The behaviour '{contract.name}' is called for {{a}}."
     try:
-        (rule,) = parse_rules(f'rule {name}(a): info\nwhen {contract.awake}\nsay "{say}"\n')
+        text = f'rule {name}(a): info\nwhen {contract.awake}\nsay "{say}"\n'
+        (rule,) = parse_rules(text, "awake")
     except (VisupError, ValueError) as fault:
         raise BehaviourError(
             f"`awake` is no condition about an object `a`: {fault}",
