@@ -22,7 +22,7 @@ CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two act
 
 def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
     """Model names that an actor stands for: the user's word, else the task's, else its own name."""
-    return mind.actors.get(actor) or task.models(actor)
+    return tuple(mind.actors.get(actor, ())) or task.models(actor)
 
 
 def strength(belief: ObjectBelief, models: Sequence[str]) -> float:

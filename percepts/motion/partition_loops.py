@@ -67,22 +67,22 @@ def flooded(right: Bytes, down: Bytes, marks: Labels) -> None:
             flat[p] = LINE
             continue
         flat[p] = cell
-        if a == 0:
-            level = np.uint64(east[p - one])
-            _queue(flat, first, last, p - one, level)
-            lowest = min(lowest, level)
-        if b == 0:
-            level = np.uint64(east[p])
-            _queue(flat, first, last, p + one, level)
-            lowest = min(lowest, level)
-        if c == 0:
-            level = np.uint64(south[p - row])
-            _queue(flat, first, last, p - row, level)
-            lowest = min(lowest, level)
-        if d == 0:
-            level = np.uint64(south[p])
-            _queue(flat, first, last, p + row, level)
-            lowest = min(lowest, level)
+        lowest = _come_to(flat, first, last, p - one, east[p - one], lowest)
+        lowest = _come_to(flat, first, last, p + one, east[p], lowest)
+        lowest = _come_to(flat, first, last, p - row, south[p - row], lowest)
+        lowest = _come_to(flat, first, last, p + row, south[p], lowest)
+
+
+@compiled
+def _come_to(
+    flat: Labels, first: Labels, last: Labels, p: np.uint64, edge: int, lowest: np.uint64
+) -> np.uint64:
+    """Queue a pixel that nobody has come to; the lowest level at which some wait."""
+    if flat[p] != 0:
+        return lowest
+    level = np.uint64(edge)
+    _queue(flat, first, last, p, level)
+    return min(lowest, level)
 
 
 @compiled

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from tests.tasks.scripted import Played, Script, Spell, play
@@ -9,7 +11,7 @@ from visup.agent import Status, TaskBelief, Verdict
 from visup.supervisor import final_verdict
 from visup.tasks import parse_task
 from visup.tasks.activity import AUDIBLE
-from visup.tasks.supervise import task_thinker
+from visup.tasks.supervise import SILENT_S, task_thinker
 
 DOCK = parse_task("""<dock> ::= <approach> <captured>
 <approach> ::= converging(arm, satellite)
@@ -116,3 +118,21 @@ def test_that_a_task_is_recognised_and_set_aside_is_told() -> None:
     assert ("task_active", "dock") in told
     assert ("task_inactive", "inspect") in told
     assert told.index(("task_active", "inspect")) < told.index(("task_inactive", "inspect"))
+
+
+def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own_pace() -> None:
+    minds = play(task_thinker([DOCK, INSPECT, LEAVE]), Script(DOCKS), 26.0, 25.0).minds
+    paces = set()
+    for before, mind in pairwise(minds):
+        for old, new in zip(before.memory["tasks"], mind.memory["tasks"], strict=True):
+            if old.activity.audible:
+                assert new.time == mind.time
+            else:
+                assert mind.time - new.time < SILENT_S
+                paces |= {round(new.time - old.time, 6)} - {0.0}
+    assert paces == {SILENT_S}
+
+
+def test_one_task_alone_is_followed_in_each_step() -> None:
+    for mind in play(task_thinker([DOCK]), Script(DOCKS), 15.0, 25.0).minds:
+        assert mind.memory["tasks"][0].time == mind.time
