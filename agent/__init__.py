@@ -6,11 +6,10 @@ may be plugged in), `agent.py` (the cycle on one screen), `perceive.py`, `slot.p
 behaviours are contained), `registry.py`, `journal.py`.
 """
 
-from visup.agent.behaviour import Behaviour, Contract, Outcome, Thinker
-from visup.agent.cells import Column, Relation
-from visup.agent.errors import VisupError
-from visup.agent.limits import Limits
-from visup.agent.mind import (
+from visup.agent.contract.behaviour import Behaviour, Contract, Outcome, Thinker
+from visup.agent.contract.limits import Limits
+from visup.agent.model.errors import VisupError
+from visup.agent.model.mind import (
     Binding,
     Candidate,
     Coupling,
@@ -28,7 +27,8 @@ from visup.agent.mind import (
     Verdict,
     Zone,
 )
-from visup.agent.records import (
+from visup.agent.model.notebook import showing
+from visup.agent.model.records import (
     Alert,
     Concern,
     Depth,
@@ -47,8 +47,8 @@ from visup.agent.records import (
     Severity,
     Truth,
 )
-from visup.agent.relations import RelationTable
-from visup.agent.shown import showing
+from visup.agent.model.relation_columns import Column, Relation
+from visup.agent.model.relation_table import RelationTable
 
 __all__ = [
     "Alert",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from visup.agent.agent import Step
-from visup.demo import demo_settings
-from visup.supervisor import build_agent, final_verdict, open_video
+from visup.agent.model.step import Step
+from visup.runs.demo import demo_settings
+from visup.runs.wiring import build_agent, final_verdict, open_video
 
 
 def tell(step: Step) -> None:

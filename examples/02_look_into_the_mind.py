@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from visup.agent import ObjectBelief
-from visup.agent.agent import Step
-from visup.demo import demo_settings
-from visup.supervisor import build_agent, open_video
+from visup.agent.model.step import Step
+from visup.runs.demo import demo_settings
+from visup.runs.wiring import build_agent, open_video
 
 
 def identified(step: Step) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from visup.agent.errors import VisupError
+from visup.agent.model.errors import VisupError
 from visup.tasks import parse_task
 
 GOOD = """

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept
-from visup.agent.agent import Agent
-from visup.demo import demo_settings
-from visup.supervisor import open_video
+from visup.agent.cycle.agent import Agent
+from visup.runs.demo import demo_settings
+from visup.runs.wiring import open_video
 
 
 class Lamp:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from visup.demo import demo_settings
-from visup.percepts.shape.database import ModelDatabase
+from visup.percepts.shape.database.database import ModelDatabase
+from visup.runs.demo import demo_settings
 
 if __name__ == "__main__":
     silhouette = np.zeros((240, 320), np.uint8)

@@ -16,7 +16,7 @@ from onnx import TensorProto, helper, save
 from pydantic import BaseModel, Field
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept
-from visup.agent.agent import Agent
+from visup.agent.cycle.agent import Agent
 from visup.testing import crossing
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept
-from visup.agent.agent import Agent
+from visup.agent.cycle.agent import Agent
 
 
 class Markers:

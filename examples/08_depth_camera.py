@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Contract, Depth, Directive, Frame, Observation, Percept
-from visup.agent.agent import Agent
+from visup.agent.cycle.agent import Agent
 from visup.testing import crossing, stand_ins
 
 

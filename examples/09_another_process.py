@@ -7,8 +7,8 @@ import time
 from collections.abc import Iterator, Sequence
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept
-from visup.agent.agent import Agent
-from visup.agent.limits import Limits
+from visup.agent.contract.limits import Limits
+from visup.agent.cycle.agent import Agent
 from visup.testing import disc
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from visup.demo import demo_settings
+from visup.runs.demo import demo_settings
+from visup.runs.wiring import build_agent, open_video
 from visup.stepping import Stepper
-from visup.stepping.whatif import IdentityIs
-from visup.supervisor import build_agent, open_video
+from visup.stepping.what_if import IdentityIs
 
 if __name__ == "__main__":
     settings = demo_settings(every=4)

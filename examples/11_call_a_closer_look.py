@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import cv2
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept, ReportState
-from visup.settings import WatchSettings
-from visup.supervisor import build_agent
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent
 from visup.testing import crossing
 
 

@@ -17,10 +17,18 @@ from typing import Any
 import cv2
 from scipy.spatial.distance import pdist
 
-from visup.agent.behaviour import Contract
-from visup.agent.errors import SettingsError
-from visup.agent.records import Depth, Directive, Frame, Hypothesis, Observation, Percept, Region
-from visup.percepts.shape.database import ModelDatabase
+from visup.agent.contract.behaviour import Contract
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.records import (
+    Depth,
+    Directive,
+    Frame,
+    Hypothesis,
+    Observation,
+    Percept,
+    Region,
+)
+from visup.percepts.shape.database.database import ModelDatabase
 
 FOV_VERTICAL_DEG = 40.0
 """Vertical field of view assumed when none is told."""

@@ -7,8 +7,8 @@ mean), `course.py` (where one can be in a task), `verify.py` (how a step stands)
 joins them).
 """
 
-from visup.tasks.load import load_task, load_tasks, parse_task, shipped_tasks
-from visup.tasks.tree import Action, Actor, Choice, Sequence, Stage, Task, Together
+from visup.tasks.checks.load import load_task, load_tasks, parse_task, shipped_tasks
+from visup.tasks.grammar.nodes import Action, Actor, Choice, Sequence, Stage, Task, Together
 
 __all__ = [
     "Action",

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.paths import ROOT
+
 PARTS = ("agent", "percepts", "rules", "tasks")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 

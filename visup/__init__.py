@@ -2,11 +2,11 @@
 
 Where to read first:
 
-1. `visup/agent/records.py`: what flows, from a frame to an alert; `visup/agent/mind.py`: what is believed.
-2. `visup/agent/agent.py`: the cogitation-action cycle on one screen.
+1. `visup/agent/model/`: what flows (`records.py`) and what is believed (`mind.py`).
+2. `visup/agent/cycle/agent.py`: the cogitation-action cycle on one screen.
 3. `visup/percepts/`: seeing (video, motion, shape, depth, health), each as a behaviour.
 4. `visup/rules/` and `visup/tasks/`: interpreting what is seen, and verifying tasks.
-5. `visup/supervisor.py`: all of it wired together; `visup/cli.py`: the command.
+5. `visup/runs/wiring.py`: all of it wired together; `visup/cli.py`: the command.
 
 `docs/tour.md` follows one frame through all of it.
 """

@@ -9,17 +9,17 @@ from typing import Annotated
 import typer
 
 import visup
-from visup.agent.errors import VisupError
+from visup.agent.model.errors import VisupError
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
-from visup.commands.evaluate import app as evaluate_app
+from visup.commands.eval.app import app as evaluate_app
 from visup.commands.models import app as models_app
 from visup.commands.render import render
 from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
 from visup.commands.step import step
-from visup.commands.task import app as task_app
+from visup.commands.task.task import app as task_app
 from visup.commands.watch import demo, watch
 
 BAD_INPUT = 2

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from visup.agent import ReportState
 
 VERSION = 1
-"""Of the form; that of the journal that holds it is `visup.agent.journal.VERSION`."""
+"""Of the form; that of the journal that holds it is `visup.agent.storage.journal.VERSION`."""
 
 Number = Annotated[float, Field(description="A number; Infinity and NaN are written so.")]
 

@@ -20,13 +20,13 @@ from visup.agent import (
     Observation,
     Percept,
 )
-from visup.agent.state import held
-from visup.percepts.health.arrivals import Arrivals
-from visup.percepts.health.cells import Cells
-from visup.percepts.health.grain import Grain
-from visup.percepts.health.picture import Picture, measure
-from visup.percepts.health.repeats import Repeats
+from visup.agent.storage.checkpoint import held
+from visup.percepts.health.frozen_cells import Cells
+from visup.percepts.health.image_quality import Picture, measure
+from visup.percepts.health.noise import Grain
+from visup.percepts.health.repeated_frames import Repeats
 from visup.percepts.health.settings import HealthSettings
+from visup.percepts.health.timing import Arrivals
 
 OK = Health(HealthStatus.OK)
 USUAL = 25  # sound images that say what is usual
@@ -55,7 +55,7 @@ class HealthBehaviour:
         self._harmed = False
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
         return held(self, "_settings")
 
     def load(self, state: Mapping[str, Any]) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from visup.agent import Contract, Directive, Frame, HealthStatus, Observation, Percept
-from visup.percepts.motion.lookback import LookBack
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.output.backward_tracking import LookBack
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.settings import MotionSettings
 
 HARMED = frozenset(HealthStatus) - {HealthStatus.OK, HealthStatus.DROPPED}
 """Faults of the image itself; where frames are missing, those that come are sound."""
@@ -28,7 +28,7 @@ class MotionBehaviour:
         self._back = LookBack()
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
         return {"segmenter": self._segmenter.save(), "back": self._back}
 
     def load(self, state: Mapping[str, Any]) -> None:

@@ -15,26 +15,28 @@ import cv2
 import numpy as np
 
 from visup.agent import Directive, Frame, Region
-from visup.agent.state import held
-from visup.percepts.motion.background import bare_ground, find_background
-from visup.percepts.motion.constraints import (
+from visup.agent.storage.checkpoint import held
+from visup.percepts.motion.features.constraints import (
     Constraints,
     Points,
     find_points,
     track,
     with_flow,
 )
-from visup.percepts.motion.dense import label, looks
-from visup.percepts.motion.discovery import rate_of
-from visup.percepts.motion.image import Floats, History, WorkImage, prepare
-from visup.percepts.motion.joining import absorb, merge, release
-from visup.percepts.motion.layers import Affine
-from visup.percepts.motion.life import bear, bury, confirm, update
-from visup.percepts.motion.looked import Looked
-from visup.percepts.motion.report import chosen, evidence_of, obey, report, sought
-from visup.percepts.motion.resting import RestingView
-from visup.percepts.motion.salience import rests, weigh
-from visup.percepts.motion.scene import (
+from visup.percepts.motion.features.image import Floats, History, WorkImage, prepare
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.features.superpixels import Superpixels, superpixels
+from visup.percepts.motion.layers.camera_model import bare_ground, find_background
+from visup.percepts.motion.layers.dense import label, looks
+from visup.percepts.motion.layers.discovery import rate_of
+from visup.percepts.motion.layers.layers import Affine
+from visup.percepts.motion.layers.rate import Rate
+from visup.percepts.motion.output.report import chosen, evidence_of, obey, report, sought
+from visup.percepts.motion.static_camera.static_segmenter import RestingView
+from visup.percepts.motion.tracks.lifecycle import bear, bury, confirm, update
+from visup.percepts.motion.tracks.merge_split import absorb, merge, release
+from visup.percepts.motion.tracks.salience import rests, weigh
+from visup.percepts.motion.tracks.scene import (
     Measured,
     Scene,
     expected,
@@ -43,10 +45,9 @@ from visup.percepts.motion.scene import (
     outside,
     reach_of,
 )
-from visup.percepts.motion.settings import MotionSettings
-from visup.percepts.motion.superpixels import Superpixels, superpixels
-from visup.percepts.motion.tracking import Rate, Tracks, carry, priors
-from visup.percepts.motion.warping import flow_back, warped
+from visup.percepts.motion.tracks.trace import Looked
+from visup.percepts.motion.tracks.tracking import Tracks, carry, priors
+from visup.percepts.motion.tracks.warping import flow_back, warped
 
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
 
@@ -88,7 +89,7 @@ class MotionSegmenter:
         return self._resting.active
 
     def save(self) -> dict[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
         return held(self, "settings", "looked", "_beside", "_engine")
 
     def load(self, state: Mapping[str, Any]) -> None:

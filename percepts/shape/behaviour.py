@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent.behaviour import Contract
-from visup.agent.records import Directive, Frame, Hypothesis, Observation, Percept, Region
-from visup.percepts.shape.database import ModelDatabase, ViewMatch
-from visup.percepts.shape.silhouette import normalise
+from visup.agent.contract.behaviour import Contract
+from visup.agent.model.records import Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.percepts.shape.database.database import ModelDatabase, ViewMatch
+from visup.percepts.shape.silhouette.silhouette import normalise
 
 _THUMB = 48
 
@@ -86,7 +86,7 @@ class ShapeBehaviour:
         self._remembered: dict[int, _Remembered] = {}
 
     def save(self) -> Mapping[str, Any]:
-        """All that is remembered of the frames so far; see `visup.agent.state`."""
+        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
         return {"remembered": self._remembered}
 
     def load(self, state: Mapping[str, Any]) -> None:

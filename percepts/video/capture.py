@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.video.base import DEFAULT_FPS, to_bgr
-from visup.percepts.video.quiet import hush_decoder, quiet
+from visup.percepts.video.silence import hush_decoder, quiet
 
 CONNECT_MS = 10_000
 HIGHEST_FPS = 1000.0

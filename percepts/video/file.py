@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from visup.agent import Frame
-from visup.agent.errors import SourceError
+from visup.agent.model.errors import SourceError
 from visup.percepts.video.base import Ending, Source
 from visup.percepts.video.capture import (
     Capture,

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame
-from visup.agent.errors import SourceError
+from visup.agent.model.errors import SourceError
 from visup.percepts.video.base import DEFAULT_FPS, Ending, Source, to_bgr
-from visup.percepts.video.quiet import quiet
+from visup.percepts.video.silence import quiet
 
 IMAGE_SUFFIXES = frozenset(
     {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".pbm", ".pnm"}

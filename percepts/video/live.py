@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from visup.agent import Concern, Frame, Severity
-from visup.agent.errors import SourceError
+from visup.agent.model.errors import SourceError
 from visup.percepts.video.base import Ending, Source
 from visup.percepts.video.capture import Capture, frame_rate, take
 

@@ -6,7 +6,7 @@ import math
 import re
 from pathlib import Path
 
-from visup.agent.errors import SettingsError, SourceError
+from visup.agent.model.errors import SettingsError, SourceError
 from visup.percepts.video.base import Source
 from visup.percepts.video.capture import (
     Capture,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from visup.render.scenario import Scenario
+from visup.render.scenario.scenario import Scenario
 
 QUIET = {"noise": 0.0, "blur_px": 0.0, "black": 0.0, "gamma": 1.0}
 

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from visup.percepts.shape.database import ModelDatabase
-from visup.percepts.shape.views import half_sphere_directions, render_views
-from visup.render.demo_clip import CLIP, RECORD
-from visup.render.demo_models import MODELS, rendered_views, view_counts
-from visup.render.library import shipped_scenario
-from visup.render.meshes import mesh
-from visup.render.renderer import Renderer
-from visup.render.truth import frame_truth, mission
+from visup.percepts.shape.building.views import half_sphere_directions, render_views
+from visup.percepts.shape.database.database import ModelDatabase
+from visup.render.imaging.renderer import Renderer
+from visup.render.meshes.spacecraft import mesh
+from visup.render.output.demo_clip import CLIP, RECORD
+from visup.render.output.demo_models import MODELS, rendered_views, view_counts
+from visup.render.output.truth import frame_truth, mission
+from visup.render.scenario.library import shipped_scenario
 
 DATA = Path(str(resources.files("visup") / "data"))
 CHECKED = (0, 137, 300, 431, 549)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from tests.paths import ROOT
+from visup.render.imaging.renderer import Renderer
+from visup.render.meshes.spacecraft import MESHES
+from visup.render.scenario.scenario import parse_scenario
 
-from visup.render.meshes import MESHES
-from visup.render.renderer import Renderer
-from visup.render.scenario import parse_scenario
-
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
 
 
 def test_the_example_renders() -> None:

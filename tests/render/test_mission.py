@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from visup.agent.errors import ExtraMissingError, OutputError, SettingsError
+from visup.agent.model.errors import ExtraMissingError, OutputError, SettingsError
 from visup.commands.render import needs_renderer, parse_size
-from visup.render.library import shipped_scenario
-from visup.render.renderer import Renderer
-from visup.render.truth import presence_events, spin_deg_per_s
-from visup.render.writer import write_mission
+from visup.render.imaging.renderer import Renderer
+from visup.render.output.truth import presence_events, spin_deg_per_s
+from visup.render.output.writer import write_mission
+from visup.render.scenario.library import shipped_scenario
 
 TINY = (96, 72)
 

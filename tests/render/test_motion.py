@@ -10,13 +10,20 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from visup.agent.errors import SettingsError
-from visup.render import arm
-from visup.render.arm import Joints, link_poses, reach, tip_pose
-from visup.render.meshes import MESHES, mesh
-from visup.render.shapes import Solid, ball, box, cone, lathe, mirrored, plate
-from visup.render.things import THINGS
-from visup.render.tracks import inverse, look_at, pose_of, rotation_at, shake, value_at
+from visup.agent.model.errors import SettingsError
+from visup.render.meshes import arm
+from visup.render.meshes.arm import Joints, link_poses, reach, tip_pose
+from visup.render.meshes.distractors import THINGS
+from visup.render.meshes.solids import Solid, ball, box, cone, lathe, mirrored, plate
+from visup.render.meshes.spacecraft import MESHES, mesh
+from visup.render.scenario.trajectories import (
+    inverse,
+    look_at,
+    pose_of,
+    rotation_at,
+    shake,
+    value_at,
+)
 
 angle = st.floats(-3.0, 3.0)
 small = st.floats(-1.2, 1.2)

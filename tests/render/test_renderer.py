@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.render.scenes import QUIET, box_file, scene, sphere_file, thing
-from visup.render.library import shipped_names, shipped_scenario
-from visup.render.renderer import Renderer, pixel_rays
-from visup.render.scenario import Scenario
-from visup.render.truth import frame_truth
+from visup.render.imaging.renderer import Renderer, pixel_rays
+from visup.render.output.truth import frame_truth
+from visup.render.scenario.library import shipped_names, shipped_scenario
+from visup.render.scenario.scenario import Scenario
 
 TINY = (96, 72)
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from visup.render.background import AIR_KM, EARTH_RADIUS_KM, clouds, earth, panorama, stars
-from visup.render.optics import Camera, CameraKey, Earth, Light, Panorama, Sensor, Stars
-from visup.render.sensor import expose
-from visup.render.texture import pattern
+from visup.render.imaging.background import AIR_KM, EARTH_RADIUS_KM, clouds, earth, panorama, stars
+from visup.render.imaging.sensor import expose
+from visup.render.imaging.texture import pattern
+from visup.render.scenario.optics import Camera, CameraKey, Earth, Light, Panorama, Sensor, Stars
 
 CAMERA = Camera(size=(120, 120), track=(CameraKey(position=(0, 0, 0), look_at=(1, 0, 0)),))
 

@@ -32,7 +32,7 @@ from visup.agent import (
     Truth,
     Verdict,
 )
-from visup.agent.agent import Step
+from visup.agent.model.step import Step
 
 FPS = 5.0
 TOUCH_S, END_S = 6.0, 12.0

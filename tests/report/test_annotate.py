@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tests.report.scene import frame_at, mind_at
 from visup.agent import Alert, Mind, Presence, Severity
 from visup.report.annotate import _overlap, _place, annotate, label_of
+from visup.report.image_text import fitted, ink
 from visup.report.palette import OBJECT_COLOURS, object_colour
-from visup.report.text import fitted, ink
 
 SIZES = [(640, 480), (320, 240), (1280, 720), (64, 48), (200, 400), (17, 9)]
 

@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 
 from tests.report.scene import TOLD, run
 from visup.agent import Event, Severity, Verdict
-from visup.agent.errors import ExtraMissingError, OutputError
-from visup.report.data import Collector
+from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.report.collector import Collector
 from visup.report.figures import distance_figures, fitted_lines, vote_figures
 from visup.report.html import embedded, plotly_source, report_page, write_report
 from visup.report.records import RunData, Span
 from visup.report.sections import flat, narrative, nearest
-from visup.report.story import summary, title_of, verdict_words
+from visup.report.summary import summary, title_of, verdict_words
 
 EVIL = "<script>alert('x')</script> & \"quotes\""
 VOID = frozenset({"meta", "img", "br", "link", "input", "hr"})

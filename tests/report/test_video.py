@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.scene import FPS, run
-from visup.agent.errors import OutputError
+from visup.agent.model.errors import OutputError
 from visup.percepts.video import open_source
 from visup.report.annotate import annotate
 from visup.report.video import AnnotatedVideo, VideoWriter, playable_size

@@ -1,19 +1,19 @@
-"""Percepts made from the truth of shared missions, for tests: see `visup.evaluation.truth_percepts`."""
+"""Percepts made from the truth of shared missions, for tests."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
+from tests.paths import SHARED
 from visup.agent import Observation
-from visup.evaluation.mission_files import read_json
-from visup.evaluation.truth_masks import Mission, load_mission
-from visup.evaluation.truth_percepts import PerceptNoise, observations_of
+from visup.evaluation.missions.mission_files import read_json
+from visup.evaluation.simulation.truth_masks import Mission, load_mission
+from visup.evaluation.simulation.truth_percepts import PerceptNoise, observations_of
 
-MISSIONS = Path(__file__).resolve().parents[2] / "../shared/data/missions"
+MISSIONS = SHARED / "missions"
 
 
 @dataclass(frozen=True)

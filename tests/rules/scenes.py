@@ -17,7 +17,7 @@ from visup.agent import (
     Report,
     ReportState,
 )
-from visup.rules.outlines import reach
+from visup.rules.geometry.outlines import reach
 
 SIZE = (640, 480)
 Rect = tuple[float, float, float, float]

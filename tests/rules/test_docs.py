@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
-from visup.rules.bounds import MOST_KEPT, MOST_VARIABLES
-from visup.rules.facts import SIGMAS
-from visup.rules.fragments import FragmentSettings
-from visup.rules.language import parse_rules, shipped_rules
-from visup.rules.measure import RelationSettings
-from visup.rules.operators import REACH, SPACING
-from visup.rules.thinkers import RuleSettings
-from visup.rules.units import DIMENSION, TICKS
-from visup.rules.vocabulary import IMPLIED, KEEP_OUT, QUANTITIES, WORDS
-from visup.rules.work import PresenceSettings
+from tests.paths import ROOT
+from visup.rules.formula.units import DIMENSION, TICKS
+from visup.rules.language.cost import MOST_KEPT, MOST_VARIABLES
+from visup.rules.language.parser import parse_rules, shipped_rules
+from visup.rules.monitoring.operators import REACH, SPACING
+from visup.rules.predicates.snapshot import SIGMAS
+from visup.rules.predicates.vocabulary import IMPLIED, KEEP_OUT, QUANTITIES, WORDS
+from visup.rules.presence.fragments import FragmentSettings
+from visup.rules.presence.step_context import PresenceSettings
+from visup.rules.reasoners import RuleSettings
+from visup.rules.relations.kinematics import RelationSettings
 
-PAGE = (Path(__file__).parents[2] / "docs/rules.md").read_text("utf-8")
+PAGE = (ROOT / "docs/rules.md").read_text("utf-8")
 BLOCKS = [t for kind, t in re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.S | re.M) if not kind]
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]

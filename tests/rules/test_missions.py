@@ -7,7 +7,7 @@ import pytest
 from tests.rules.percepts_from_truth import Noise, actors_of, available, observations
 from tests.rules.runs import Thought, dock, think
 from visup.agent import Presence, Truth
-from visup.rules.thinkers import default_thinkers
+from visup.rules.reasoners import default_thinkers
 
 pytestmark = pytest.mark.skipif(
     not available("capture_fails"), reason="the shared missions are not beside this repository"

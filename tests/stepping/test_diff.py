@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.stepping.courses import reasoning_course
+from tests.stepping.timelines import reasoning_course
 from visup.agent import Truth
 from visup.stepping import MindDiff, difference
 

@@ -1,16 +1,16 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
-from visup.tasks.actions import ACTIONS
-from visup.tasks.faults import CODES
-from visup.tasks.load import shipped_tasks
-from visup.tasks.read import read
+from tests.paths import ROOT
+from visup.tasks.actions.actions import ACTIONS
+from visup.tasks.checks.load import shipped_tasks
+from visup.tasks.diagnostics.diagnostic import CODES
+from visup.tasks.grammar.parser import read
 
-PAGE = (Path(__file__).parents[2] / "docs/task-language.md").read_text("utf-8")
+PAGE = (ROOT / "docs/task-language.md").read_text("utf-8")
 BLOCKS = [
     b for b in re.findall(r"```\n(.*?)```", PAGE, re.S) if "^" not in b and not b.startswith("$")
 ]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from visup.tasks.chunk import WORDS
-from visup.tasks.conditions import Both, Condition, Denied, Either
-from visup.tasks.tree import (
+from visup.tasks.grammar.conditions import Both, Condition, Denied, Either
+from visup.tasks.grammar.nodes import (
     Action,
     Actor,
     Actors,
@@ -34,7 +33,8 @@ from visup.tasks.tree import (
     Together,
     ZoneDeclaration,
 )
-from visup.tasks.units import UNITS
+from visup.tasks.grammar.statement import WORDS
+from visup.tasks.grammar.units import UNITS
 
 names = st.from_regex(r"[a-zA-Zä_][a-z0-9_é]{0,8}", fullmatch=True).filter(lambda n: n not in WORDS)
 models = st.from_regex(r"[a-z0-9][a-z0-9_.\-]{0,8}", fullmatch=True).filter(

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from visup.agent import Contract
-    from visup.agent.loading import Offer
+    from visup.agent.plugins.loader import Offer
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -55,8 +55,8 @@ def list_behaviours() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from visup.agent.errors import BehaviourError
-    from visup.agent.registry import discover
+    from visup.agent.model.errors import BehaviourError
+    from visup.agent.plugins.registry import discover
 
     registry, console = discover(), Console(highlight=False)
     table = Table(padding=(0, 0))
@@ -90,7 +90,7 @@ def check(
     """
     from rich.console import Console
 
-    from visup.agent.plugin_settings import parse_settings
+    from visup.agent.plugins.settings import parse_settings
 
     console, values = Console(highlight=False), parse_settings(setting or ())
     kept = [_check(console, offer, values) for offer in _offers(where)]
@@ -105,7 +105,7 @@ def new(
     """Write a behaviour that runs at once, to be changed into your own."""
     from keyword import iskeyword
 
-    from visup.agent.errors import OutputError, SettingsError
+    from visup.agent.model.errors import OutputError, SettingsError
 
     if not name.isidentifier() or iskeyword(name):
         raise SettingsError(
@@ -125,8 +125,8 @@ def new(
 
 
 def _offers(where: str) -> list[Offer]:
-    from visup.agent.loading import offers
-    from visup.agent.registry import discover
+    from visup.agent.plugins.loader import offers
+    from visup.agent.plugins.registry import discover
 
     registry = discover()
     return [registry.offer(where)] if where in registry.names() else offers(where)

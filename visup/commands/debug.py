@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from visup.percepts.video import Source
-    from visup.run import Progress
+    from visup.runs.runner import Progress
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -58,7 +58,7 @@ def _write(video: Source, target: Path, limit: int | None, advance: Progress) ->
     from itertools import islice
 
     from visup.percepts.motion.segmenter import MotionSegmenter
-    from visup.report.debug_motion import draw_motion
+    from visup.report.motion_debug.panels import draw_motion
     from visup.report.video import VideoWriter
 
     segmenter, written = MotionSegmenter(), 0
@@ -93,7 +93,7 @@ def checked_target(path: Path) -> Path:
         SettingsError: It is not WebM.
         OutputError: Its folder does not exist.
     """
-    from visup.agent.errors import OutputError, SettingsError
+    from visup.agent.model.errors import OutputError, SettingsError
 
     if path.suffix != ".webm":
         raise SettingsError(

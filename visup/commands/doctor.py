@@ -114,7 +114,7 @@ def _codecs() -> str:
 
 
 def _behaviours() -> str:
-    from visup.agent.registry import discover
+    from visup.agent.plugins.registry import discover
 
     registry = discover()
     for name in registry.names():
@@ -132,9 +132,9 @@ def _tasks() -> str:
 
 
 def _demo() -> str:
-    from visup.demo import demo_settings
-    from visup.percepts.shape.database import ModelDatabase
-    from visup.supervisor import open_video
+    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.runs.demo import demo_settings
+    from visup.runs.wiring import open_video
 
     settings = demo_settings()
     with open_video(settings) as source:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from visup.percepts.shape.database import ModelDatabase, Ranking
+    from visup.percepts.shape.database.database import ModelDatabase, Ranking
 
 app = typer.Typer(
     no_args_is_help=True, help="Model databases: the shapes that objects are known by."
@@ -41,7 +41,7 @@ def build(
 
     from rich.progress import Progress
 
-    from visup.percepts.shape.build import build_database
+    from visup.percepts.shape.building.build import build_database
 
     with Progress(transient=True) as bar:
         task = bar.add_task("views", total=len(meshes) * max(1, views))
@@ -73,9 +73,9 @@ def add(
 
     Silhouettes may be cut by the pictures' borders, and are then stored as such.
     """
-    from visup.agent.errors import SettingsError
-    from visup.percepts.shape.build import read_masks, read_silhouettes, silhouette_views
-    from visup.percepts.shape.database import ModelDatabase
+    from visup.agent.model.errors import SettingsError
+    from visup.percepts.shape.building.build import read_masks, read_silhouettes, silhouette_views
+    from visup.percepts.shape.database.database import ModelDatabase
 
     if clusters < 1 or not name.strip():
         raise SettingsError(
@@ -103,7 +103,7 @@ def list_models(db: Db) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from visup.percepts.shape.database import ModelDatabase
+    from visup.percepts.shape.database.database import ModelDatabase
 
     database = ModelDatabase.open(db)
     table = Table("object", "views", "directions", "cut by a border", title=str(db))
@@ -126,10 +126,10 @@ def match_picture(
     ] = None,
 ) -> None:
     """Rank the views that a silhouette looks like; with --out, draw why."""
-    from visup.agent.errors import DatabaseError, SettingsError
-    from visup.percepts.shape.build import read_silhouette
-    from visup.percepts.shape.database import ModelDatabase
-    from visup.percepts.shape.silhouette import looks_cut, normalise
+    from visup.agent.model.errors import DatabaseError, SettingsError
+    from visup.percepts.shape.building.build import read_silhouette
+    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.silhouette.silhouette import looks_cut, normalise
 
     if top < 1:
         raise SettingsError(f"the best {top} views were asked for", expected="at least 1")
@@ -148,7 +148,7 @@ def match_picture(
     else:
         _print_ranking(ranking, image, len(database.views))
     if out is not None:
-        from visup.percepts.shape.pictures import match_picture
+        from visup.percepts.shape.drawing.pictures import match_picture
 
         _write_picture(out, match_picture(database, silhouette, ranking, image.name), as_json)
 
@@ -161,8 +161,8 @@ def show(
     ] = None,
 ) -> None:
     """Draw a contact sheet: a row for each model, its views with their shock graphs."""
-    from visup.percepts.shape.database import ModelDatabase
-    from visup.percepts.shape.pictures import contact_sheet
+    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.drawing.pictures import contact_sheet
 
     sheet = contact_sheet(ModelDatabase.open(db))
     _write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)
@@ -171,7 +171,7 @@ def show(
 def _write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -> None:
     import cv2
 
-    from visup.agent.errors import OutputError
+    from visup.agent.model.errors import OutputError
 
     done, data = cv2.imencode(".png", picture)
     try:

@@ -26,8 +26,8 @@ def render(
     from rich.console import Console
     from rich.progress import Progress
 
-    from visup.render.library import find_scenario
-    from visup.render.writer import write_mission
+    from visup.render.output.writer import write_mission
+    from visup.render.scenario.library import find_scenario
 
     found = find_scenario(scenario)
     if size is not None:
@@ -53,7 +53,7 @@ def needs_renderer() -> None:
         import embreex  # noqa: F401
         import trimesh  # noqa: F401
     except ImportError as error:
-        from visup.agent.errors import ExtraMissingError
+        from visup.agent.model.errors import ExtraMissingError
 
         raise ExtraMissingError("visup render", "render") from error
 
@@ -64,7 +64,7 @@ def parse_size(text: str) -> tuple[int, int]:
     Raises:
         SettingsError: It is something else, or a side is not within 16 and 8192 pixels.
     """
-    from visup.agent.errors import SettingsError
+    from visup.agent.model.errors import SettingsError
 
     width, _, height = text.partition("x")
     if width.isdecimal() and height.isdecimal():

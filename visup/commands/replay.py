@@ -12,7 +12,7 @@ from visup.commands.watch import Actors, Rules, Tasks, Zones
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from visup.replay import Difference, Told
+    from visup.runs.replay import Difference, Told
 
 
 def replay(
@@ -39,12 +39,12 @@ def replay(
     """
     from rich.console import Console
 
-    from visup.agent.recording import Recording
-    from visup.narrative import Narrator, verdict_line
-    from visup.replay import difference, recorded, settings_for
-    from visup.replay import replay as reason_again
-    from visup.run import fresh_folder
-    from visup.settings import parse_actors
+    from visup.agent.storage.journal_reader import Recording
+    from visup.runs.replay import difference, recorded, settings_for
+    from visup.runs.replay import replay as reason_again
+    from visup.runs.runner import fresh_folder
+    from visup.runs.settings import parse_actors
+    from visup.terminal.narrator import Narrator, verdict_line
 
     console = Console(highlight=False)
     recording = Recording.open(run)

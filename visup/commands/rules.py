@@ -12,7 +12,7 @@ from visup.commands.watch import Actors, Every, Fov, Fps, Models, Rules, Source,
 
 if TYPE_CHECKING:
     from visup.agent import Mind
-    from visup.rules.formula import Rule
+    from visup.rules.formula.nodes import Rule
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -23,8 +23,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
     """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
-    from visup.agent.errors import ManyErrors, VisupError
-    from visup.rules.language import load_rules, raise_all
+    from visup.agent.model.errors import ManyErrors, VisupError
+    from visup.rules.language.parser import load_rules, raise_all
 
     faults: list[VisupError] = []
     for file in files:
@@ -44,8 +44,8 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
 @app.command("list")
 def list_rules(files: Files = None, as_json: AsJson = False) -> None:
     """List rules: severity, memory bound and delay of each."""
-    from visup.rules.bounds import bounds_of
-    from visup.rules.language import load_rules, shipped_rules
+    from visup.rules.language.cost import bounds_of
+    from visup.rules.language.parser import load_rules, shipped_rules
 
     found = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
     if as_json:
@@ -83,8 +83,8 @@ def explain(
     fov: Fov = None,
 ) -> None:
     """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
-    from visup.agent.errors import SettingsError
-    from visup.supervisor import build_agent, open_video
+    from visup.agent.model.errors import SettingsError
+    from visup.runs.wiring import build_agent, open_video
 
     settings = settings_of(source, task, models, rules, actor, every, None, None, fps, fov)
     agent, mind = build_agent(settings), None
@@ -110,7 +110,7 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
     Raises:
         RuleError: There is no rule of that name.
     """
-    from visup.rules.ask import choices, explain, rule_named, values_of
+    from visup.rules.safety.queries import choices, explain, rule_named, values_of
 
     values = values_of(mind)
     wanted = [rule_named(values, only)] if only else list(values.prepared.rules)
@@ -118,7 +118,7 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
 
 
 def _cost(rule: Rule) -> str:
-    from visup.rules.bounds import bounds_of
+    from visup.rules.language.cost import bounds_of
 
     cost = bounds_of(rule)
     late = f"told {cost.delay_s:g} s late" if cost.delay_s else "told at once"

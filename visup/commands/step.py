@@ -27,8 +27,8 @@ from visup.commands.watch import (
 )
 
 if TYPE_CHECKING:
-    from visup.agent.agent import Agent
-    from visup.settings import WatchSettings
+    from visup.agent.cycle.agent import Agent
+    from visup.runs.settings import WatchSettings
     from visup.stepping import Feed
 
 
@@ -57,8 +57,8 @@ def step(
     """
     # All options by their names: a run folder takes those that replay takes, and refuses the rest.
     given = dict(locals())
-    from visup.prompt import read_commands
-    from visup.session import Session
+    from visup.terminal.prompt import read_commands
+    from visup.terminal.session import Session
 
     with ExitStack() as stack:
         agent, frames = _recorded(given) if _is_run(source) else _live(settings_of(**given), stack)
@@ -68,14 +68,14 @@ def step(
 
 
 def _is_run(source: str) -> bool:
-    from visup.agent.recording import JOURNAL
+    from visup.agent.storage.journal_reader import JOURNAL
 
     path = Path(source)
     return (path / JOURNAL).is_file() or (path.is_file() and path.name == JOURNAL)
 
 
 def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
-    from visup.supervisor import build_agent, open_video
+    from visup.runs.wiring import build_agent, open_video
 
     agent = build_agent(settings)
     stack.callback(agent.close)
@@ -87,12 +87,12 @@ _AGAIN = ("source", "task", "rules", "actor", "zones")
 
 
 def _recorded(given: dict[str, Any]) -> tuple[Agent, Feed]:
-    from visup.agent.errors import SettingsError
-    from visup.agent.recording import Recording
-    from visup.replay import settings_for
-    from visup.settings import parse_actors
+    from visup.agent.model.errors import SettingsError
+    from visup.agent.storage.journal_reader import Recording
+    from visup.runs.replay import settings_for
+    from visup.runs.settings import parse_actors
+    from visup.runs.wiring import reasoning_agent
     from visup.stepping import RecordedFeed
-    from visup.supervisor import reasoning_agent
 
     beyond = [k for k, v in given.items() if k not in _AGAIN and v not in (None, [], 1, False)]
     if beyond:

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from visup.resume import Past
-    from visup.run import Progress, RunOptions, RunResult
-    from visup.settings import WatchSettings
+    from visup.runs.resume import Past
+    from visup.runs.runner import Progress, RunOptions, RunResult
+    from visup.runs.settings import WatchSettings
 
 Source = Annotated[str, typer.Argument(help="Video file, folder of images, camera index or URL.")]
 Tasks = Annotated[
@@ -96,8 +96,8 @@ def settings_of(
     realtime: bool | None = None,
 ) -> WatchSettings:
     """The settings of a run, from the command's options."""
-    from visup.agent.plugin_settings import merged, parse_settings, read_settings
-    from visup.settings import WatchSettings, parse_actors
+    from visup.agent.plugins.settings import merged, parse_settings, read_settings
+    from visup.runs.settings import WatchSettings, parse_actors
 
     return WatchSettings(
         source=source,
@@ -175,8 +175,8 @@ def watch(
 
     Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
     """
-    from visup.agent.journal import Limits
-    from visup.run import RunOptions
+    from visup.agent.storage.journal import Limits
+    from visup.runs.runner import RunOptions
 
     keep = None if keep_gb is None else int(keep_gb * 1e9)
     options = RunOptions(
@@ -233,15 +233,15 @@ def watch(
 
 
 def _answers(given: list[str], path: Path | None) -> dict[int, str]:
-    from visup.operator import parse_answers, read_answers
+    from visup.runs.operator import parse_answers, read_answers
 
     return {**(read_answers(path) if path else {}), **parse_answers(given)}
 
 
 def _past(run: Path, *given: object) -> tuple[WatchSettings, Past]:
     """The run that goes on; what it is about was settled when it began."""
-    from visup.agent.errors import SettingsError
-    from visup.resume import past_of
+    from visup.agent.model.errors import SettingsError
+    from visup.runs.resume import past_of
 
     if any(given):
         raise SettingsError(
@@ -260,7 +260,7 @@ def demo(
 
     An arm tries to capture a satellite, and sends it away spinning. Exit code 0 when visup sees that.
     """
-    from visup.demo import demo_settings, free_folder
+    from visup.runs.demo import demo_settings, free_folder
 
     result = run_and_tell(demo_settings(every), out or free_folder(Path("demo-run")))
     # The clip shows a failed capture: having seen that is the demo's success.
@@ -283,9 +283,9 @@ def run_and_tell(
     from rich.console import Console
     from rich.markup import escape
 
-    from visup.narrative import Narrator
-    from visup.operator import Operator, typed_lines
-    from visup.run import fresh_folder, supervise
+    from visup.runs.operator import Operator, typed_lines
+    from visup.runs.runner import fresh_folder, supervise
+    from visup.terminal.narrator import Narrator
 
     console = Console(highlight=False)
     folder = past.recording.path.parent if past else fresh_folder(out, settings.source)
@@ -363,7 +363,7 @@ def _as_json(result: RunResult) -> dict[str, object]:
 def _closing(result: RunResult) -> Iterator[str]:
     from rich.markup import escape
 
-    from visup.narrative import verdict_line
+    from visup.terminal.narrator import verdict_line
 
     if result.problem:
         yield f"[yellow]The source: {escape(result.problem)}[/yellow]"

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import visup
-from visup.agent.encode import plain
-from visup.agent.errors import OutputError
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.jsonable import plain
 
 RECORD_VERSION = 1
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Alert, Mind, ObjectBelief, Presence, Severity, StageBelief, Status
+from visup.report.image_text import fitted, ink, shade, write
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, Rgb, object_colour
-from visup.report.text import fitted, ink, shade, write
 
 WHITE: Rgb = (255, 255, 255)
 INK: Rgb = (12, 16, 22)

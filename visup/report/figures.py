@@ -12,7 +12,7 @@ import numpy as np
 from visup.agent import Severity, Status
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, css, object_colour
 from visup.report.records import RunData, Span, Subject
-from visup.report.story import called, name_of, span_sentence
+from visup.report.summary import called, name_of, span_sentence
 
 CANDIDATE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8a8f98")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")

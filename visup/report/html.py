@@ -8,9 +8,8 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-from visup.agent.errors import ExtraMissingError, OutputError
+from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report import sections
-from visup.report.courses import courses
 from visup.report.figures import (
     Figure,
     distance_figures,
@@ -19,7 +18,8 @@ from visup.report.figures import (
     vote_figures,
 )
 from visup.report.records import RunData
-from visup.report.story import title_of, verdict_words
+from visup.report.summary import title_of, verdict_words
+from visup.report.task_trees import courses
 
 
 def write_report(run: RunData, path: Path) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from visup.agent import Alert, Event, Severity, TaskBelief, Verdict
-from visup.agent.records import empty
-from visup.tasks.outline import Branch
+from visup.agent.model.records import empty
+from visup.tasks.tools.outline import Branch
 
 
 @dataclass(frozen=True, slots=True)

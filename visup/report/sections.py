@@ -11,7 +11,7 @@ from visup.agent import Alert, Event, Severity, StageBelief, TaskBelief
 from visup.report.figures import Figure
 from visup.report.palette import OBJECT_COLOURS, css, object_colour
 from visup.report.records import KeyFrame, Look, RunData
-from visup.report.story import (
+from visup.report.summary import (
     SEVERITY_WORDS,
     called,
     picture_words,

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame
-from visup.agent.agent import Step
-from visup.agent.errors import OutputError
-from visup.percepts.video.quiet import quiet
+from visup.agent.model.errors import OutputError
+from visup.agent.model.step import Step
+from visup.percepts.video.silence import quiet
 from visup.report.annotate import annotate
 
 MOST_WIDTH = 960

@@ -3,8 +3,8 @@
 Read `outbox.py` (how nothing waits for a sink), then `plain.py`, and `choose.py` (what `--sink` means).
 """
 
-from visup.sinks.choose import Sinks, open_sink
+from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import Outbox, Sink
-from visup.sinks.records import AlertSender
+from visup.sinks.sinks import Sinks, open_sink
 
 __all__ = ["AlertSender", "Outbox", "Sink", "Sinks", "open_sink"]

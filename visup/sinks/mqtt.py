@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from visup.agent.errors import ExtraMissingError, SettingsError
-from visup.sinks.plain import TIMEOUT_S, text_of
+from visup.agent.model.errors import ExtraMissingError, SettingsError
+from visup.sinks.builtin import TIMEOUT_S, text_of
 
 PORT = 1883
 ONCE_AT_LEAST = 1

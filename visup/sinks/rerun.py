@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from visup.agent import Frame, Severity
-from visup.agent.agent import Step
-from visup.agent.errors import ExtraMissingError
+from visup.agent.model.errors import ExtraMissingError
+from visup.agent.model.step import Step
 
 LEVELS = {Severity.INFO: "INFO", Severity.WARNING: "WARN", Severity.CRITICAL: "CRITICAL"}
 JPEG_QUALITY = 80

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from visup.agent import ReportState
-from visup.agent.agent import Step
-from visup.agent.errors import ExtraMissingError, SettingsError
+from visup.agent.model.errors import ExtraMissingError, SettingsError
+from visup.agent.model.step import Step
 
 NAME = "visup"
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.agent import Mind, ObjectBelief, Truth
-from visup.agent.shown import showing
+from visup.agent.model.notebook import showing
 
 Key = tuple[str, str]
 

@@ -14,9 +14,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from visup.agent import Alert, Event, Observation, Outcome
-from visup.agent.agent import Agent, Step
-from visup.agent.phases import Phase, Snapshot
-from visup.stepping.tape import Tape
+from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.cycle.agent import Agent
+from visup.agent.model.step import Step
+from visup.stepping.observation_log import Tape
 
 SPACING = 12
 LATEST = 100

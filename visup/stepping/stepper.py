@@ -8,26 +8,27 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import Event, Frame, Mind
-from visup.agent.agent import Agent, Step, Thinkers
-from visup.agent.encode import event_line
-from visup.agent.errors import SettingsError
-from visup.agent.phases import Phase
-from visup.agent.recording import Recording
-from visup.replay import Difference, Told, settings_for
-from visup.replay import difference as told_difference
-from visup.stepping import asking
-from visup.stepping.course import Course
+from visup.agent.contract.phases import Phase
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
+from visup.agent.storage.jsonable import event_line
+from visup.runs.replay import Difference, Told, settings_for
+from visup.runs.replay import difference as told_difference
+from visup.runs.wiring import final_verdict, reasoning_agent
+from visup.stepping.breakpoint_parser import stop_of
+from visup.stepping.breakpoints import PhaseStop, Predicate, Stop
+from visup.stepping.cursor import Stopped
 from visup.stepping.diff import MindDiff, difference
-from visup.stepping.evidence import Why
-from visup.stepping.feeds import Feed, LiveFeed, RecordedFeed
+from visup.stepping.explanations import questions as asking
+from visup.stepping.explanations.evidence import Why
+from visup.stepping.explanations.why import Reasons
 from visup.stepping.history import LATEST, SPACING, History
-from visup.stepping.places import Stopped
-from visup.stepping.stopping import stop_of
-from visup.stepping.stops import PhaseStop, Predicate, Stop
-from visup.stepping.watching import Breakpoint, Watch
-from visup.stepping.whatif import Belief, insisted, insisting, without_tasks
-from visup.stepping.why import Reasons
-from visup.supervisor import final_verdict, reasoning_agent
+from visup.stepping.observation_sources import Feed, LiveFeed, RecordedFeed
+from visup.stepping.timeline import Course
+from visup.stepping.watch_expressions import Breakpoint, Watch
+from visup.stepping.what_if import Belief, insisted, insisting, without_tasks
 
 
 class Stepper(Course):
@@ -68,7 +69,7 @@ class Stepper(Course):
 
         Args:
             run: A run folder or its recording.
-            changed: Settings of the run to change, as of `visup.replay.settings_for`.
+            changed: Settings of the run to change, as of `visup.runs.replay.settings_for`.
 
         Raises:
             VisupError: There is no such run, or a setting is not as it should be.
@@ -87,7 +88,7 @@ class Stepper(Course):
         Args:
             n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
                 inside which it is stopped counts when it is completed.
-            until: See `visup.stepping.stopping.stop_of`.
+            until: See `visup.stepping.breakpoint_parser.stop_of`.
             tell: Told of each step as it is completed.
 
         Returns:
@@ -145,7 +146,7 @@ class Stepper(Course):
     # Where to stop, what to watch
 
     def break_at(self, what: str | Phase | Predicate | Stop) -> Breakpoint:
-        """Set a breakpoint; see `visup.stepping.stopping.stop_of`."""
+        """Set a breakpoint; see `visup.stepping.breakpoint_parser.stop_of`."""
         made = Breakpoint(max(self.breakpoints, default=0) + 1, stop_of(what, self.mind))
         self.breakpoints[made.id] = made
         return made
@@ -225,7 +226,7 @@ class Stepper(Course):
         on by itself, ahead of its place.
 
         Args:
-            beliefs: To be held in every step of the branch whatever is seen, from `visup.stepping.whatif`.
+            beliefs: To be held in every step of the branch whatever is seen, from `visup.stepping.what_if`.
             thinkers: What reasons there; as here when left out.
         """
         thinkers = thinkers or self.agent.thinkers

@@ -5,8 +5,8 @@
 True
 """
 
-from visup.testing.check import Finding, check_behaviour, findings
 from visup.testing.clips import CLIPS, Shot, crossing, disc, flat, noise, region_of
+from visup.testing.contract_checker import Finding, check_behaviour, findings
 from visup.testing.scripted import Scripted, ScriptedSource, stand_ins
 
 __all__ = [

@@ -17,7 +17,7 @@ from visup.agent import (
     Observation,
     Percept,
 )
-from visup.agent.errors import BehaviourError, SettingsError
+from visup.agent.model.errors import BehaviourError, SettingsError
 from visup.percepts.video.base import Ending, Source
 from visup.testing.clips import Shot
 

@@ -1,0 +1,63 @@
+"""The contracts of what runs inside the cycle: behaviours perceive, thinkers reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from visup.agent.contract.contract import Contract
+from visup.agent.model.mind import Mind
+from visup.agent.model.records import Concern, Directive, Event, Frame, Observation, Percept
+
+__all__ = ["Behaviour", "Contract", "Outcome", "Thinker"]
+
+
+@runtime_checkable
+class Behaviour(Protocol):
+    """A perception routine: frames in, percepts out. May keep state between frames.
+
+    A method `start(self)`, if there is one, is called once before the first run, in the process in
+    which the behaviour runs: the place to open what cannot be sent to another process, such as a
+    model, a socket or a device.
+    """
+
+    contract: Contract
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report about one frame.
+
+        Args:
+            frame: The frame; its image cannot be written to.
+            seen: What behaviours before this one reported of the same frame; `seen.past` holds as
+                many frames before it as the contract's `history` asks for.
+            directives: What cogitation asked for after the last step.
+
+        Returns:
+            Percepts of the kinds that the contract names.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a thinker concludes.
+
+    Attributes:
+        mind: The mind after it.
+        events: What happened.
+        concerns: Reasons for alerts that hold now; an alert whose concern is not renewed is closed.
+        directives: What is asked of behaviours.
+    """
+
+    mind: Mind
+    events: tuple[Event, ...] = ()
+    concerns: tuple[Concern, ...] = ()
+    directives: tuple[Directive, ...] = ()
+
+
+Thinker = Callable[[Mind, Observation], Outcome]
+"""A pure function of the mind and of what was observed. It keeps nothing to itself: what it must
+remember goes into `Mind.memory` under its own name, so that minds can be kept and restored."""

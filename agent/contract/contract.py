@@ -1,0 +1,125 @@
+"""What a behaviour declares of itself, checked as soon as it is written down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from visup.agent.model.errors import BehaviourError
+from visup.agent.model.records import Frame, Percept
+
+CONTRACT_VERSION = 1
+"""Of the contract itself; it grows when a plug-in written for an older one would no longer run."""
+
+MOST_HISTORY = 64
+"""Past frames that a behaviour may ask for: they are whole images, and all of them are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contract:
+    """What a behaviour declares of itself.
+
+    Attributes:
+        name: Its name, unique within an agent.
+        gives: Kinds of percept that it reports.
+        needs: Kinds of percept that must be there before it runs in a step.
+        every_s: Least time between two runs, seconds of video; 0 for every frame.
+        cost_ms: Its budget: what one run takes at most, milliseconds; None when it does not say.
+        history: How many past frames, with what was reported of them, it wants in `seen.past`.
+        deterministic: Whether the same frames give the same percepts.
+        isolate: Whether it runs in a process of its own, with hard limits.
+        memory_mb: How much memory it may take, megabytes; None when it does not say.
+        most_percepts: How many percepts one run may report.
+        version: Version of the contract that it was written for.
+        awake: When it is awake: a condition of the rule language about one object `a`, such as
+            "expected(a)" or "exists b: gap(a, b) < 60 px"; it runs on frames that follow a step in
+            which that held of some object, and 'wake' directives say of which. Empty for always.
+        relieves: Names of behaviours that rest while this one runs, coarse ones whose work it does
+            more closely; where it fails they do it again.
+
+    Raises:
+        BehaviourError: A field is not as it should be.
+    """
+
+    name: str
+    gives: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+    every_s: float = 0.0
+    cost_ms: float | None = None
+    history: int = 0
+    deterministic: bool = True
+    isolate: bool = False
+    memory_mb: float | None = None
+    most_percepts: int = 1000
+    version: int = CONTRACT_VERSION
+    awake: str = ""
+    relieves: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.isidentifier():
+            raise BehaviourError(
+                f"{self.name!r} is no name for a behaviour",
+                where="contract",
+                expected="a word of letters, digits and underscores, such as 'lamp'",
+            )
+        self._expect("version", self.version == CONTRACT_VERSION, f"{CONTRACT_VERSION}", _VERSION)
+        for field in ("gives", "needs", "relieves"):
+            kinds = getattr(self, field)
+            object.__setattr__(self, field, tuple(kinds) if isinstance(kinds, list) else kinds)
+            self._expect_kinds(field)
+        self._expect("gives", bool(self.gives), "at least one kind of percept")
+        self._expect("awake", isinstance(self.awake, str), 'a condition, such as "expected(a)"')
+        self._expect("relieves", self.name not in self.relieves, "names of other behaviours")
+        self._expect("every_s", _number(self.every_s, 0.0), "seconds, 0 for every frame")
+        for field in ("cost_ms", "memory_mb"):
+            value = getattr(self, field)
+            fine = value is None or (_number(value, 0.0) and value > 0)
+            self._expect(field, fine, "a number above 0, or None")
+        self._expect("history", _whole(self.history, 0, MOST_HISTORY), f"0 to {MOST_HISTORY}")
+        self._expect("most_percepts", _whole(self.most_percepts, 1, 10**6), "1 to 1000000")
+        for field in ("deterministic", "isolate"):
+            self._expect(field, isinstance(getattr(self, field), bool), "True or False")
+
+    def percept(
+        self, frame: Frame, value: Any, *, kind: str | None = None, confidence: float = 1.0
+    ) -> Percept:
+        """A percept of this behaviour about a frame.
+
+        Args:
+            frame: The frame it is about.
+            value: What was perceived.
+            kind: Its kind; the first that the contract gives when left out.
+            confidence: 0 to 1.
+        """
+        return Percept(kind or self.gives[0], value, frame.time, self.name, confidence)
+
+    def _expect_kinds(self, field: str) -> None:
+        kinds = getattr(self, field)
+        fine = isinstance(kinds, tuple) and all(isinstance(k, str) and k for k in kinds)
+        hint = (
+            f"a tuple of one has a comma: {field}=({kinds!r},)" if isinstance(kinds, str) else None
+        )
+        self._expect(field, fine, "a tuple of words, such as ('region',)", hint)
+        self._expect(field, len(set(kinds)) == len(kinds), "each kind once")
+
+    def _expect(self, field: str, fine: bool, expected: str, hint: str | None = None) -> None:
+        if not fine:
+            raise BehaviourError(
+                f"`{field}` is {getattr(self, field)!r}",
+                where=f"contract of '{self.name}'",
+                expected=expected,
+                hint=hint,
+            )
+
+
+_VERSION = "this behaviour was written for another version of visup; see docs/plugins.md"
+
+
+def _number(value: object, least: float) -> bool:
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    return plain and isfinite(value) and value >= least  # type: ignore[arg-type, operator]
+
+
+def _whole(value: object, least: int, most: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most

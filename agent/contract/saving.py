@@ -1,0 +1,19 @@
+"""What a behaviour offers so that its state can be saved in a checkpoint and restored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
+
+
+@runtime_checkable
+class Keeps(Protocol):
+    """A behaviour whose state can be kept, so that a run that was killed can go on from it."""
+
+    def save(self) -> Mapping[str, Any]:
+        """All that it holds from frame to frame, by name; what its settings determine is left out."""
+        ...
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on a state that an object of the same settings gave."""
+        ...

@@ -1,0 +1,273 @@
+"""The cogitation-action cycle (paper, section 2; after CoCo), on one screen: `Agent.step`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from visup.agent.contract.behaviour import Behaviour, Outcome, Thinker
+from visup.agent.contract.limits import Limits
+from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.saving import Keeps
+from visup.agent.cycle.alerts import alert_events, faults, update_alerts
+from visup.agent.cycle.answers import understood, with_answers
+from visup.agent.cycle.outcomes import joined
+from visup.agent.execution.behaviour_slot import Slot
+from visup.agent.execution.pipeline import in_order, perceive
+from visup.agent.execution.runners import worded
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.mind import Mind, Zone
+from visup.agent.model.notebook import showing
+from visup.agent.model.records import (
+    Concern,
+    Directive,
+    Frame,
+    Observation,
+    Severity,
+)
+from visup.agent.model.step import Observer, Step
+
+
+@dataclass(frozen=True, slots=True)
+class Thinkers:
+    """What reasons in an agent, by phase; within a phase in this order.
+
+    Attributes:
+        update: Percepts enter the mind.
+        cogitate: Relations and rules are evaluated, events derived.
+        match: Stages of tasks are matched and verified.
+    """
+
+    update: tuple[Thinker, ...] = ()
+    cogitate: tuple[Thinker, ...] = ()
+    match: tuple[Thinker, ...] = ()
+
+    def by_phase(self) -> tuple[tuple[Phase, tuple[Thinker, ...]], ...]:
+        """The phases that reason, in order, each with its thinkers."""
+        return (
+            (Phase.UPDATE, self.update),
+            (Phase.COGITATE, self.cogitate),
+            (Phase.MATCH, self.match),
+        )
+
+
+showing(Step)
+
+
+@dataclass(slots=True)
+class Agent:
+    """A mind with what perceives and reasons for it.
+
+    Two agents never meet: ids, time and state belong to the instance, and the same frames give the
+    same steps.
+
+    Attributes:
+        behaviours: What perceives.
+        thinkers: What reasons.
+        actors: Actor name -> model names, known before the first frame.
+        zones: Parts of the scene that rules can name.
+        observers: Told of each step.
+        models: Names of models that the operator may answer with, besides those spoken of.
+        limits: What behaviours are held to.
+        mind: The mental model now.
+    """
+
+    behaviours: Sequence[Behaviour] = ()
+    thinkers: Thinkers = field(default_factory=Thinkers)
+    actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    observers: Sequence[Observer] = ()
+    zones: Sequence[Zone] = ()
+    models: Sequence[str] = ()
+    limits: Limits = field(default_factory=Limits)
+    mind: Mind = field(init=False)
+    directives: tuple[Directive, ...] = field(default=(), init=False)
+    _slots: list[Slot] = field(init=False, repr=False)
+    _alerts_opened: int = field(default=0, init=False, repr=False)
+    _answers: dict[int, str] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.mind = Mind(actors=MappingProxyType(dict(self.actors)), zones=tuple(self.zones))
+        self._slots = in_order(self.behaviours, self.limits)
+
+    def step(self, frame: Frame) -> Step:
+        """Perceive, update, cogitate, match, act: one turn of the cycle.
+
+        Args:
+            frame: The next frame; its time must not be before that of the last one.
+
+        Returns:
+            The whole record of the step; `mind` has become `Step.mind`.
+        """
+        step = self.rethink(self.look(frame))
+        for observer in self.observers:
+            observer(step, frame)
+        return step
+
+    def look(self, frame: Frame) -> Observation:
+        """Perceive only: behaviours see the frame, the mind stays as it is."""
+        return perceive(self._slots, frame, self.directives)
+
+    def rethink(self, seen: Observation, answers: Mapping[int, str] | None = None) -> Step:
+        """Reason about what was perceived, now or in a recorded run; observers are not told.
+
+        Args:
+            seen: What was perceived of the next frame.
+            answers: What the operator had said before that step of a recorded run: object id ->
+                model name, as 'answer' events tell it. None when there is no such run.
+
+        Returns:
+            The whole record of the step; `mind` has become `Step.mind`.
+        """
+        *_, (_, thought) = self.phases(seen, answers)
+        return self.act(seen, thought)
+
+    def phases(
+        self, seen: Observation, answers: Mapping[int, str] | None = None
+    ) -> Iterator[tuple[Phase, Outcome]]:
+        """Update, cogitate, match: one after the other, to look in between; the mind stays as it is.
+
+        Args:
+            seen: What was perceived of the next frame.
+            answers: As of `rethink`.
+
+        Yields:
+            Each phase that is over, with all that was concluded up to there; the last one is for `act`.
+        """
+        begin = replace(
+            self.mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+        )
+        begin, told = with_answers(begin, self._answers if answers is None else answers)
+        self._answers = {}
+        outcome = Outcome(begin, told)
+        for phase, thinkers in self.thinkers.by_phase():
+            for thinker in thinkers:
+                try:
+                    outcome = joined(outcome, thinker(outcome.mind, seen), seen)
+                except (Exception, SystemExit) as fault:
+                    # The half-made mind is dropped: beliefs stay as they were and count as unknown.
+                    yield phase, replace(_fault(begin, seen, thinker, fault), events=told)
+                    return
+            yield phase, outcome
+
+    def act(self, seen: Observation, thought: Outcome) -> Step:
+        """The last phase: alerts and directives; what was thought becomes the mind."""
+        concerns = (*thought.concerns, *faults(seen))
+        alerts, opened, closed = update_alerts(
+            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1, thought.mind.unknown
+        )
+        self._alerts_opened += len(opened)
+        events = (*thought.events, *alert_events(opened, closed, seen.time, seen.frame_index))
+        step = Step(
+            frame_index=seen.frame_index,
+            time=seen.time,
+            observation=seen,
+            mind=replace(thought.mind, alerts=alerts),
+            events=events,
+            alerts=(*opened, *closed),
+            directives=thought.directives,
+        )
+        self.mind, self.directives = step.mind, step.directives
+        return step
+
+    def snapshot(self) -> Snapshot:
+        """What it believes now, to go back to with `restore`; a few references, no copy."""
+        answers = MappingProxyType(dict(self._answers))
+        return Snapshot(self.mind, self.directives, self._alerts_opened, answers)
+
+    def restore(self, was: Snapshot) -> None:
+        """Believe again what it, or another agent, believed then; behaviours stay as they are."""
+        self.mind, self.directives = was.mind, was.directives
+        self._alerts_opened, self._answers = was.alerts_opened, dict(was.answers)
+
+    def close(self) -> None:
+        """Let go of threads and processes of behaviours; they would also go with the agent itself."""
+        for slot in self._slots:
+            slot.runner.close()
+
+    def run(
+        self, frames: Iterable[Frame], until: Callable[[Step], bool] | None = None
+    ) -> Step | None:
+        """Step over frames until they end or a condition holds.
+
+        Args:
+            frames: A source; it is left where the run stopped, so a further run goes on from there.
+            until: Looked at after each step.
+
+        Returns:
+            The last step, or None when there was no frame.
+        """
+        last = None
+        for last in self.steps(frames):
+            if until is not None and until(last):
+                break
+        return last
+
+    def steps(self, frames: Iterable[Frame]) -> Iterator[Step]:
+        """Each step over frames, one at a time."""
+        return (self.step(frame) for frame in frames)
+
+    def answer(self, object_id: int, name: str) -> None:
+        """Say what an object is; a fact from the next step on, told by an 'answer' event.
+
+        Args:
+            object_id: The object.
+            name: A model, an actor, or 'unknown' for none of the models.
+
+        Raises:
+            SettingsError: There is no such object, or nobody knows such a name.
+        """
+        self._answers[object_id] = understood(self.mind, object_id, name, self.models)
+
+    def save(self) -> Mapping[str, Any]:
+        """All that this agent has become, to be frozen by `visup.agent.storage.checkpoint`.
+
+        Returns:
+            `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
+        """
+        whole = all(s.keeps for s in self._slots)
+        kept = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.keeps}
+        return {
+            "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
+            "behaviours": {n: _saved(b) for n, b in kept.items()} if whole else None,
+            "slots": {s.behaviour.contract.name: s.conduct() for s in self._slots},
+        }
+
+    def load(self, state: Mapping[str, Any]) -> bool:
+        """Become what an agent of the same settings was; `state` is used up.
+
+        Returns:
+            Whether behaviours too are as they were; else they are new, and only the mind is.
+        """
+        self.mind, self.directives, self._alerts_opened, self._answers = state["mind"]
+        behaviours = state["behaviours"]
+        for slot in self._slots if behaviours is not None else ():
+            name = slot.behaviour.contract.name
+            slot.behaviour.load(behaviours[name])  # type: ignore[attr-defined]  # it gave its state
+            slot.take_up(state["slots"][name])
+        return behaviours is not None
+
+
+def _saved(behaviour: Behaviour) -> Mapping[str, Any]:
+    assert isinstance(behaviour, Keeps)
+    return behaviour.save()
+
+
+def _fault(mind: Mind, seen: Observation, thinker: Thinker, fault: BaseException) -> Outcome:
+    name = getattr(thinker, "__name__", type(thinker).__name__)
+    concern = Concern(
+        "thinking_failed",
+        (),
+        Severity.CRITICAL,
+        f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",
+        (worded(fault),),
+        key=name,
+        needs=(),
+    )
+    held = tuple(
+        Concern(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key, a.needs)
+        for a in mind.alerts
+    )
+    unknown = frozenset(kind for r in seen.reports for kind in r.gives)
+    return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, concern))

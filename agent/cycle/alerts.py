@@ -1,0 +1,145 @@
+"""The last phase of a step: alerts open, are renewed, and close, as concerns come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.records import (
+    BROKEN,
+    Alert,
+    Concern,
+    Event,
+    Observation,
+    ReportState,
+    Severity,
+)
+
+GRACE_S = 1.0
+"""A concern may be silent this long before its alert closes: alerts must not flicker."""
+
+SETTLE_S = 3.0
+"""After a kind of percept was unknown, rules need so long to see again what they had seen; until
+then no alert that needs it is told to be over."""
+
+Key = tuple[str, tuple[int, ...], str]
+
+
+def faults(observation: Observation) -> tuple[Concern, ...]:
+    """Concerns about behaviours that failed, are late or suspended: their part of the mind is unknown."""
+    return tuple(
+        Concern(
+            "behaviour_failed",
+            (),
+            Severity.WARNING,
+            f"The behaviour '{r.behaviour}' {_ails(r.state)}; what it gives is unknown.",
+            (r.error,),
+            key=r.behaviour,
+            needs=(),
+        )
+        for r in observation.reports
+        if r.state in BROKEN
+    )
+
+
+def _ails(state: ReportState) -> str:
+    return "gave no answer in time" if state is ReportState.LATE else "failed"
+
+
+def update_alerts(
+    alerts: Sequence[Alert],
+    concerns: Iterable[Concern],
+    time: float,
+    next_id: int,
+    unknown: frozenset[str] = frozenset(),
+) -> tuple[tuple[Alert, ...], tuple[Alert, ...], tuple[Alert, ...]]:
+    """Alerts after the concerns of one step.
+
+    Args:
+        alerts: Those that were open, in the order in which they opened.
+        concerns: Those that hold now; of two alike the graver stays.
+        time: Seconds.
+        next_id: Number of the next alert that opens.
+        unknown: Kinds of percept that are unknown now: an alert that needs one of them stays open,
+            for nobody can tell that it is over.
+
+    Returns:
+        The alerts that are open now, those that opened, those that closed.
+    """
+    fresh = _by_key(concerns)
+    still: list[Alert] = []
+    closed: list[Alert] = []
+    for alert in alerts:
+        concern = fresh.pop(_key(alert), None)
+        if concern is not None:
+            still.append(_renew(alert, concern, time))
+            continue
+        silent = _unsure(alert, unknown, time)
+        if _is_over(silent, time):
+            closed.append(replace(silent, closed=time))
+        else:
+            still.append(silent)
+    opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(fresh.values()))
+    return (*still, *opened), opened, tuple(closed)
+
+
+def alert_events(
+    opened: Iterable[Alert], closed: Iterable[Alert], time: float, frame_index: int
+) -> tuple[Event, ...]:
+    """The events that tell of alerts that opened or closed."""
+    told = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
+    over = [
+        _event("alert_closed", f"No longer so: {a.cause}", a, time, frame_index, Severity.INFO)
+        for a in closed
+    ]
+    return (*told, *over)
+
+
+def _event(
+    kind: str, text: str, alert: Alert, time: float, frame_index: int, severity: Severity
+) -> Event:
+    data = {"alert": alert.id, "alert_kind": alert.kind, "evidence": list(alert.evidence)}
+    return Event(kind, time, frame_index, text, alert.objects, severity=severity, data=data)
+
+
+def _key(it: Alert | Concern) -> Key:
+    return it.kind, it.objects, it.key
+
+
+def _by_key(concerns: Iterable[Concern]) -> dict[Key, Concern]:
+    now: dict[Key, Concern] = {}
+    for concern in concerns:
+        held = now.setdefault(_key(concern), concern)
+        if concern.severity > held.severity:
+            now[_key(concern)] = concern
+    return now
+
+
+def _open(concern: Concern, time: float, number: int) -> Alert:
+    return Alert(
+        id=number,
+        kind=concern.kind,
+        severity=concern.severity,
+        opened=time,
+        updated=time,
+        objects=concern.objects,
+        cause=concern.cause,
+        evidence=concern.evidence,
+        key=concern.key,
+        needs=concern.needs,
+    )
+
+
+def _renew(alert: Alert, concern: Concern, time: float) -> Alert:
+    # The cause keeps its first wording, so that the narrative and the report tell one story.
+    severity = max(alert.severity, concern.severity)
+    return replace(alert, severity=severity, updated=time, evidence=concern.evidence)
+
+
+def _unsure(alert: Alert, unknown: frozenset[str], time: float) -> Alert:
+    return replace(alert, unsure=time) if unknown.intersection(alert.needs) else alert
+
+
+def _is_over(alert: Alert, time: float) -> bool:
+    settled = alert.unsure is None or time - alert.unsure > SETTLE_S
+    return settled and time - alert.updated > GRACE_S

@@ -1,0 +1,117 @@
+"""What the operator says: checked when it is said, a fact in the mind from the next step on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from types import MappingProxyType
+
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.mind import UNKNOWN_OBJECT, Mind
+from visup.agent.model.records import Event
+
+NOBODY = ("unknown", UNKNOWN_OBJECT)
+"""Answers that say that an object is none of the models."""
+
+
+def understood(mind: Mind, object_id: int, name: str, models: Iterable[str] = ()) -> str:
+    """The model that an answer means.
+
+    Args:
+        mind: The mind.
+        object_id: Whom the answer is about.
+        name: A model, an actor that stands for one, or 'unknown'.
+        models: Models that are known besides those that anybody has spoken of.
+
+    Returns:
+        The model's name, or 'unknown object'.
+
+    Raises:
+        SettingsError: Nobody knows such an object or such a name.
+    """
+    belief = mind.objects.get(object_id)
+    if belief is None:
+        known = ", ".join(str(i) for i in sorted(mind.objects)) or "none yet"
+        raise SettingsError(f"there is no object {object_id}", expected=f"one of: {known}")
+    own = [c.name for c in belief.candidates]
+    own += [n for q in mind.questions if q.object_id == object_id for n in q.names]
+    return model_named(mind, name, models, own)
+
+
+def model_named(mind: Mind, name: str, models: Iterable[str] = (), own: Sequence[str] = ()) -> str:
+    """The model that a name means.
+
+    Args:
+        mind: The mind, which knows the actors and what was spoken of.
+        name: A model, an actor, or 'unknown'.
+        models: Further models that are known.
+        own: Models that the object may be, most likely first, for actors that stand for several.
+
+    Raises:
+        SettingsError: Nobody knows such a name.
+    """
+    said = " ".join(name.split())
+    if said in NOBODY:
+        return UNKNOWN_OBJECT
+    meant = {_plain(m): m for m in _models(mind) | set(models)}
+    meant |= {_plain(actor): _model(found, own) for actor, found in mind.actors.items() if found}
+    if _plain(said) in meant:
+        return meant[_plain(said)]
+    close = get_close_matches(_plain(said), meant, n=1)
+    raise SettingsError(
+        f"nobody knows a '{said}': there is no such model or actor",
+        expected=f"one of: {', '.join([*sorted(meant), 'unknown'])}",
+        hint=f"did you mean '{close[0]}'?" if close else None,
+    )
+
+
+def with_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[Event, ...]]:
+    """A mind that takes answers as facts, and the events that tell of them.
+
+    Args:
+        mind: At the beginning of a step.
+        answers: Object id -> model name, as `understood` gives it.
+    """
+    if not answers:
+        return mind, ()
+    events = tuple(
+        Event(
+            "answer",
+            mind.time,
+            mind.frame_index,
+            f"The operator says that object {i} is {_spoken(mind, name)}.",
+            (i,),
+            data=MappingProxyType({"name": name}),
+        )
+        for i, name in sorted(answers.items())
+    )
+    mind = replace(
+        mind,
+        answers=MappingProxyType({**mind.answers, **answers}),
+        questions=tuple(q for q in mind.questions if q.object_id not in answers),
+    )
+    return mind, events
+
+
+def _models(mind: Mind) -> set[str]:
+    """Every model that anybody has spoken of."""
+    named = {c.name for b in mind.objects.values() for c in b.candidates}
+    named |= {n for q in mind.questions for n in q.names} | set(mind.answers.values())
+    return (named | {m for models in mind.actors.values() for m in models}) - {UNKNOWN_OBJECT}
+
+
+def _model(models: Sequence[str], own: Sequence[str]) -> str:
+    """Which of an actor's models is meant: the likeliest of the object's names, else the first."""
+    return next((n for n in own if n in models), models[0])
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ").lower()
+
+
+def _spoken(mind: Mind, name: str) -> str:
+    if name == UNKNOWN_OBJECT:
+        return "none of the models"
+    actor = next((a for a, models in sorted(mind.actors.items()) if name in models), name)
+    return f"the {actor.replace('_', ' ')}"

@@ -1,0 +1,60 @@
+"""What a thinker concludes is taken over only if it makes sense: phases are all or nothing."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from visup.agent.contract.behaviour import Outcome
+from visup.agent.model.mind import Mind
+from visup.agent.model.records import Concern, Directive, Event, Observation
+
+
+def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
+    """What thinkers before concluded, and one more.
+
+    Args:
+        so_far: Of those before.
+        more: Of the one more; its mind takes the place of theirs.
+        seen: What they thought about.
+
+    Raises:
+        TypeError: It is no outcome, or holds what is none of its parts.
+        ValueError: Its mind is of another moment, or a confidence or time is no number.
+    """
+    _expect(more, Outcome, "the thinker returned")
+    _expect(more.mind, Mind, "the mind is")
+    if (more.mind.time, more.mind.frame_index) != (seen.time, seen.frame_index):
+        raise ValueError(
+            f"the mind is of frame {more.mind.frame_index} at {more.mind.time} s, "
+            f"not of frame {seen.frame_index} at {seen.time} s"
+        )
+    for parts, kind in (
+        (more.events, Event),
+        (more.concerns, Concern),
+        (more.directives, Directive),
+    ):
+        _all_are(parts, kind)
+    for event in more.events:
+        if not (isfinite(event.time) and 0.0 <= event.confidence <= 1.0):
+            raise ValueError(
+                f"event '{event.kind}' has time {event.time} and confidence {event.confidence}"
+            )
+    return Outcome(
+        more.mind,
+        so_far.events + more.events,
+        so_far.concerns + more.concerns,
+        so_far.directives + more.directives,
+    )
+
+
+def _all_are(parts: object, kind: type) -> None:
+    if not isinstance(parts, tuple):
+        raise TypeError(f"{kind.__name__}s are a {type(parts).__name__}, expected a tuple")
+    for part in parts:
+        if type(part) is not kind:
+            _expect(part, kind, "a part is")
+
+
+def _expect(value: object, kind: type, what: str) -> None:
+    if not isinstance(value, kind):
+        raise TypeError(f"{what} a {type(value).__name__}, expected {kind.__name__}")

@@ -1,0 +1,233 @@
+"""A behaviour in its place in an agent: when it runs, and what comes of its conduct.
+
+After three failures in a row a behaviour is suspended for a while, twice as long each time; what
+hangs, dies or takes too much memory is suspended at once. Whatever it gives is unknown from its
+failure until it has run again, also in the steps in which it would not have run.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from visup.agent.contract.behaviour import Behaviour
+from visup.agent.contract.contract import Contract
+from visup.agent.contract.limits import Limits
+from visup.agent.contract.saving import Keeps
+from visup.agent.execution.runners import (
+    Direct,
+    GrowthError,
+    LateError,
+    LostError,
+    Runner,
+    Threaded,
+    resident_mb,
+    told_seconds,
+    worded,
+)
+from visup.agent.model.records import (
+    BROKEN,
+    WAKE,
+    Directive,
+    Frame,
+    Observation,
+    Past,
+    Percept,
+    Report,
+    ReportState,
+)
+
+PATIENCE = 3
+FIRST_SUSPENSION_S = 1.0
+LONGEST_SUSPENSION_S = 60.0
+NEVER = float("-inf")
+
+
+_SETTLED = frozenset({"behaviour", "contract", "limits", "runner", "relieved_by"})
+"""What of a slot is settled when the agent is made; all else is conduct."""
+
+
+@dataclass(slots=True)
+class Slot:
+    """A behaviour in its place in an agent, with what the agent knows of its conduct.
+
+    Attributes:
+        behaviour: What runs.
+        contract: As it was when the behaviour was plugged in.
+        limits: What it is held to.
+        runner: How it runs.
+        relieved_by: Names of behaviours that do its work more closely while they run.
+        last_run: Seconds of the latest frame on which it ran.
+        failures: In a row.
+        error: Of the latest failure; empty once it has run again.
+        suspended_at: Seconds of the frame at which it was suspended.
+        grown_mb: By how much its runs have made this process grow, megabytes.
+        past: As many past frames as it asked for.
+    """
+
+    behaviour: Behaviour
+    contract: Contract
+    limits: Limits
+    runner: Runner
+    relieved_by: frozenset[str] = frozenset()
+    last_run: float = NEVER
+    failures: int = 0
+    error: str = ""
+    suspended_at: float = NEVER
+    grown_mb: float = 0.0
+    past: deque[Past] = field(default_factory=deque)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the behaviour can tell its state; that of another process is out of reach."""
+        return isinstance(self.behaviour, Keeps) and not self.limits.isolated(self.contract)
+
+    def conduct(self) -> dict[str, Any]:
+        """What the agent knows of its behaviour's conduct, for a checkpoint."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SETTLED}
+
+    def take_up(self, conduct: Mapping[str, Any]) -> None:
+        """Go on from the conduct that another slot told."""
+        for name, value in conduct.items():
+            setattr(self, name, value)
+
+    @property
+    def suspension_s(self) -> float:
+        """How long it rests after its latest failure, seconds."""
+        over = self.failures - PATIENCE
+        return 0.0 if over < 0 else min(FIRST_SUSPENSION_S * 2.0**over, LONGEST_SUSPENSION_S)
+
+    def run(self, frame: Frame, seen: Observation, directives: Sequence[Directive]) -> Report:
+        """Run it on a frame, if it is its turn.
+
+        Args:
+            frame: The frame.
+            seen: What others reported of it before.
+            directives: What the last step asked for.
+
+        Returns:
+            What became of it; never an exception.
+        """
+        contract = self.contract
+        idle = Report(contract.name, ReportState.RESTED, contract.gives)
+        asleep = self._asleep(directives)
+        if (waiting := self._waiting(frame.time, asleep)) is not None:
+            return replace(idle, state=waiting, error=self.error)
+        if asleep:
+            return replace(idle, error="asleep: nothing calls for it")
+        closer = [r.behaviour for r in seen.reports if r.behaviour in self.relieved_by and _ran(r)]
+        if closer:
+            return replace(idle, error=f"'{closer[0]}' looks more closely")
+        unseen = [k for k in contract.needs if not seen.observed(k)]
+        if unseen:
+            blind = any(k in seen.unknown for k in unseen)
+            state = ReportState.BLIND if blind else ReportState.RESTED
+            return replace(idle, state=state, error=f"'{unseen[0]}' was not observed")
+        if self._within(frame.time, self.last_run, contract.every_s):
+            return idle
+        self.last_run = frame.time
+        begin = self.limits.clock()
+        try:
+            percepts = self._held(frame, replace(seen, past=tuple(self.past)), directives, begin)
+        except Exception as fault:
+            # Containment: whatever a plug-in raises is its own failure, never the supervisor's.
+            self._fail(fault, frame.time)
+            state = ReportState.LATE if isinstance(fault, LateError) else ReportState.FAILED
+            return replace(idle, state=state, error=self.error, elapsed_ms=self._ms(begin))
+        self.failures, self.error = 0, ""
+        return replace(idle, state=ReportState.RAN, percepts=percepts, elapsed_ms=self._ms(begin))
+
+    def remember(self, frame: Frame, seen: Observation) -> None:
+        """Keep a frame that is over, if past frames were asked for."""
+        if self.past.maxlen:
+            self.past.append(Past(frame, seen))
+
+    def _asleep(self, directives: Sequence[Directive]) -> bool:
+        name = self.contract.name
+        asked = (d for d in directives if d.kind == WAKE and d.data.get("behaviour") == name)
+        return self.limits.sleeps(self.contract) and next(asked, None) is None
+
+    def _waiting(self, now: float, asleep: bool) -> ReportState | None:
+        """Why a behaviour that failed does not run now; None when it may."""
+        if self.runner.tend():
+            return ReportState.LATE
+        if self._within(now, self.suspended_at, self.suspension_s):
+            return ReportState.SUSPENDED
+        if self.error and (asleep or self._within(now, self.last_run, self.contract.every_s)):
+            return ReportState.SUSPENDED
+        return None
+
+    @staticmethod
+    def _within(now: float, since: float, seconds: float) -> bool:
+        # A clock that was set back must not keep anybody waiting; rounding must not cost a frame.
+        return 0.0 <= now - since < seconds - 1e-9
+
+    def _held(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive], begin: float
+    ) -> tuple[Percept, ...]:
+        """Run it, held to its limits."""
+        seconds = self.limits.seconds(self.contract)
+        before = resident_mb()
+        percepts = self.runner.run(frame, seen, directives, seconds)
+        taken = self.limits.clock() - begin
+        if self.limits.budgets and seconds is not None and taken > seconds:
+            raise LateError(f"it took longer than its budget of {told_seconds(seconds)}")
+        self.grown_mb += resident_mb() - before
+        most = self.limits.megabytes(self.contract)
+        if self.grown_mb > most:
+            self.grown_mb = 0.0
+            raise GrowthError(f"its runs made the process grow by more than {most:g} MB")
+        return percepts
+
+    def _fail(self, fault: Exception, now: float) -> None:
+        self.error = worded(fault)
+        self.failures += 1
+        if self._grave(fault):
+            self.failures = max(self.failures, PATIENCE)
+        if self.failures >= PATIENCE:
+            self.suspended_at = now
+
+    def _grave(self, fault: Exception) -> bool:
+        """Whether another try is too dear: each hang costs its whole limit again."""
+        if isinstance(fault, LateError):
+            return not self.limits.budgets
+        return isinstance(fault, LostError | GrowthError | MemoryError)
+
+    def _ms(self, begin: float) -> float:
+        return (self.limits.clock() - begin) * 1000.0
+
+
+def _ran(report: Report) -> bool:
+    return report.state is ReportState.RAN
+
+
+def taken_over(report: Report, by: Slot) -> Report:
+    """The report of a behaviour that failed, once one that it relieves has run in its place.
+
+    What both give is known.
+    """
+    if report.state not in BROKEN or report.behaviour not in by.relieved_by:
+        return report
+    gives = tuple(kind for kind in report.gives if kind not in by.contract.gives)
+    return replace(report, gives=gives)
+
+
+def slot_of(behaviour: Behaviour, limits: Limits) -> Slot:
+    """A behaviour in its place, with what runs it as its contract and the limits say.
+
+    Raises:
+        BehaviourError: It shall run in a process of its own, but cannot be sent to one.
+    """
+    contract = behaviour.contract
+    runner: Runner
+    if limits.isolated(contract):
+        from visup.agent.execution.process_runner import Isolated
+
+        runner = Isolated(behaviour, contract, limits)
+    elif limits.hang_s is None:
+        runner = Direct(behaviour, contract)
+    else:
+        runner = Threaded(behaviour, contract, limits.start_s)
+    return Slot(behaviour, contract, limits, runner, past=deque(maxlen=contract.history))

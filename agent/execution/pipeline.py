@@ -1,0 +1,112 @@
+"""The first phase of a step: the behaviours run on the frame, each contained.
+
+A behaviour that raises, hangs or breaks its contract never reaches the mind: its report says so,
+and what it gives is unknown. `slot.py` has one behaviour, `limits.py` the policy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
+
+from visup.agent.contract.behaviour import Behaviour
+from visup.agent.contract.limits import Limits
+from visup.agent.execution.behaviour_slot import Slot, slot_of, taken_over
+from visup.agent.model.errors import BehaviourError
+from visup.agent.model.records import Directive, Frame, Observation, ReportState
+
+
+def in_order(behaviours: Sequence[Behaviour], limits: Limits | None = None) -> list[Slot]:
+    """Behaviours so that each comes after those that give what it needs.
+
+    Args:
+        behaviours: In any order.
+        limits: What they are held to; the defaults when left out.
+
+    Raises:
+        BehaviourError: Two have one name, a need is given by none or only in a circle, or a name
+            that shall be isolated is not among them.
+    """
+    held = limits or Limits()
+    named = {b.contract.name: b for b in behaviours}
+    if len(named) < len(behaviours):
+        names = [b.contract.name for b in behaviours]
+        twice = next(n for n in names if names.count(n) > 1)
+        raise BehaviourError(f"two behaviours are called '{twice}'", hint="rename one of them")
+    for name in sorted(held.isolate - named.keys()):
+        raise BehaviourError(
+            f"there is no behaviour called '{name}' to isolate",
+            expected=f"one of: {', '.join(sorted(named))}",
+        )
+    closer = {n: _closer(b, behaviours) for n, b in named.items()}
+    before = {n: [*_providers(b, behaviours), *closer[n]] for n, b in named.items()}
+    try:
+        order = list(TopologicalSorter(before).static_order())
+    except CycleError as circle:
+        path = " -> ".join(circle.args[1])
+        raise BehaviourError(f"behaviours wait for each other in a circle: {path}") from circle
+    slots = [slot_of(named[name], held) for name in order]
+    for slot in slots:
+        slot.relieved_by = frozenset(closer[slot.contract.name])
+    return slots
+
+
+def _closer(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
+    """Names of those that relieve one; they give all that it gives, so that nothing is lost."""
+    coarse = behaviour.contract
+    fine = [b.contract for b in behaviours if coarse.name in b.contract.relieves]
+    for contract in fine:
+        for kind in coarse.gives:
+            if kind not in contract.gives:
+                raise BehaviourError(
+                    f"behaviour '{contract.name}' relieves '{coarse.name}', but does not give '{kind}'",
+                    hint=f"let it give '{kind}' too, or leave '{coarse.name}' at work",
+                )
+    return [c.name for c in fine]
+
+
+def _providers(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
+    """Names of the others that give what one needs."""
+    contract = behaviour.contract
+    others = [b.contract for b in behaviours if b is not behaviour]
+    given = {kind for c in others for kind in c.gives}
+    for kind in contract.needs:
+        if kind not in given:
+            alone = " but itself" if kind in contract.gives else ""
+            raise BehaviourError(
+                f"behaviour '{contract.name}' needs '{kind}', which no behaviour{alone} gives",
+                expected=f"one of: {', '.join(sorted(given))}" if given else "another behaviour",
+            )
+    return [c.name for c in others if set(contract.needs) & set(c.gives)]
+
+
+def perceive(slots: Sequence[Slot], frame: Frame, directives: Sequence[Directive]) -> Observation:
+    """Run the behaviours on a frame.
+
+    Args:
+        slots: From `in_order`.
+        frame: The frame.
+        directives: What the last step asked for.
+
+    Returns:
+        One report for each behaviour, in order.
+    """
+    shown = read_only(frame)
+    seen = Observation(frame.index, frame.time, frame.size)
+    for slot in slots:
+        report = slot.run(shown, seen, directives)
+        earlier = seen.reports
+        if slot.relieved_by and report.state is ReportState.RAN:
+            earlier = tuple(taken_over(r, slot) for r in earlier)
+        seen = replace(seen, reports=(*earlier, report))
+    for slot in slots:
+        slot.remember(shown, seen)
+    return seen
+
+
+def read_only(frame: Frame) -> Frame:
+    """The same frame with an image that cannot be written to: whoever tries fails, alone."""
+    image = frame.image.view()
+    image.flags.writeable = False
+    return Frame(frame.index, frame.time, image)

@@ -1,0 +1,267 @@
+"""All that holds between objects at one moment: a table by columns that gives records on demand.
+
+Fifty objects are 1225 pairs of a dozen relations each: too many records to make in every step, of
+which a few are ever read. So a step keeps its relations as arrays, a column for each question that
+has one answer for a pair (such as: do the two converge, keep their distance, or diverge?), and a
+`Relation` is made when somebody asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from operator import itemgetter
+from typing import TYPE_CHECKING, overload
+
+from visup.agent.model.records import Truth
+from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns, Relation
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_CODES = {Truth.TRUE: 1, Truth.UNKNOWN: 0, Truth.FALSE: -1}
+_TRUTHS = {code: truth for truth, code in _CODES.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class RelationTable(Sequence[Relation]):
+    """The relations of one step; immutable. As a sequence it gives those that are listed.
+
+    Attributes:
+        ids: (M,) object ids, increasing.
+        parts: What holds between all pairs of them.
+        extra: Relations given one by one (those of plug-ins).
+    """
+
+    ids: tuple[int, ...] = ()
+    parts: tuple[Cells, ...] = ()
+    extra: tuple[Relation, ...] = field(default=())
+
+    def with_cells(self, cells: Cells) -> RelationTable:
+        """The same with more that holds between all pairs of its objects."""
+        return RelationTable(self.ids, (*self.parts, cells), self.extra)
+
+    def find(self, name: str, *objects: int) -> Relation | None:
+        """The relation of that name between exactly these objects, or None when it is not judged.
+
+        Args:
+            name: Any relation, listed or not.
+            objects: Ids; their order matters for relations that are not symmetric.
+        """
+        if len(objects) == 2:
+            k, row = self.pair(*objects)
+            for part in self.parts:
+                at = part.columns.named.get(name)
+                if at is not None and k >= 0:
+                    return part.relation(*at, (objects[0], objects[1]), row, k)
+        return self._given.get((name, frozenset(objects))) if self.extra else None
+
+    def truth(self, name: str, a: int, b: int) -> Truth | None:
+        """Whether the relation of that name holds from a to b, or None when it is not judged."""
+        for part in self.parts:
+            at = part.columns.named.get(name)
+            if at is not None:
+                k, row = self.pair(a, b)
+                if k >= 0:
+                    column, code = at
+                    held = int(part.state[column.rows[row], k])
+                    return _TRUTHS[1 if held == code else 0 if held == UNKNOWN_CODE else -1]
+        found = self._given.get((name, frozenset((a, b)))) if self.extra else None
+        return None if found is None else found.truth
+
+    def codes(self, name: str) -> list[int]:
+        """Whether a relation holds between pairs as they stand: 1 true, -1 false, 0 unknown or not judged."""
+        for part in self.parts:
+            at = part.columns.named.get(name)
+            if at is not None:
+                column, code = at
+                held = part.state[column.rows[0]].tolist()
+                return [1 if c == code else 0 if c == UNKNOWN_CODE else -1 for c in held]
+        truths = [self.truth(name, *pair) for pair in self._pairs]
+        return [0 if t is None else _CODES[t] for t in truths]
+
+    def true(self, *names: str) -> tuple[Relation, ...]:
+        """The relations of some names that are true, by their objects."""
+        held = (self.find(name, *objects) for objects, name in self.held(*names))
+        return tuple([r for r in held if r is not None])
+
+    def held(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
+        """Objects and names of the relations of some names that are true, by objects: no records."""
+        found: list[tuple[tuple[int, ...], str]] = [
+            (r.objects, r.name) for r in self.extra if r.name in names and r.truth is Truth.TRUE
+        ]
+        pairs: list[tuple[int, int]] = []
+        for part in self.parts:
+            for name in names:
+                column, code = part.columns.named.get(name, (None, 0))
+                if column is None:
+                    continue
+                pairs = pairs or list(self._pairs)
+                for row in range(len(set(column.rows))):
+                    states = part.state[column.rows[row]].tolist()
+                    for k, state in enumerate(states):
+                        if state == code:
+                            pair = pairs[k] if row == 0 else pairs[k][::-1]
+                            found.append((pair, name))
+        return sorted(found, key=itemgetter(0))
+
+    def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
+        """A relation between all of some objects.
+
+        Args:
+            name: Any relation, listed or not.
+            ids: Objects, in any order.
+
+        Returns:
+            (n, n) int8, a the row and b the column: 1 true, -1 false, 0 unknown or not judged.
+        """
+        table: NDArray[np.int8] = self.truths_of((name,), ids)[0]
+        return table
+
+    def truths_of(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
+        """Several relations between all of some objects, in one pass.
+
+        Args:
+            names: Any relations, listed or not.
+            ids: Objects, in any order.
+
+        Returns:
+            (k, n, n) int8, one table as of `truths` for each name.
+        """
+        import numpy as np
+
+        columns = tuple([part.columns for part in self.parts])
+        heights = tuple([len(part.state) for part in self.parts])
+        places, code = _places_of(columns, heights, names, len(self.ids))
+        states = [part.state.ravel() for part in self.parts]
+        codes = _truth(np.concatenate([*states, _nothing()]).take(places), code)
+        if tuple(ids) != self.ids:
+            codes = self._of(codes, ids)
+        for r in self.extra:
+            if r.name in names and len(r.objects) == 2 and set(r.objects) <= set(ids):
+                i, j = (list(ids).index(o) for o in r.objects)
+                k = names.index(r.name)
+                codes[k, i, j] = codes[k, j, i] = _CODES[r.truth]
+        return codes
+
+    def _of(self, codes: NDArray[np.int8], ids: Sequence[int]) -> NDArray[np.int8]:
+        """(k, n, n) tables for other objects; what is not judged is unknown."""
+        import numpy as np
+
+        out = np.zeros((len(codes), len(ids), len(ids)), dtype=np.int8)
+        there = [n for n, i in enumerate(ids) if i in self._place]
+        here = [self._place[ids[n]] for n in there]
+        out[:, np.array(there, np.intp)[:, None], there] = codes[
+            :, np.array(here, np.intp)[:, None], here
+        ]
+        return out
+
+    def all(self) -> Iterator[Relation]:
+        """Everything that is judged, listed or not: of each column the relation that holds."""
+        for part in self.parts:
+            for k, pair in enumerate(self._pairs):
+                for column in part.columns.each:
+                    for row, at in enumerate(dict.fromkeys(column.rows)):
+                        code = max(0, int(part.state[at, k]))
+                        if column.names[code]:
+                            turned = pair if row == 0 else pair[::-1]
+                            yield part.relation(column, code, turned, row, k)
+        yield from self.extra
+
+    def pair(self, a: int, b: int) -> tuple[int, int]:
+        """Number of a pair and its row: 0 as it stands, 1 turned round; number -1 when not there."""
+        i, j = self._place.get(a, -1), self._place.get(b, -1)
+        if i < 0 or j < 0 or i == j:
+            return -1, 0
+        low, high, row = (i, j, 0) if i < j else (j, i, 1)
+        m = len(self.ids)
+        return low * m - low * (low + 1) // 2 + high - low - 1, row
+
+    def __iter__(self) -> Iterator[Relation]:
+        for part in self.parts:
+            listed = [q for q in part.columns.each if q.listed != "none"]
+            for k, pair in enumerate(self._pairs):
+                for column in listed:
+                    yield from part.told(column, pair, k)
+        yield from self.extra
+
+    def __len__(self) -> int:
+        m = len(self.ids)
+        count = sum(q.count for part in self.parts for q in part.columns.each)
+        return m * (m - 1) // 2 * count + len(self.extra)
+
+    @overload
+    def __getitem__(self, index: int) -> Relation: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Relation, ...]: ...
+    def __getitem__(self, index: int | slice) -> Relation | tuple[Relation, ...]:
+        return self._listed[index]
+
+    def __add__(self, more: Iterable[Relation]) -> RelationTable:
+        return RelationTable(self.ids, self.parts, (*self.extra, *more))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RelationTable | tuple):
+            return NotImplemented
+        return tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(self._listed)
+
+    @property
+    def _pairs(self) -> Iterator[tuple[int, int]]:
+        return ((a, b) for i, a in enumerate(self.ids) for b in self.ids[i + 1 :])
+
+    @cached_property
+    def _listed(self) -> tuple[Relation, ...]:
+        return tuple(self)
+
+    @cached_property
+    def _place(self) -> Mapping[int, int]:
+        return {object_id: i for i, object_id in enumerate(self.ids)}
+
+    @cached_property
+    def _given(self) -> Mapping[tuple[str, frozenset[int]], Relation]:
+        return {(r.name, frozenset(r.objects)): r for r in reversed(self.extra)}
+
+
+@lru_cache(maxsize=128)
+def _places_of(
+    columns: tuple[Columns, ...], heights: tuple[int, ...], wanted: tuple[str, ...], m: int
+) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
+    """Where some relations of all of m objects are found in the states of all cells, end to end.
+
+    Returns:
+        (k, m, m) places, of what is not judged that behind the last state, and (k, 1, 1) codes.
+    """
+    import numpy as np
+
+    first, second = np.triu_indices(m, 1)
+    pairs, each = len(first), np.arange(len(first))
+    places = np.full((len(wanted), m, m), sum(heights) * pairs, dtype=np.intp)
+    codes = np.zeros((len(wanted), 1, 1), dtype=np.int8)
+    for number, part in enumerate(columns):
+        begin = sum(heights[:number])
+        for k, name in enumerate(wanted):
+            if name in part.named:
+                column, codes[k] = part.named[name]
+                row, turned = column.rows
+                places[k, first, second] = (begin + row) * pairs + each
+                places[k, second, first] = (begin + turned) * pairs + each
+    return places, codes
+
+
+@lru_cache(maxsize=1)
+def _nothing() -> NDArray[np.int8]:
+    """The state of what is not judged."""
+    import numpy as np
+
+    return np.array([UNKNOWN_CODE], dtype=np.int8)
+
+
+def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
+    """1 where a state has the code, 0 where it is unknown, else -1."""
+    held = (state == code).astype("int8")
+    return held + held - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]

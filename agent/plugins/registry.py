@@ -1,0 +1,80 @@
+"""Installed behaviours, found by name: entry points of packages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from visup.agent.contract.behaviour import Behaviour
+from visup.agent.model.errors import BehaviourError
+from visup.agent.plugins.loader import Kind, Offer
+
+GROUP = "visup.behaviours"
+
+
+class Registry:
+    """Behaviours that can be made, by name. Made by whoever wires an agent; never global."""
+
+    def __init__(self) -> None:
+        self._offers: dict[str, Offer | EntryPoint] = {}
+
+    def add(self, name: str, kind: Kind | EntryPoint) -> None:
+        """Add a class of behaviours, or whatever makes one.
+
+        Raises:
+            BehaviourError: The name is taken.
+        """
+        if name in self._offers:
+            raise BehaviourError(f"a behaviour called '{name}' is registered already")
+        self._offers[name] = kind if isinstance(kind, EntryPoint) else Offer(kind, name)
+
+    def names(self) -> list[str]:
+        """Names in alphabetical order."""
+        return sorted(self._offers)
+
+    def offer(self, name: str) -> Offer:
+        """What makes the behaviour of that name; an entry point is imported now.
+
+        Raises:
+            BehaviourError: No such name, or it cannot be imported.
+        """
+        if name not in self._offers:
+            raise BehaviourError(
+                f"there is no behaviour called '{name}'",
+                expected=f"one of: {', '.join(self.names())}",
+            )
+        found = self._offers[name]
+        if isinstance(found, Offer):
+            return found
+        try:
+            offer = Offer(found.load(), found.value)
+        except Exception as fault:
+            said = f"{type(fault).__name__}: {fault}"
+            raise BehaviourError(
+                f"behaviour '{name}' cannot be imported: {said}", where=found.value
+            ) from fault
+        self._offers[name] = offer
+        return offer
+
+    def make(self, name: str, settings: Mapping[str, Any] | None = None) -> Behaviour:
+        """A new behaviour.
+
+        Args:
+            name: Its name.
+            settings: For it.
+
+        Raises:
+            BehaviourError: No such name, or it cannot be made.
+            SettingsError: A setting is not as it should be.
+        """
+        return self.offer(name).make(settings)
+
+
+def discover() -> Registry:
+    """A registry of all behaviours that installed packages offer under `visup.behaviours`."""
+    registry = Registry()
+    for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
+        if point.name not in registry.names():
+            registry.add(point.name, point)
+    return registry

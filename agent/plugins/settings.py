@@ -1,0 +1,145 @@
+"""Settings of plug-ins: each is judged by the plug-in's own pydantic model, named `Settings`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+
+Values = dict[str, dict[str, Any]]
+"""Name of a behaviour -> its settings."""
+
+
+def validated(model: type | None, values: Mapping[str, Any], name: str) -> object:
+    """Settings of one behaviour, as its model makes them.
+
+    Args:
+        model: The pydantic model; None for a behaviour without settings.
+        values: What was given.
+        name: Of the behaviour.
+
+    Returns:
+        An instance of the model, or None without one.
+
+    Raises:
+        SettingsError: A setting is unknown or not as it should be.
+    """
+    if model is None:
+        if values:
+            raise SettingsError(
+                f"behaviour '{name}' has no settings",
+                where=f"{name}.{next(iter(values))}",
+                hint="a behaviour's settings are a pydantic model in it, called Settings",
+            )
+        return None
+    from pydantic import BaseModel, ValidationError
+
+    if not issubclass(model, BaseModel):
+        raise SettingsError(
+            f"the settings of behaviour '{name}' are a {model.__name__}",
+            expected="class Settings(pydantic.BaseModel)",
+        )
+    unknown = [_unknown(key, model.model_fields, name) for key in values if not _has(model, key)]
+    _refuse(unknown)
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as faults:
+        _refuse([_worded(dict(e), name) for e in faults.errors()])
+        raise
+
+
+def parse_settings(given: Iterable[str]) -> Values:
+    """Settings from `NAME.KEY=VALUE`; values are read as TOML, or else as plain text.
+
+    >>> parse_settings(["lamp.contrast=120", "lamp.colour=red"])
+    {'lamp': {'contrast': 120, 'colour': 'red'}}
+
+    Raises:
+        SettingsError: One is not of that form, or comes twice.
+    """
+    values: Values = {}
+    for text in given:
+        path, equals, value = text.partition("=")
+        name, dot, key = path.strip().partition(".")
+        if not (equals and dot and name and key):
+            raise SettingsError(
+                f"--set {text!r} cannot be read",
+                expected="NAME.KEY=VALUE, such as lamp.contrast=120",
+            )
+        if key in values.setdefault(name, {}):
+            raise SettingsError(f"--set {path.strip()} comes twice", expected="each setting once")
+        values[name][key] = _value(value.strip())
+    return values
+
+
+def read_settings(path: Path) -> Values:
+    """Settings from a TOML file: a table `[behaviours.NAME]` for each behaviour.
+
+    Raises:
+        SettingsError: The file is missing, is not TOML, or holds something else.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise SettingsError(f"cannot be read: {fault.strerror}", where=str(path)) from fault
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        raise SettingsError(f"it is not TOML: {fault}", where=str(path)) from fault
+    tables = document.pop("behaviours", {})
+    strange = next(iter(document), None)
+    if strange is not None:
+        raise SettingsError(
+            f"'{strange}' is unknown", where=str(path), expected="tables [behaviours.NAME]"
+        )
+    if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
+        raise SettingsError(
+            "`behaviours` is no table of tables",
+            where=str(path),
+            expected="[behaviours.NAME] with KEY = VALUE below it",
+        )
+    return tables
+
+
+def merged(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
+    """Settings in layers; a later one goes over those before it, key by key."""
+    names = dict.fromkeys(name for layer in layers for name in layer)
+    return {n: {k: v for layer in layers for k, v in layer.get(n, {}).items()} for n in names}
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _has(model: Any, key: str) -> bool:
+    return key in model.model_fields or any(f.alias == key for f in model.model_fields.values())
+
+
+def _unknown(key: str, known: Mapping[str, object], name: str) -> VisupError:
+    near = get_close_matches(key, known, n=1)
+    return SettingsError(
+        f"behaviour '{name}' has no setting '{key}'",
+        where=f"{name}.{key}",
+        expected=f"one of: {', '.join(known)}" if known else "none",
+        hint=f"did you mean '{near[0]}'?" if near else None,
+    )
+
+
+def _worded(fault: Mapping[str, Any], name: str) -> VisupError:
+    place = ".".join(str(part) for part in (name, *fault["loc"]))
+    wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if fault["type"] == "missing":
+        return SettingsError("a setting is missing", where=place, hint=f"--set {place}=VALUE")
+    return SettingsError(f"{fault['input']!r} will not do", where=place, expected=wanted)
+
+
+def _refuse(faults: list[VisupError]) -> None:
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise ManyErrors(faults)

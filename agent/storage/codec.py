@@ -1,0 +1,317 @@
+"""What was perceived, as bytes and back: reasoning again on it gives the very same events.
+
+A step is one JSON document (docs/step.schema.json), compressed by zlib. Numbers are written so that
+they are read back to the last bit; masks are runs, contours from pixel to pixel chain codes. Plug-ins'
+values are kept when they are made of plain values, arrays and visup's own records; of others only
+the type is known, and what their behaviour gives is unknown when the run is replayed.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import from_json, to_json
+
+from visup.agent.model import mind, records
+from visup.agent.model.errors import OutputError
+from visup.agent.model.records import Observation, Percept, Region, Report, ReportState
+from visup.agent.storage._codec_jit import NO_DIGIT, chain_digits, chain_points, run_lengths
+
+LARGEST = 256 * 2**20
+"""No step is larger, bytes uncompressed: a damaged file must not fill the memory."""
+
+_LEVEL = 1  # of zlib: higher levels save a few per cent and take several times as long
+_PLAIN = frozenset({type(None), bool, int, float, str})
+_LEFT_OUT = (records.Frame, records.Observation, mind.Mind)
+_TYPES: Mapping[str, type] = MappingProxyType(
+    {
+        name: kind
+        for module in (records, mind)
+        for name, kind in vars(module).items()
+        if isinstance(kind, type)
+        and kind.__module__ == module.__name__
+        and (is_dataclass(kind) or issubclass(kind, Enum))
+        and kind not in _LEFT_OUT
+    }
+)
+_FIELDS = {k: tuple(f.name for f in fields(k)) for k in _TYPES.values() if is_dataclass(k)}
+
+
+class NotPlainError(TypeError):
+    """A value is of a type that the codec does not know."""
+
+
+def packed(seen: Observation) -> bytes:
+    """An observation as bytes.
+
+    Args:
+        seen: What was perceived of one frame; times that behaviours took are not kept.
+
+    Returns:
+        A compressed JSON document.
+    """
+    return zlib.compress(to_json(document(seen), inf_nan_mode="constants"), _LEVEL)
+
+
+def unpacked(data: bytes, where: str = "") -> Observation:
+    """The observation that was packed.
+
+    Raises:
+        OutputError: The bytes are damaged.
+    """
+    try:
+        inflater = zlib.decompressobj()
+        text = inflater.decompress(data, LARGEST)
+        if not inflater.eof:
+            raise ValueError("it is cut off or too large")
+        return observation(from_json(text))
+    except (zlib.error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as fault:
+        raise OutputError(
+            f"a recorded step cannot be read ({fault})",
+            where=where or None,
+            hint="the file is damaged; steps before this one can be used",
+        ) from fault
+
+
+def document(seen: Observation) -> dict[str, Any]:
+    """An observation as JSON values, in the form of docs/step.schema.json."""
+    return {
+        "frame_index": seen.frame_index,
+        "time": float(seen.time),
+        "frame_size": [int(n) for n in seen.frame_size],
+        "reports": [_report(r) for r in seen.reports],
+    }
+
+
+def observation(told: Mapping[str, Any]) -> Observation:
+    """The observation of a document; reports whose values could not be kept have rested."""
+    width, height = told["frame_size"]
+    return Observation(
+        int(told["frame_index"]),
+        float(told["time"]),
+        (int(width), int(height)),
+        tuple(_told_report(r) for r in told["reports"]),
+    )
+
+
+def _report(r: Report) -> dict[str, Any]:
+    out: dict[str, Any] = {"behaviour": r.behaviour, "state": r.state.value, "gives": list(r.gives)}
+    if r.error:
+        out["error"] = r.error
+    try:
+        out["percepts"] = [_percept(p) for p in r.percepts]
+    except NotPlainError as fault:
+        out["lost"] = str(fault)
+    return out
+
+
+def _percept(p: Percept) -> list[Any]:
+    return [p.kind, encoded(p.value), encoded(p.time), p.source, encoded(p.confidence)]
+
+
+def _told_report(told: Mapping[str, Any]) -> Report:
+    gives = tuple(str(k) for k in told["gives"])
+    if "lost" in told:
+        error = f"its percepts were not recorded: {told['lost']}"
+        return Report(str(told["behaviour"]), ReportState.RESTED, gives, error=error)
+    percepts = tuple(
+        Percept(str(kind), decoded(value), decoded(time), str(source), decoded(confidence))
+        for kind, value, time, source, confidence in told["percepts"]
+    )
+    state = ReportState(told["state"])
+    return Report(str(told["behaviour"]), state, gives, percepts, str(told.get("error", "")))
+
+
+def encoded(value: Any) -> Any:
+    """A value as JSON values; what JSON has no form for is an object with the key '$'.
+
+    Raises:
+        NotPlainError: It is, or holds, something that is not known here.
+    """
+    kind = type(value)
+    if kind in _PLAIN:
+        return value
+    if kind is Region:
+        return _region(value)
+    if kind in _FIELDS:
+        return _record(kind, value)
+    if kind is tuple:
+        return {"$": "tuple", "of": [v if type(v) in _PLAIN else encoded(v) for v in value]}
+    if kind is list:
+        return [encoded(v) for v in value]
+    if isinstance(value, Enum):
+        if _TYPES.get(kind.__name__) is not kind:
+            raise NotPlainError(f"{kind.__module__}.{kind.__qualname__}")
+        return {"$": kind.__name__, "of": value.value}
+    if kind is dict or kind is MappingProxyType:
+        return _mapping(value)
+    if isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biufc":
+        return _array(value)
+    if kind is frozenset or kind is set:
+        ordered = sorted((encoded(v) for v in value), key=lambda v: json.dumps(v, sort_keys=True))
+        return {"$": kind.__name__, "of": ordered}
+    if kind is bytes:
+        return {"$": "bytes", "of": base64.b64encode(value).decode()}
+    raise NotPlainError(f"{kind.__module__}.{kind.__qualname__}")
+
+
+def decoded(value: Any) -> Any:
+    """The value that was encoded.
+
+    Raises:
+        ValueError, TypeError, KeyError: It was not.
+    """
+    kind = type(value)
+    if kind in _PLAIN:
+        return value
+    if kind is list:
+        return [decoded(v) for v in value]
+    tag = value.get("$")
+    if tag is None:
+        return {k: decoded(v) for k, v in value.items()}
+    if tag == "Region":
+        return _told_region(value)
+    if tag in _TYPES:
+        return _told_record(_TYPES[tag], value)
+    return _OTHERS[tag](value)
+
+
+def _record(kind: type, value: Any) -> dict[str, Any]:
+    out: dict[str, Any] = {"$": kind.__name__}
+    for name in _FIELDS[kind]:
+        held = getattr(value, name)
+        out[name] = held if type(held) in _PLAIN else encoded(held)
+    return out
+
+
+def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
+    if type(value) is dict and all(type(k) is str and k != "$" for k in value):
+        return {k: encoded(v) for k, v in value.items()}
+    pairs = [[encoded(k), encoded(v)] for k, v in value.items()]
+    return {"$": "map" if type(value) is dict else "frozenmap", "of": pairs}
+
+
+def _told_record(kind: type, told: Mapping[str, Any]) -> Any:
+    if kind not in _FIELDS:
+        return kind(told["of"])
+    given = {n: v if type(v) in _PLAIN else decoded(v) for n, v in told.items()}
+    del given["$"]
+    return kind(**given)
+
+
+def _array(value: NDArray[Any] | np.generic) -> dict[str, Any]:
+    whole = np.asarray(value)
+    little = whole.astype(whole.dtype.newbyteorder("<"), copy=False)
+    return {
+        "$": "array" if isinstance(value, np.ndarray) else "scalar",
+        "dtype": little.dtype.str,
+        "shape": list(whole.shape),
+        "of": base64.b64encode(np.ascontiguousarray(little).tobytes()).decode(),
+    }
+
+
+def _told_array(told: Mapping[str, Any]) -> NDArray[Any]:
+    dtype = np.dtype(str(told["dtype"]))
+    if dtype.kind not in "biufc":
+        raise ValueError(f"an array of {dtype}")
+    flat = np.frombuffer(base64.b64decode(told["of"]), dtype)
+    # As arrays are made in memory: writable, and of the machine's own byte order.
+    return flat.astype(dtype.newbyteorder("=")).reshape([int(n) for n in told["shape"]])
+
+
+_OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+    "tuple": lambda told: tuple([v if type(v) in _PLAIN else decoded(v) for v in told["of"]]),
+    "set": lambda told: {decoded(v) for v in told["of"]},
+    "frozenset": lambda told: frozenset(decoded(v) for v in told["of"]),
+    "map": lambda told: {decoded(k): decoded(v) for k, v in told["of"]},
+    "frozenmap": lambda told: MappingProxyType({decoded(k): decoded(v) for k, v in told["of"]}),
+    "bytes": lambda told: base64.b64decode(told["of"]),
+    "array": _told_array,
+    "scalar": lambda told: _told_array(told)[()],
+}
+
+
+_SHOWN = tuple(n for n in _FIELDS[Region] if n not in ("mask", "contour", "bbox"))
+
+
+def _region(r: Region) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "$": "Region",
+        "bbox": [int(n) for n in r.bbox],
+        "mask": runs(r.mask),
+        "contour": _chain(r.contour),
+    }
+    for name in _SHOWN:
+        held = getattr(r, name)
+        out[name] = held if type(held) in _PLAIN else encoded(held)
+    return out
+
+
+def _told_region(told: Mapping[str, Any]) -> Region:
+    x, y, w, h = (int(n) for n in told["bbox"])
+    given = {n: decoded(v) for n, v in told.items() if n not in ("$", "bbox", "mask", "contour")}
+    mask = unrun(told["mask"], (h, w))
+    return Region(
+        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decoded(told["contour"])), **given
+    )
+
+
+def runs(mask: NDArray[np.bool_]) -> list[int]:
+    """Lengths of the runs of a mask in reading order, that of False first (0 when there is none)."""
+    lengths: list[int] = run_lengths(np.ascontiguousarray(mask).reshape(-1)).tolist()
+    return lengths
+
+
+def unrun(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """The mask of runs, of shape (height, width).
+
+    Raises:
+        ValueError: The runs are not of that many pixels.
+    """
+    counts = np.asarray(lengths, np.int64)
+    if counts.ndim != 1 or (counts < 0).any() or int(counts.sum()) != shape[0] * shape[1]:
+        raise ValueError("the runs of a mask do not fill its box")
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts).reshape(shape)
+
+
+_CHAIN = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
+_CODE = np.full(9, NO_DIGIT, np.uint8)
+"""The character of a move (dx, dy) at 3 (dx + 1) + dy + 1."""
+for _digit, (_dx, _dy) in enumerate(_CHAIN):
+    _CODE[3 * (_dx + 1) + _dy + 1] = ord("0") + _digit
+
+
+def _chain(contour: NDArray[np.float32]) -> Any:
+    """A contour that goes from pixel to neighbouring pixel as a chain code (Freeman, 1961).
+
+    Digits are directions in steps of 45 degrees, 0 to the right, 2 down. Any other contour is kept as
+    an array.
+    """
+    points = np.asarray(contour)
+    if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 2 or not len(points):
+        return encoded(contour)
+    digits = chain_digits(np.ascontiguousarray(points), _CODE)
+    if len(digits) == len(points):
+        return encoded(contour)
+    first = [int(points[0, 0]), int(points[0, 1])]
+    return {"$": "chain", "from": first, "of": digits.tobytes().decode()}
+
+
+def _unchained(told: Mapping[str, Any]) -> NDArray[np.float32]:
+    digits = np.frombuffer(told["of"].encode(), np.uint8) - ord("0")
+    if len(digits) and digits.max() > 7:
+        raise ValueError("a chain code has digits from 0 to 7")
+    x, y = told["from"]
+    return chain_points(int(x), int(y), digits, _CHAIN)
+
+
+_OTHERS["chain"] = _unchained

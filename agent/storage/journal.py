@@ -1,0 +1,305 @@
+"""The journal: what happened in a run, in SQLite files, written step by step.
+
+Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step
+up to the last one that was committed, and can be read while the run goes on. A run of days goes on in
+further files (segments) beside the first one. What was perceived is kept in full, so that a run can be
+reasoned about again without its video. Read next: `recording.py`, which reads all this back.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import to_json
+
+from visup.agent.model.errors import OutputError
+from visup.agent.model.mind import TaskBelief
+from visup.agent.model.records import Alert, Event, Frame
+from visup.agent.model.step import Step
+from visup.agent.storage.codec import packed
+from visup.agent.storage.jsonable import event_line, object_line, plain
+
+APPLICATION_ID = 0x56495355  # "VISU"
+VERSION = 2
+
+SCHEMA = """
+CREATE TABLE run (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE steps (
+    frame_index INTEGER PRIMARY KEY, time REAL NOT NULL, summary TEXT NOT NULL,
+    seen BLOB NOT NULL, crc INTEGER NOT NULL);
+CREATE TABLE events (
+    number INTEGER PRIMARY KEY, frame_index INTEGER NOT NULL, time REAL NOT NULL,
+    kind TEXT NOT NULL, text TEXT NOT NULL, record TEXT NOT NULL);
+CREATE TABLE alerts (
+    id INTEGER PRIMARY KEY, kind TEXT NOT NULL, severity TEXT NOT NULL, opened REAL NOT NULL,
+    closed REAL, cause TEXT NOT NULL, record TEXT NOT NULL);
+CREATE INDEX events_by_time ON events (time);
+"""
+
+Statement = tuple[str, tuple[Any, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How a journal is cut into segments, and how much of it is kept.
+
+    Attributes:
+        segment_bytes: A segment that holds more of steps is followed by a new one.
+        segment_s: So is one that spans more than this, seconds of the source.
+        keep_bytes: When steps of all segments take more, those of the oldest are dropped; their events
+            and alerts stay. None keeps everything.
+    """
+
+    segment_bytes: int = 256 * 2**20
+    segment_s: float = 6 * 3600.0
+    keep_bytes: int | None = None
+
+
+class Journal:
+    """Writes a run as it goes: give its `record` to an agent as an observer, close it at the end.
+
+    Args:
+        path: The first file; it must not exist yet, unless `resume`.
+        limits: When to begin a new segment, and what to keep.
+        resume: Go on with the journal of an earlier run.
+
+    Attributes:
+        path: As given.
+        last_frame: Number of the last frame that is recorded, or None.
+
+    Raises:
+        OutputError: It cannot be written, or the one to go on with is of another version.
+    """
+
+    def __init__(self, path: Path, limits: Limits | None = None, *, resume: bool = False) -> None:
+        self.path = path
+        self.last_frame: int | None = None
+        self._limits = limits or Limits()
+        self._begun: float | None = None
+        self._last_event = 0
+        self._sizes: list[int] = []
+        if not resume:
+            self._open(path, 1)
+            return
+        old = segments(path)
+        begun = [one for one in old if self._take_over(one)]
+        self._db = _connected(begun[-1])
+
+    def note(self, **facts: Any) -> None:
+        """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
+        rows = [(key, _text(plain(value))) for key, value in facts.items()]
+        self._write([("INSERT OR REPLACE INTO run VALUES (?, ?)", row) for row in rows])
+
+    def record(self, step: Step, frame: Frame | None = None) -> None:
+        """Write one step, wholly or not at all.
+
+        Raises:
+            OutputError: The disk is full or the file has become unwritable; earlier steps stay.
+        """
+        seen = packed(step.observation)
+        text = to_json(summary(step)).decode()
+        row = (step.frame_index, step.time, text, seen, zlib.crc32(seen))
+        statements: list[Statement] = [("INSERT INTO steps VALUES (?, ?, ?, ?, ?)", row)]
+        statements += [
+            ("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (number, *_event_row(e)))
+            for number, e in enumerate(step.events, self._last_event + 1)
+        ]
+        statements += [
+            ("INSERT OR REPLACE INTO alerts VALUES (?, ?, ?, ?, ?, ?, ?)", _alert_row(a))
+            for a in step.alerts
+        ]
+        if self._is_full(step.time):
+            self._next_segment()
+        self._write(statements)
+        self._last_event += len(step.events)
+        self.last_frame = step.frame_index
+        self._begun = step.time if self._begun is None else self._begun
+        self._sizes[-1] += len(seen) + len(text)
+
+    def close(self) -> None:
+        """Fold the log into the file and close it."""
+        try:
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            self._db.close()
+        except sqlite3.Error as fault:
+            raise _unwritable(self.path, fault) from fault
+
+    def _open(self, path: Path, number: int) -> None:
+        try:
+            self._db = _connected(path)
+            # One transaction: a run killed meanwhile leaves an empty file or a whole journal.
+            marks = f"PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};"
+            self._db.executescript(f"BEGIN;{SCHEMA}{marks}COMMIT;")
+        except sqlite3.Error as fault:
+            raise _unwritable(path, fault) from fault
+        self._sizes.append(0)
+        self._begun = None
+        if number > 1:
+            self.note(segment=number)
+
+    def _take_over(self, path: Path) -> bool:
+        """Count what a segment holds; False when the run was killed before it was begun."""
+        try:
+            db = _connected(path)
+            if path != self.path and is_empty(db):
+                db.close()
+                return False
+            check_version(db, path)
+            last, begun, size = db.execute(
+                "SELECT max(frame_index), min(time), coalesce(sum(length(seen) + length(summary)), 0)"
+                " FROM steps"
+            ).fetchone()
+            (event,) = db.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()
+            db.close()
+        except sqlite3.Error as fault:
+            raise _unwritable(path, fault) from fault
+        self.last_frame = last if last is not None else self.last_frame
+        self._last_event = max(self._last_event, event)
+        self._begun = begun
+        self._sizes.append(size)
+        return True
+
+    def _is_full(self, time: float) -> bool:
+        if self._begun is None:
+            return False
+        limits = self._limits
+        return self._sizes[-1] >= limits.segment_bytes or time - self._begun >= limits.segment_s
+
+    def _next_segment(self) -> None:
+        number = len(self._sizes) + 1
+        old = self._db
+        self._open(segment_path(self.path, number), number)
+        try:
+            old.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            old.close()
+            self._make_room()
+        except sqlite3.Error as fault:
+            raise _unwritable(self.path, fault) from fault
+
+    def _make_room(self) -> None:
+        """Drop the steps of the oldest segments beyond what is kept."""
+        keep = self._limits.keep_bytes
+        for i in range(len(self._sizes) - 1):
+            if keep is None or sum(self._sizes) + self._limits.segment_bytes <= keep:
+                return
+            if self._sizes[i]:
+                db = _connected(segment_path(self.path, i + 1))
+                db.execute("DELETE FROM steps")
+                db.execute("INSERT OR REPLACE INTO run VALUES ('steps_dropped', 'true')")
+                db.execute("VACUUM")
+                db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+                db.close()
+                self._sizes[i] = 0
+
+    def _write(self, statements: list[Statement]) -> None:
+        try:
+            if len(statements) == 1:  # is a transaction by itself
+                self._db.execute(*statements[0])
+                return
+            self._db.execute("BEGIN IMMEDIATE")
+            for sql, row in statements:
+                self._db.execute(sql, row)
+            self._db.execute("COMMIT")
+        except sqlite3.Error as fault:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise _unwritable(self.path, fault) from fault
+
+
+def segment_path(path: Path, number: int) -> Path:
+    """The file of a segment: `journal.sqlite`, `journal-2.sqlite`, ..."""
+    return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
+
+
+def segments(path: Path) -> list[Path]:
+    """The files of a journal, in order; the first one is always among them."""
+    found = [path]
+    while (following := segment_path(path, len(found) + 1)).exists():
+        found.append(following)
+    return found
+
+
+def is_empty(db: sqlite3.Connection) -> bool:
+    """Whether a file is a segment that was not begun."""
+    return db.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
+
+
+def check_version(db: sqlite3.Connection, path: Path) -> None:
+    """Refuse what is not a journal of this version.
+
+    Raises:
+        OutputError: It is not.
+    """
+    (application,) = db.execute("PRAGMA application_id").fetchone()
+    (version,) = db.execute("PRAGMA user_version").fetchone()
+    if application != APPLICATION_ID:
+        raise OutputError("this is not a journal", where=str(path), expected="a run of visup")
+    if version != VERSION:
+        raise OutputError(
+            f"this journal has version {version}",
+            where=str(path),
+            expected=f"version {VERSION}",
+            hint="record the run again with this visup, or read it with the visup that wrote it",
+        )
+
+
+def summary(step: Step) -> dict[str, Any]:
+    """What is believed after a step, in short; all else follows from what was seen (`seen`)."""
+    mind = step.mind
+    return {
+        "objects": [object_line(b) for _, b in sorted(mind.objects.items())],
+        "couplings": plain(mind.couplings),
+        "tasks": [_task_line(t) for t in mind.tasks],
+        "health": plain(mind.health),
+        "unknown": plain(mind.unknown),
+        "directives": plain(step.directives),
+        "behaviours": {r.behaviour: [r.state.value, r.error] for r in step.reports},
+    }
+
+
+def _task_line(task: TaskBelief) -> dict[str, Any]:
+    return {
+        "task": task.task,
+        "verdict": task.verdict.value,
+        "current": task.current,
+        "stages": {s.stage: s.status.value for s in task.stages},
+    }
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    # Written by one thread at a time; which one is the caller's business.
+    db = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    # Steps of a few kilobytes fill large pages better; of a file that there is the size stays.
+    db.execute("PRAGMA page_size=16384")
+    db.execute("PRAGMA journal_mode=WAL")
+    db.execute("PRAGMA synchronous=NORMAL")
+    return db
+
+
+def _event_row(event: Event) -> tuple[Any, ...]:
+    return event.frame_index, event.time, event.kind, event.text, _text(event_line(event))
+
+
+def _alert_row(a: Alert) -> tuple[Any, ...]:
+    return a.id, a.kind, a.severity.name.lower(), a.opened, a.closed, a.cause, _text(plain(a))
+
+
+def _text(value: Any) -> str:
+    """Plain values as JSON, the same values as the same text."""
+    return _TEXT.encode(value)
+
+
+_TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+
+
+def _unwritable(path: Path, fault: sqlite3.Error) -> OutputError:
+    return OutputError(
+        f"the journal cannot be written ({fault})",
+        where=str(path),
+        hint="check that the folder exists, is writable and has room",
+    )

@@ -1,0 +1,202 @@
+"""A recorded run, read back: its facts, steps, events and alerts, over all segments of its journal."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import OutputError
+from visup.agent.model.records import Observation
+from visup.agent.storage.codec import unpacked
+from visup.agent.storage.journal import check_version, is_empty, segments
+
+JOURNAL = "journal.sqlite"
+_LARGEST_ROW = 2**30
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A run on disk; it may still go on. Nothing is read before it is asked for.
+
+    Attributes:
+        path: The first file of its journal.
+    """
+
+    path: Path
+
+    @classmethod
+    def open(cls, run: Path) -> Recording:
+        """The recording of a run.
+
+        Args:
+            run: A run folder, or the journal in it.
+
+        Raises:
+            OutputError: There is none, or it is of another version.
+        """
+        path = run / JOURNAL if run.is_dir() else run
+        if not path.is_file():
+            raise OutputError(
+                "there is no recorded run here",
+                where=str(run),
+                expected=f"a run folder with {JOURNAL}",
+            )
+        it = cls(path)
+        for _ in it._rows("SELECT 1 FROM steps, run LIMIT 1"):
+            pass
+        return it
+
+    def facts(self) -> Mapping[str, Any]:
+        """Facts about the run, as given to `Journal.note`."""
+        rows = self._rows("SELECT key, value FROM run")
+        return {key: self._loaded(value) for _, (key, value) in rows}
+
+    def events(self) -> Iterator[dict[str, Any]]:
+        """Events as lines of `events.jsonl`, in the order in which they were told."""
+        rows = self._rows("SELECT record FROM events ORDER BY number")
+        return (self._record(record) for _, (record,) in rows)
+
+    def answers(self) -> dict[int, dict[int, str]]:
+        """What the operator said: frame index -> object id -> model name."""
+        told: dict[int, dict[int, str]] = {}
+        for _, (text,) in self._rows("SELECT record FROM events WHERE kind = 'answer'"):
+            event = self._record(text)
+            try:
+                number, name = int(event["objects"][0]), str(event["data"]["name"])
+                told.setdefault(int(event["frame_index"]), {})[number] = name
+            except (KeyError, IndexError, TypeError, ValueError) as fault:
+                raise _damaged(str(self.path), "an answer is not as it should be") from fault
+        return told
+
+    def alerts(self) -> dict[int, dict[str, Any]]:
+        """Alerts by id, as they were last."""
+        rows = self._rows("SELECT record FROM alerts ORDER BY id")
+        told = [self._record(record) for _, (record,) in rows]
+        return {a["id"]: a for a in told if isinstance(a.get("id"), int)}
+
+    def summaries(self) -> Iterator[dict[str, Any]]:
+        """What was believed after each step, in short, with frame index and time."""
+        rows = self._rows("SELECT frame_index, time, summary FROM steps ORDER BY frame_index")
+        return ({"frame_index": i, "time": t, **self._record(s)} for _, (i, t, s) in rows)
+
+    def observations(self, after: int = -1) -> Iterator[Observation]:
+        """What was perceived, step by step.
+
+        Args:
+            after: Only of frames with a higher number.
+
+        Raises:
+            OutputError: A step is damaged; those before it were given.
+        """
+        sql = "SELECT frame_index, seen, crc FROM steps WHERE frame_index > ? ORDER BY frame_index"
+        for path, (index, seen, crc) in self._rows(sql, (after,)):
+            where = f"{path}, frame {index}"
+            if not isinstance(seen, bytes) or zlib.crc32(seen) != crc:
+                raise _damaged(where, "its check sum is wrong")
+            yield unpacked(seen, where)
+
+    def first_and_last(self) -> tuple[int, int] | None:
+        """Numbers of the first and last frame whose steps are kept, or None when there are none."""
+        rows = self._rows("SELECT min(frame_index), max(frame_index) FROM steps")
+        ends = [(a, b) for _, (a, b) in rows if isinstance(a, int) and isinstance(b, int)]
+        return (ends[0][0], ends[-1][1]) if ends else None
+
+    def count(self) -> int:
+        """How many steps are kept."""
+        return sum(n for _, (n,) in self._rows("SELECT count(*) FROM steps"))
+
+    def written(self) -> float:
+        """When it was last written to, seconds since the epoch by the clock of the wall."""
+        last = segments(self.path)[-1]
+        log = last.with_name(last.name + "-wal")
+        return max(p.stat().st_mtime for p in (last, log) if p.exists())
+
+    def _rows(
+        self, sql: str, given: tuple[Any, ...] = ()
+    ) -> Iterator[tuple[Path, tuple[Any, ...]]]:
+        for path in segments(self.path):
+            try:
+                with closing(_opened(path)) as db:
+                    if path != self.path and is_empty(db):
+                        continue
+                    check_version(db, path)
+                    for row in db.execute(sql, given):
+                        yield path, row
+            except (sqlite3.Error, ValueError, TypeError, OverflowError) as fault:
+                raise _damaged(str(path), str(fault)) from fault
+
+    def _record(self, text: Any) -> dict[str, Any]:
+        loaded = self._loaded(text)
+        if not isinstance(loaded, dict):
+            raise _damaged(str(self.path), "a record is no JSON object")
+        return loaded
+
+    def _loaded(self, text: Any) -> Any:
+        try:
+            return json.loads(text)
+        except (ValueError, TypeError, RecursionError) as fault:
+            raise _damaged(str(self.path), str(fault)) from fault
+
+
+def read_events(path: Path) -> Iterator[dict[str, Any]]:
+    """Events of a journal, in the order in which they were told.
+
+    Raises:
+        OutputError: The file is not a journal.
+    """
+    return Recording.open(path).events()
+
+
+def read_facts(path: Path) -> Mapping[str, Any]:
+    """Facts about the run, as given to `Journal.note`."""
+    return Recording.open(path).facts()
+
+
+def read_steps(path: Path) -> Iterator[dict[str, Any]]:
+    """Summaries of all steps, in order, with frame index and time."""
+    return Recording.open(path).summaries()
+
+
+def export_events(journal: Path, target: Path) -> None:
+    """Write `events.jsonl` from a journal: one event a line.
+
+    Raises:
+        OutputError: `target` cannot be written, or `journal` cannot be read.
+    """
+    try:
+        with target.open("w", encoding="utf-8") as out:
+            for event in read_events(journal):
+                out.write(event_text(event) + "\n")
+    except OSError as fault:
+        raise OutputError(f"cannot write: {fault.strerror}", where=str(target)) from fault
+
+
+def event_text(event: Mapping[str, Any]) -> str:
+    """An event as a line of `events.jsonl`, without the end of line."""
+    return json.dumps(event, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """The file, to be read only; also where not even the log beside it may be touched.
+
+    A reader that is left half way may be closed by whichever thread collects it.
+    """
+    uri = path.absolute().as_uri()
+    db = sqlite3.connect(f"{uri}?mode=ro", uri=True, check_same_thread=False)
+    try:
+        db.execute("SELECT 1 FROM sqlite_schema").fetchone()
+    except sqlite3.OperationalError:
+        db.close()
+        db = sqlite3.connect(f"{uri}?mode=ro&immutable=1", uri=True, check_same_thread=False)
+    db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
+    return db
+
+
+def _damaged(where: str, what: str) -> OutputError:
+    return OutputError(f"this is not a journal, or it is damaged ({what})", where=where)

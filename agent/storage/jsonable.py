@@ -1,0 +1,96 @@
+"""Records as plain JSON values, for the journal and for programs that read visup's output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum, IntEnum
+from functools import cache
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from visup.agent.model.mind import Mind, ObjectBelief
+from visup.agent.model.records import Event, Region
+from visup.agent.model.relation_table import RelationTable
+
+
+def plain(value: Any) -> Any:
+    """A record as JSON-like values.
+
+    Images and masks are left out (they are large, and the video has them); numbers are rounded to
+    six digits, so that equal runs give equal bytes.
+
+    Args:
+        value: A record, or what records are made of.
+    """
+    kind: Any = type(value)
+    if kind is str or kind is int or value is None or kind is bool:
+        return value
+    if kind is float:
+        return _number(value)
+    if kind is tuple or kind is list:
+        return [plain(v) for v in value]
+    if isinstance(value, IntEnum):
+        return value.name.lower()
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    if isinstance(value, float | np.floating):
+        return _number(float(value))
+    if isinstance(value, np.integer | np.bool_):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, frozenset | set):
+        return sorted(plain(v) for v in value)
+    if isinstance(value, tuple | list | RelationTable):
+        return [plain(v) for v in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return {name: plain(getattr(value, name)) for name in _shown(kind)}
+    return str(value)
+
+
+@cache
+def _shown(kind: Any) -> tuple[str, ...]:
+    """The fields of a kind of record that are told."""
+    hidden = _HIDDEN.get(kind, frozenset())
+    return tuple(f.name for f in fields(kind) if f.name not in hidden)
+
+
+_HIDDEN: Mapping[type, frozenset[str]] = {
+    Region: frozenset({"mask", "contour", "motion"}),
+    Mind: frozenset({"memory"}),
+}
+
+
+def _number(x: float) -> float | str:
+    """JSON knows no infinity and no NaN; they are told in words."""
+    return round(x, 6) if isfinite(x) else str(x)
+
+
+def event_line(event: Event) -> dict[str, Any]:
+    """An event as it stands in `events.jsonl`."""
+    line: dict[str, Any] = plain(event)
+    return line
+
+
+def object_line(belief: ObjectBelief) -> dict[str, Any]:
+    """What is believed about an object, short, as it stands in the journal."""
+    region = belief.region
+    return {
+        "id": belief.id,
+        "presence": belief.presence.value,
+        "confirmed": belief.confirmed,
+        "region": region.id,
+        "bbox": list(region.bbox),
+        "area": plain(region.area),
+        "velocity": plain(region.velocity),
+        "cut": region.cut,
+        "candidates": [[c.name, plain(c.share)] for c in belief.candidates],
+        "depth": plain(belief.depth),
+    }

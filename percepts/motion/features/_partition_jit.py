@@ -1,0 +1,188 @@
+"""Growing cells from seeds and linking them, compiled; `superpixels` says what they are for."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+from visup.percepts.motion.features.image import Floats
+
+Labels = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
+
+
+LINE, WAITS = -1, -2  # marks of pixels that part cells, and of those in a queue
+LEVELS = 256
+
+
+@compiled
+def flooded(right: Bytes, down: Bytes, marks: Labels) -> None:
+    """The watershed of seeds, pixel for pixel as `cv2.watershed` has it, in two thirds of its time.
+
+    Pixels beside the cells wait in a queue for each height of an edge, first come, first served; the
+    lowest is emptied first. A pixel between two cells parts them.
+
+    Args:
+        right: (h, w) how far each pixel differs from the next one; the last in a row is not used.
+        down: (h - 1, w) how far each differs from the one below.
+        marks: (h, w) int32, seeds from 1 and 0 elsewhere; becomes the cells, -1 between them and at
+            the border of the image. What no seed reaches stays 0.
+    """
+    height, width = marks.shape
+    flat, east, south = marks.ravel(), right.ravel(), down.ravel()
+    one, row = np.uint64(1), np.uint64(width)
+    first, last = np.full(LEVELS, -1, np.int32), np.full(LEVELS, -1, np.int32)
+    marks[0], marks[height - 1] = LINE, LINE
+    marks[:, 0], marks[:, width - 1] = LINE, LINE
+    for y in range(1, height - 1):
+        for x in range(1, width - 1):
+            p = np.uint64(y * width + x)
+            if flat[p] != 0:
+                continue
+            edge = np.uint8(LEVELS - 1)
+            west, right_of = flat[p - one] > 0, flat[p + one] > 0
+            above, below = flat[p - row] > 0, flat[p + row] > 0
+            if west:
+                edge = min(edge, east[p - one])
+            if right_of:
+                edge = min(edge, east[p])
+            if above:
+                edge = min(edge, south[p - row])
+            if below:
+                edge = min(edge, south[p])
+            if west or right_of or above or below:
+                _queue(flat, first, last, p, np.uint64(edge))
+    lowest = np.uint64(0)
+    while True:
+        while lowest < np.uint64(LEVELS) and first[lowest] < 0:
+            lowest += one
+        if lowest == np.uint64(LEVELS):
+            break
+        p = np.uint64(first[lowest])
+        first[lowest] = WAITS - 1 - flat[p]
+        a, b, c, d = flat[p - one], flat[p + one], flat[p - row], flat[p + row]
+        cell = max(max(a, b), max(c, d))
+        if (0 < a != cell) or (0 < b != cell) or (0 < c != cell) or (0 < d != cell):
+            flat[p] = LINE
+            continue
+        flat[p] = cell
+        lowest = _come_to(flat, first, last, p - one, east[p - one], lowest)
+        lowest = _come_to(flat, first, last, p + one, east[p], lowest)
+        lowest = _come_to(flat, first, last, p - row, south[p - row], lowest)
+        lowest = _come_to(flat, first, last, p + row, south[p], lowest)
+
+
+@compiled
+def _come_to(
+    flat: Labels, first: Labels, last: Labels, p: np.uint64, edge: int, lowest: np.uint64
+) -> np.uint64:
+    """Queue a pixel that nobody has come to; the lowest level at which some wait."""
+    if flat[p] != 0:
+        return lowest
+    level = np.uint64(edge)
+    _queue(flat, first, last, p, level)
+    return min(lowest, level)
+
+
+@compiled
+def _queue(flat: Labels, first: Labels, last: Labels, p: np.uint64, level: np.uint64) -> None:
+    """Put a pixel behind those that wait at a level; each that waits holds the number of the next."""
+    if first[level] < 0:
+        first[level] = p
+    else:
+        flat[np.uint64(last[level])] = WAITS - 1 - np.int32(p)
+    last[level], flat[p] = p, WAITS
+
+
+@compiled
+def borders(labels: Labels, count: int) -> tuple[Labels, Labels, Labels]:
+    """Pairs of cells that touch, and along how many pixels.
+
+    Args:
+        labels: (h, w) cells, 0 to count - 1.
+        count: How many cells.
+
+    Returns:
+        (N,) the lower and (N,) the higher cell of each pair, in their order, and (N,) pixels.
+    """
+    low, high = _steps(labels)
+    room = np.zeros(count + 1, np.int64)
+    for n in range(len(low)):
+        room[low[n] + 1] += 1
+    begin = np.cumsum(room)
+    filled, other = begin.copy(), np.empty(len(low), np.int32)
+    for n in range(len(low)):
+        other[filled[low[n]]] = high[n]
+        filled[low[n]] += 1
+    one, two = np.empty(len(low), np.int32), np.empty(len(low), np.int32)
+    along, pixels, pairs = np.zeros(count, np.int32), np.empty(len(low), np.int32), 0
+    for k in range(count):
+        first = pairs
+        for n in range(begin[k], begin[k + 1]):
+            b = other[n]
+            if not along[b]:
+                # Neighbours are few: each goes to its place among those before it.
+                place = pairs
+                while place > first and two[place - 1] > b:
+                    two[place] = two[place - 1]
+                    place -= 1
+                two[place], one[pairs] = b, k
+                pairs += 1
+            along[b] += 1
+        for n in range(first, pairs):
+            pixels[n], along[two[n]] = along[two[n]], 0
+    return one[:pairs], two[:pairs], pixels[:pairs]
+
+
+@compiled
+def _steps(labels: Labels) -> tuple[Labels, Labels]:
+    """The lower and the higher cell wherever one pixel and the next, or that below it, differ."""
+    height, width = labels.shape
+    low, high = np.empty(2 * labels.size, np.int32), np.empty(2 * labels.size, np.int32)
+    count = 0
+    # Written always and kept when they differ: which do cannot be foreseen.
+    for y in range(height):
+        for x in range(width - 1):
+            a, b = labels[y, x], labels[y, x + 1]
+            low[count], high[count] = min(a, b), max(a, b)
+            count += a != b
+    for y in range(height - 1):
+        for x in range(width):
+            a, b = labels[y, x], labels[y + 1, x]
+            low[count], high[count] = min(a, b), max(a, b)
+            count += a != b
+    return low[:count], high[:count]
+
+
+@compiled
+def linked(one: Labels, other: Labels, values: Floats, count: int) -> tuple[Labels, Labels, Floats]:
+    """Pairs of cells as a symmetric matrix in rows (CSR).
+
+    Args:
+        one: (N,) the lower cell of each pair, ascending.
+        other: (N,) the higher, ascending for each of those.
+        values: (N,) float32.
+        count: How many cells.
+
+    Returns:
+        (count + 1,) where the rows begin, (2 N,) columns and values, ascending in each row.
+    """
+    ends = np.zeros(count + 1, np.int32)
+    for n in range(len(one)):
+        ends[one[n] + 1] += 1
+        ends[other[n] + 1] += 1
+    for k in range(count):
+        ends[k + 1] += ends[k]
+    filled = ends[:-1].copy()
+    columns, data = np.empty(2 * len(one), np.int32), np.empty(2 * len(one), np.float32)
+    # All that is lower than a cell comes before what is higher: so first as the higher of a pair.
+    for n in range(len(one)):
+        at = filled[other[n]]
+        columns[at], data[at] = one[n], values[n]
+        filled[other[n]] += 1
+    for n in range(len(one)):
+        at = filled[one[n]]
+        columns[at], data[at] = other[n], values[n]
+        filled[one[n]] += 1
+    return ends, columns, data

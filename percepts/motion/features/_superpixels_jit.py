@@ -1,0 +1,309 @@
+"""Passes over the pixels of superpixels and over their neighbours, compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+from visup.percepts.motion.features.image import Floats
+
+Labels = NDArray[np.int32]
+
+
+@compiled
+def gathered(
+    labels: Labels, tone: NDArray[np.uint8], busy: Floats, count: int
+) -> tuple[Floats, Floats, Labels]:
+    """What the pixels of each cell are like, all in one pass.
+
+    Args:
+        labels: (h, w) cells, 0 to count - 1.
+        tone: (h, w, 3).
+        busy: (h, w) float32.
+        count: How many cells.
+
+    Returns:
+        (count,) float32 pixels; (count, 6) float32 sums of x, y, the three tones and `busy`;
+        (count, 4) int32 (left, top, right, bottom), the latter two beyond the cell.
+    """
+    height, width = labels.shape
+    number, sums = np.zeros(count, np.float32), np.zeros((count, 6), np.float32)
+    corners = np.zeros((count, 4), np.int32)
+    corners[:, 0], corners[:, 1] = width, height
+    for y in range(height):
+        for x in range(width):
+            k = labels[y, x]
+            number[k] += np.float32(1)
+            sums[k, 0] += np.float32(x)
+            sums[k, 1] += np.float32(y)
+            for i in range(3):
+                sums[k, 2 + i] += np.float32(tone[y, x, i])
+            sums[k, 5] += busy[y, x]
+            box = corners[k]
+            box[0], box[1] = min(box[0], x), min(box[1], y)
+            box[2], box[3] = max(box[2], x + 1), max(box[3], y + 1)
+    return number, sums, corners
+
+
+@compiled
+def totals(labels: Labels, values: Floats, count: int) -> Floats:
+    """Sum of a (h, w) map, most of it 0, in each cell, (count,) float32."""
+    height, width = labels.shape
+    out = np.zeros(count, np.float32)
+    for y in range(height):
+        for x in range(width):
+            if values[y, x] != 0:
+                out[labels[y, x]] += values[y, x]
+    return out
+
+
+@compiled
+def spread_to(
+    ends: Labels, neighbours: Labels, members: NDArray[np.bool_], steps: int
+) -> NDArray[np.bool_]:
+    """Cells within some steps of (count, K) members.
+
+    `ends` and `neighbours` are as in CSR matrices; who is a neighbour of one has it as a neighbour. Only
+    from cells that were come to last is gone on: most sets are small.
+    """
+    count, kinds = members.shape
+    near = members.copy()
+    come_to = np.empty(count, np.int32)
+    for k in range(kinds):
+        begin, end = 0, 0
+        for i in range(count):
+            if members[i, k]:
+                come_to[end] = i
+                end += 1
+        for _ in range(steps):
+            last = end
+            for n in range(begin, last):
+                i = come_to[n]
+                for at in range(ends[i], ends[i + 1]):
+                    other = neighbours[at]
+                    if not near[other, k]:
+                        near[other, k] = True
+                        come_to[end] = other
+                        end += 1
+            begin = last
+    return near
+
+
+@compiled
+def brought(
+    old: Labels, new: Labels, flow: Floats, shares: Floats, area: Floats, every: int
+) -> Floats:
+    """Shares of cells of an older image as they come to those of a newer one, along the flow.
+
+    Args:
+        old: (h, w) cells of the older image.
+        new: (h, w) cells of the newer one.
+        flow: (h, w, 2) float32, from the newer back to the older.
+        shares: (old count, K) float32.
+        area: (count,) float32, how many pixels each cell of the newer one has.
+        every: One in so many pixels of a cell, its first one always, is asked where it comes from.
+
+    Returns:
+        (count, K) float32 means over those pixels; what came into view counts as 0.
+    """
+    height, width = new.shape
+    kinds = shares.shape[1]
+    count = len(area)
+    asked, out = np.zeros(count, np.int32), np.zeros((count, kinds), np.float32)
+    # A mean is summed up share by share, so that what is whole stays whole within rounding.
+    part = np.empty(count, np.float32)
+    for c in range(count):
+        part[c] = np.float32(1) / np.float32(max((int(area[c]) + every - 1) // every, 1))
+    for y in range(height):
+        for x in range(width):
+            c = new[y, x]
+            asked[c] += 1
+            if asked[c] > 1:
+                if asked[c] == every:
+                    asked[c] = 0
+                continue
+            if every == 1:
+                asked[c] = 0
+            u = x + int(np.rint(flow[y, x, 0]))
+            v = y + int(np.rint(flow[y, x, 1]))
+            if 0 <= u < width and 0 <= v < height:
+                source = old[v, u]
+                for k in range(kinds):
+                    out[c, k] += part[c] * shares[source, k]
+    return out
+
+
+@compiled
+def flattest(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
+    """Seeds of a watershed, numbered from 1, and how many.
+
+    Args:
+        strength: (h, w) float32, of edges.
+        cell: Spacing of the seeds.
+        flat: Strength below which there is no edge worth following.
+
+    Returns:
+        (h, w) int32, 0 elsewhere: the flattest 3 x 3 pixels in each square of `cell` pixels, or its
+        inside when that is flat all over.
+    """
+    rows, cols = strength.shape[0] // cell, strength.shape[1] // cell
+    seeds = np.zeros(strength.shape, np.int32)
+    for row in range(rows):
+        for col in range(cols):
+            top, left = row * cell, col * cell
+            number = row * cols + col + 1
+            low, high, at_y, at_x = np.float32(np.inf), np.float32(-np.inf), top + 1, left + 1
+            for y in range(top + 1, top + cell - 1):
+                for x in range(left + 1, left + cell - 1):
+                    s = strength[y, x]
+                    high = max(high, s)
+                    if s < low:
+                        low, at_y, at_x = s, y, x
+            if high < flat:
+                seeds[top + 1 : top + cell - 1, left + 1 : left + cell - 1] = number
+            seeds[at_y - 1 : at_y + 2, at_x - 1 : at_x + 2] = number
+    return seeds, rows * cols
+
+
+@compiled
+def bounds(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """(left, top, right, bottom) around some cells; (large, large, 0, 0) when there are none."""
+    left, top, right, bottom = 2**30, 2**30, 0, 0
+    for k in range(len(members)):
+        if members[k]:
+            left, top = min(left, int(corners[k, 0])), min(top, int(corners[k, 1]))
+            right, bottom = max(right, int(corners[k, 2])), max(bottom, int(corners[k, 3]))
+    return left, top, right, bottom
+
+
+@compiled
+def painted(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floats:
+    """1 at the pixels of some cells and 0 elsewhere, (h, w) float32."""
+    out = np.zeros(labels.shape, np.float32)
+    left, top, right, bottom = bounds(corners, members)
+    for y in range(top, bottom):
+        for x in range(left, right):
+            out[y, x] = np.float32(members[labels[y, x]])
+    return out
+
+
+@compiled
+def covered(
+    new: Labels,
+    old: Labels,
+    corners: Labels,
+    members: NDArray[np.bool_],
+    dx: int,
+    dy: int,
+    count: int,
+) -> NDArray[np.int64]:
+    """How many pixels of each of `count` cells some old cells cover when moved by whole pixels."""
+    out = np.zeros(count, np.int64)
+    height, width = new.shape
+    left, top, right, bottom = bounds(corners, members)
+    for y in range(max(top, -dy), min(bottom, height - dy)):
+        for x in range(max(left, -dx), min(right, width - dx)):
+            out[new[y + dy, x + dx]] += members[old[y, x]]
+    return out
+
+
+@compiled
+def means_of_half(
+    labels: Labels, values: Floats, box: tuple[int, int, int, int], count: int
+) -> Floats:
+    """Mean, in each cell, of a map of a part of the image at half its size.
+
+    Args:
+        labels: (h, w) cells.
+        values: (height, width) float32, of the box.
+        box: (x, y, width, height), pixels at half the size.
+        count: How many cells.
+
+    Returns:
+        (count,) float32; 0 where no pixel of a cell is seen.
+    """
+    total, number = np.zeros(count), np.zeros(count, np.int64)
+    for j in range(box[3]):
+        for i in range(box[2]):
+            k = labels[2 * (box[1] + j), 2 * (box[0] + i)]
+            total[k] += values[j, i]
+            number[k] += 1
+    return (total / np.maximum(number, 1)).astype(np.float32)
+
+
+@compiled
+def beside_points(
+    labels: Labels, xy: Floats, normal: Floats, likelihood: Floats, far: float, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What points say of the cells on both of their sides.
+
+    Args:
+        labels: (h, w) cells.
+        xy: (N, 2) float32 positions.
+        normal: (N, 2) float32 unit vectors across the edge at each.
+        likelihood: (N, K) float32 log likelihood of labels.
+        far: How far from a point its sides are, pixels.
+        count: How many cells.
+
+    Returns:
+        (count, K) float64 sums, and (count,) float64, over how many.
+    """
+    height, width = labels.shape
+    kinds = likelihood.shape[1]
+    totals, number = np.zeros((count, kinds)), np.zeros(count)
+    for side in (-np.float32(far), np.float32(far)):
+        for n in range(len(xy)):
+            x = int(np.rint(xy[n, 0] + side * normal[n, 0]))
+            y = int(np.rint(xy[n, 1] + side * normal[n, 1]))
+            k = labels[min(max(y, 0), height - 1), min(max(x, 0), width - 1)]
+            number[k] += 1
+            for i in range(kinds):
+                totals[k, i] += likelihood[n, i]
+    return totals, number
+
+
+@compiled
+def weighed(
+    totals: NDArray[np.float64],
+    number: NDArray[np.float64],
+    more: Floats,
+    prior: Floats,
+    least: float,
+    clip: float,
+) -> tuple[Floats, Floats]:
+    """Shares of the labels of each cell after what its points and its pixels say.
+
+    Args:
+        totals: (count, K) float64 sums of log likelihoods over points.
+        number: (count,) float64, of how many.
+        more: (count, K) float32 dense log likelihood; all 0 where nothing is known.
+        prior: (count, K) float32 shares before.
+        least: What is added to those.
+        clip: Log likelihood ratio that counts as sure.
+
+    Returns:
+        (count, K) float32 shares; (count,) float32 weight of the evidence, 0 to 1.
+    """
+    count, kinds = prior.shape
+    share, sure = np.empty((count, kinds), np.float32), np.zeros(count, np.float32)
+    each = np.empty(kinds)
+    for c in range(count):
+        scale, told, highest = max(np.sqrt(number[c]), 1.0), number[c] > 0, -np.inf
+        for k in range(kinds):
+            each[k] = totals[c, k] / scale + more[c, k]
+            told |= more[c, k] != 0
+            highest = max(highest, each[k])
+        lowest, whole = 0.0, 0.0
+        for k in range(kinds):
+            off = each[k] - highest
+            lowest = min(lowest, off)
+            each[k] = (prior[c, k] + np.float32(least)) * np.exp(max(off, -2 * clip))
+            whole += each[k]
+        for k in range(kinds):
+            share[c, k] = each[k] / whole
+        if told:
+            sure[c] = min(-lowest, clip) / clip
+    return share, sure

@@ -1,0 +1,141 @@
+"""Looking back: since when something that is seen to move has been in view.
+
+Motion is seen only when something moves, so that a body which rested is told late. Whether it came
+into view or only began to move is told by the past: its points are followed back through older images
+until most of them are not found. What is kept of the past thins out with age,
+so that a minute costs little more than a second; a body that had been at rest is found again however far
+apart the images are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame, Region
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.image import Floats, WorkImage, prepare
+
+SIZE = 400  # longer side of what is kept, pixels
+EVERY_S = 0.16  # between images of the last second
+THINNING = 8.0  # images kept while their age grows e times
+HORIZON_S = 120.0
+POINTS = 48
+LEAST_POINTS = 4
+REMEMBERED = 256  # ids of regions; the oldest are forgotten first
+FOUND = 0.4  # share of a region's points that must be found for it to be in view
+BACK_PX = 1.0  # how far from its start a point may end up when it is followed there and back
+ALIKE = 0.5  # mean difference of a point's neighbourhood, as a share of its contrast
+WINDOW = 9
+
+Grey = NDArray[np.uint8]
+
+
+class LookBack:
+    """Remembers older images and finds in them what is new now; one per video."""
+
+    def __init__(self) -> None:
+        self._past: list[tuple[float, Grey]] = []
+        self._since: dict[int, float] = {}
+        self._shape: tuple[int, int] = (0, 0)
+
+    def step(self, frame: Frame, regions: Sequence[Region]) -> tuple[Region, ...]:
+        """Say of each region since when it has been in view.
+
+        Args:
+            frame: The next frame.
+            regions: Those found in it; one is looked back for when its id is first seen.
+
+        Returns:
+            The same with `visible_since`.
+        """
+        self._since = dict(list(self._since.items())[-REMEMBERED:])
+        due = not self._past or frame.time - self._past[-1][0] >= EVERY_S - 1e-6
+        fresh = [r for r in regions if r.id not in self._since]
+        if due or fresh:
+            image = prepare(frame, SIZE)
+            self._see(image)
+            for r in fresh:
+                self._since[r.id] = self._found_since(image, r, frame.size)
+            if due:
+                self._keep(image)
+        return tuple(replace(r, visible_since=self._since.get(r.id)) for r in regions)
+
+    def _see(self, image: WorkImage) -> None:
+        if image.shape != self._shape:
+            self._past, self._since, self._shape = [], {}, image.shape
+
+    def _keep(self, image: WorkImage) -> None:
+        self._past.append((image.time, image.grey))
+        times = [t for t, _ in self._past]
+        # The first that is closer to its neighbours than its age allows goes; one for each that comes.
+        for k in range(1, len(times) - 1):
+            if times[k + 1] - times[k - 1] < (image.time - times[k]) / THINNING:
+                del self._past[k]
+                break
+        if image.time - self._past[0][0] > HORIZON_S:
+            del self._past[0]
+
+    def _found_since(self, image: WorkImage, region: Region, size: tuple[int, int]) -> float:
+        """The time of the oldest image to which a region can be followed."""
+        points = _points(image.grey, region, size)
+        since, newer = image.time, image.grey
+        needed = max(LEAST_POINTS, FOUND * len(points))
+        for time, older in reversed(self._past):
+            points, found = _followed(newer, older, points)
+            if found < needed:
+                break
+            since, newer = time, older
+        return since
+
+
+def _points(grey: Grey, region: Region, size: tuple[int, int]) -> Floats:
+    """Corners of a region, (N, 1, 2) float32 in the small image."""
+    mask = region.full_mask(size).astype(np.uint8)
+    mask = np.asarray(cv2.resize(mask, grey.shape[::-1], interpolation=cv2.INTER_NEAREST))
+    found = cv2.goodFeaturesToTrack(grey, POINTS, 0.02, 3, mask=mask, blockSize=5)
+    return np.zeros((0, 1, 2), np.float32) if found is None else np.asarray(found, np.float32)
+
+
+def _followed(newer: Grey, older: Grey, points: Floats) -> tuple[Floats, int]:
+    """Where the points are in an older image, and how many of them are found there.
+
+    Those that are not go along with the others, so that a plain body does not lose them one by one.
+    """
+    if not len(points):
+        return points, 0
+    there, found, misfit = _lucas_kanade(newer, older, points)
+    back, again, _ = _lucas_kanade(older, newer, there)
+    off = np.linalg.norm((back - points)[:, 0], axis=1)
+    inside = ((there[:, 0] >= 0) & (there[:, 0] < np.array(older.shape[::-1]))).all(axis=1)
+    alike = misfit < ALIKE * _contrast(newer, points)
+    kept = found & again & inside & alike & (off < BACK_PX)
+    if not kept.any():
+        return points, 0
+    way = np.median((there - points)[kept], axis=0)
+    moved = np.where(kept[:, None, None], there, points + way).astype(np.float32)
+    return moved, int(kept.sum())
+
+
+def _lucas_kanade(
+    a: Grey, b: Grey, points: Floats
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.float32]]:
+    ends, found, misfit = cv2.calcOpticalFlowPyrLK(
+        a, b, points, np.zeros_like(points), winSize=(WINDOW, WINDOW), maxLevel=3
+    )
+    there = np.asarray(ends, dtype=np.float32)
+    sound = (np.asarray(found).ravel() > 0) & np.isfinite(there).all(axis=(1, 2))
+    there = np.where(sound[:, None, None], there, np.float32(-1e3)).astype(np.float32)
+    return there, sound, np.asarray(misfit, dtype=np.float32).ravel()
+
+
+def _contrast(grey: Grey, points: Floats) -> NDArray[np.float32]:
+    """Mean difference of grey values from their mean in the neighbourhood of each point, (N,)."""
+    out = []
+    for x, y in points[:, 0]:
+        patch = cv2.getRectSubPix(grey, (WINDOW, WINDOW), (float(x), float(y))).astype(np.float32)
+        out.append(float(np.abs(patch - patch.mean()).mean()))
+    return np.array(out, dtype=np.float32)

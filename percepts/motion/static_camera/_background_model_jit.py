@@ -1,0 +1,202 @@
+"""Passes over all pixels of the picture of the rest, compiled; `picture` says what they mean."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+from visup.percepts.motion.features.image import Floats
+
+Mask = NDArray[np.bool_]
+
+
+class Planes(NamedTuple):
+    """What is known of each pixel: the fields of `Picture`, in its order."""
+
+    mean: Floats
+    variance: Floats
+    seen_s: Floats
+    other: Floats
+    other_s: Floats
+
+
+class Shade(NamedTuple):
+    """How a shadow differs from what it lies on.
+
+    Attributes:
+        darkest: Least brightness, as a share of that at rest.
+        brightest: Most brightness, of reflected light.
+        hue: How far colour may differ, as a share of brightness.
+        noise: Squared grey levels by which it may differ as well.
+        least: Squared brightness at rest below which nothing can be told.
+    """
+
+    darkest: float
+    brightest: float
+    hue: float
+    noise: float
+    least: float
+
+
+class Pace(NamedTuple):
+    """How fast is learnt.
+
+    Attributes:
+        seconds: Since the last image.
+        settle: Least weight of an image.
+        restless: Weight of an image for the variance.
+        fits: Squared distance below which a pixel shows the rest.
+        rare: Squared distance beyond which it tells no more of how restless it is.
+        least: Least variance.
+        most: Largest variance.
+        alike: Squared distance, over three channels, of a tone seen again.
+    """
+
+    seconds: float
+    settle: float
+    restless: float
+    fits: float
+    rare: float
+    least: float
+    most: float
+    alike: float
+
+
+@compiled
+def offsets(image: Floats, mean: Floats, variance: Floats, most: float) -> Floats:
+    """Squared distance of each pixel to the rest in standard deviations, at most `most`, (h, w)."""
+    height, width = variance.shape
+    out = np.empty((height, width), np.float32)
+    for y in range(height):
+        for x in range(width):
+            total = np.float32(0)
+            for i in range(3):
+                gap = image[y, x, i] - mean[y, x, i]
+                total += gap * gap
+            out[y, x] = min(total / (np.float32(3) * variance[y, x]), np.float32(most))
+    return out
+
+
+@compiled
+def _is_dimmed(image: Floats, mean: Floats, y: int, x: int, shade: Shade) -> bool:
+    """Whether a pixel differs from the rest in brightness, and not in hue."""
+    power, common, own = 1.0, 0.0, 0.0
+    for i in range(3):
+        here, now = float(mean[y, x, i]), float(image[y, x, i])
+        power, common, own = power + here * here, common + now * here, own + now * now
+    bright = common / power
+    # What is left of the tone after the rest, as bright as it is seen, is taken from it.
+    hue = own - 2 * bright * common + bright * bright * (power - 1)
+    same = hue < shade.hue * shade.hue * power + shade.noise
+    return same and shade.darkest < bright < shade.brightest and power > shade.least
+
+
+@compiled
+def dimmed(image: Floats, mean: Floats, shade: Shade) -> Mask:
+    """Where an image differs from the rest in brightness, and not in hue, (h, w)."""
+    height, width = mean.shape[:2]
+    out = np.empty((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            out[y, x] = _is_dimmed(image, mean, y, x, shade)
+    return out
+
+
+@compiled
+def standing_out(
+    off: Floats, image: Floats, mean: Floats, seen_s: Floats, shade: Shade, least: float
+) -> Mask:
+    """Which pixels are further off than `least`, known, and no shadow or reflection, (h, w)."""
+    height, width = off.shape
+    out = np.zeros((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            if off[y, x] > least and seen_s[y, x] > 0:
+                out[y, x] = not _is_dimmed(image, mean, y, x, shade)
+    return out
+
+
+@compiled
+def surely(labels: NDArray[np.int32], off: Floats, out_of: Mask, count: int, least: float) -> Mask:
+    """Which pixels are in a component that somewhere goes beyond `least`.
+
+    Args:
+        labels: (h, w) number of the component of each pixel, 0 for none.
+        off: (h, w) float32, how far each is off.
+        out_of: (h, w), which of them count.
+        count: How many components, with none.
+        least: What one of its pixels must go beyond.
+    """
+    height, width = labels.shape
+    sure = np.zeros(count, np.bool_)
+    for y in range(height):
+        for x in range(width):
+            if off[y, x] > least and out_of[y, x]:
+                sure[labels[y, x]] = True
+    sure[0] = False
+    out = np.empty((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            out[y, x] = sure[labels[y, x]]
+    return out
+
+
+@compiled
+def renewed(known: Planes, image: Floats, moving: Mask, gone: Mask, pace: Pace) -> Planes:
+    """What is known of each pixel after one more (h, w, 3) image.
+
+    Args:
+        known: Before that.
+        image: The image.
+        moving: (h, w) where objects are told: there the rest is not easily given up.
+        gone: (h, w) where something that was taken for the rest has left.
+        pace: How fast is learnt.
+    """
+    height, width = moving.shape
+    mean, other = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
+    variance, seen_s = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    other_s = np.empty((height, width), np.float32)
+    for y in range(height):
+        for x in range(width):
+            spread, seen, instead = known.variance[y, x], known.seen_s[y, x], known.other_s[y, x]
+            off = _apart(image, known.mean, y, x) / (np.float32(3) * spread)
+            moves, is_known = moving[y, x], seen > 0
+            fits = off < pace.fits and not moves and is_known
+            away = is_known and not fits
+            weight = np.float32(max(pace.seconds / (seen + pace.seconds), pace.settle))
+            weight = weight if fits else np.float32(0)
+            step = np.float32(0)
+            if away:
+                alike = _apart(image, known.other, y, x) < pace.alike
+                step = np.float32(0.3 if alike else 1.0)
+                instead = instead + pace.seconds if alike else pace.seconds
+            for i in range(3):
+                now, old, before = image[y, x, i], known.mean[y, x, i], known.other[y, x, i]
+                mean[y, x, i] = old + weight * (now - old)
+                other[y, x, i] = before + step * (now - before)
+            # Leaves and water go far and come back; one object that passes weighs little.
+            if not moves:
+                spread += pace.restless * (min(off, pace.rare) - 1) * spread
+            enough = (3 * seen if moves else min(seen, 20.0)) + 0.2
+            if fits:
+                seen = min(seen + pace.seconds, 60.0)
+            if gone[y, x]:
+                other[y, x] = image[y, x]
+            variance[y, x] = max(pace.least, min(pace.most, spread))
+            seen_s[y, x], other_s[y, x] = seen, instead
+            if instead > enough or (gone[y, x] and is_known):
+                mean[y, x] = other[y, x]
+                variance[y, x], seen_s[y, x], other_s[y, x] = 2 * pace.least, instead, 0.0
+    return Planes(mean, variance, seen_s, other, other_s)
+
+
+@compiled
+def _apart(image: Floats, tones: Floats, y: int, x: int) -> float:
+    """Squared distance of a pixel of (h, w, 3) images."""
+    a = image[y, x, 0] - tones[y, x, 0]
+    b = image[y, x, 1] - tones[y, x, 1]
+    c = image[y, x, 2] - tones[y, x, 2]
+    return float(a * a + b * b + c * c)

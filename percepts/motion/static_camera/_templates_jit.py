@@ -1,0 +1,60 @@
+"""The search for a template, compiled."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+from visup.percepts.motion.features.image import Floats
+
+MOST = 60.0  # grey levels by which a pixel may speak against a shift
+
+
+@compiled
+def best_shift(
+    image: Floats,
+    free: Floats,
+    shape: NDArray[np.bool_],
+    tone: Floats,
+    corner: tuple[int, int],
+    reach: int,
+    step: int,
+) -> tuple[float, int, int]:
+    """The shift at which a template costs least.
+
+    Args:
+        image: (h, w, 3) float32.
+        free: (h, w) float32, how far each pixel is free for the template, 0 to 1.
+        shape: (m, n) bool template.
+        tone: (m, n, 3) float32, what was seen there.
+        corner: (x, y) of the template before it is shifted.
+        reach: Most pixels that it is shifted along either axis.
+        step: One in so many of its rows and columns is compared.
+
+    Returns:
+        The cost, grey levels, and the shift (x, y); the first of those that cost the same.
+    """
+    height, width = free.shape
+    best, best_x, best_y = np.inf, 0, 0
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
+            left, top = corner[0] + dx, corner[1] + dy
+            total, number = 0.0, 0
+            for j in range(max(-top, 0), min(shape.shape[0], height - top), step):
+                for i in range(max(-left, 0), min(shape.shape[1], width - left), step):
+                    if not shape[j, i]:
+                        continue
+                    y, x = top + j, left + i
+                    gap = abs(image[y, x, 0] - tone[j, i, 0])
+                    gap += abs(image[y, x, 1] - tone[j, i, 1])
+                    gap += abs(image[y, x, 2] - tone[j, i, 2])
+                    total += MOST - (MOST - min(gap / 3, MOST)) * free[y, x]
+                    number += 1
+            if number:
+                cost = total / number + 0.5 * hypot(dx, dy)
+                if cost < best:
+                    best, best_x, best_y = cost, dx, dy
+    return best, best_x, best_y

@@ -1,0 +1,149 @@
+"""A picture of what rests, pixel by pixel, for a camera that rests as well.
+
+Each pixel keeps the tone that it shows at rest with its variance, and a candidate: the tone that it
+shows instead of late. A candidate that has been seen longer than what is taken for the rest takes
+its place, so that what stood there as the video began, and leaves, is not taken for an object for
+ever. (After Stauffer and Grimson, Adaptive background mixture models, 1999, with two modes; shadows
+after Horprasert, Harwood, Davis, A statistical approach for robust background subtraction, 1999.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.static_camera._background_model_jit import (
+    Pace,
+    Planes,
+    Shade,
+    dimmed,
+    offsets,
+    renewed,
+    standing_out,
+    surely,
+)
+
+Mask = NDArray[np.bool_]
+NOISE = 4.0  # least standard deviation that is assumed, grey levels
+FAR = 3.0  # standard deviations at which a pixel surely shows something else
+NEAR = 2.2  # the same for one beside a sure one
+SETTLE_S = 8.0  # time constant of what is learnt, seconds
+RESTLESS_S = 8.0  # the same of the variance
+SHADE = 0.6  # least brightness in a shadow, as a share of that at rest
+HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
+RARE = 10.0  # squared distance beyond which a pixel tells no more of how restless it is
+EVEN = 0.03  # change of exposure that is none
+LIT = 1.12  # brightness in reflected light
+CAST = Shade(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """What rests.
+
+    Attributes:
+        mean: (h, w, 3) float32, tone at rest, grey levels.
+        variance: (h, w) float32, of one channel.
+        seen_s: (h, w) float32, for how long that tone was seen, seconds; 0 where the rest is unknown.
+        other: (h, w, 3) float32, the tone that is seen instead.
+        other_s: (h, w) float32, for how long.
+    """
+
+    mean: Floats
+    variance: Floats
+    seen_s: Floats
+    other: Floats
+    other_s: Floats
+
+
+def first_picture(image: Floats) -> Picture:
+    """What rests, after one (h, w, 3) image."""
+    bare = np.zeros(image.shape[:2], np.float32)
+    return Picture(image, bare + NOISE**2, bare + 0.01, image, bare)
+
+
+def forgotten(picture: Picture, where: Mask) -> Picture:
+    """The picture without what it shows in some places: an object may have stood there."""
+    return replace(picture, seen_s=np.where(where, 0, picture.seen_s).astype(np.float32))
+
+
+def filled(picture: Picture, image: Floats, bare: Mask) -> Picture:
+    """The picture with what is seen of an image where it was unknown and nothing hides the rest."""
+    new = bare & (picture.seen_s <= 0)
+    if not new.any():
+        return picture
+    fresh = first_picture(image)
+    planes = [getattr(picture, f.name).copy() for f in fields(picture)]
+    for plane, f in zip(planes, fields(picture), strict=True):
+        plane[new] = getattr(fresh, f.name)[new]
+    return Picture(*planes)
+
+
+def shaded(picture: Picture, image: Floats) -> Mask:
+    """Where an image differs as a shadow or a reflection does: in brightness, not in hue."""
+    return dimmed(image, picture.mean, CAST)
+
+
+def changed(picture: Picture, image: Floats) -> Mask:
+    """Which pixels show something else than what rests, (h, w) bool; where that is unknown, none."""
+    far = offsets(image, picture.mean, picture.variance, 100.0)
+    off = np.asarray(cv2.GaussianBlur(far, (3, 3), 0.8), dtype=np.float32)
+    out = standing_out(off, image, picture.mean, picture.seen_s, CAST, NEAR**2)
+    near = cv2.medianBlur(out.view(np.uint8), 5)
+    count, labels = cv2.connectedComponents(near, connectivity=8)
+    return surely(np.asarray(labels, np.int32), off, out, count, (FAR * 1.5) ** 2)
+
+
+def learnt(
+    picture: Picture, image: Floats, moving: Mask, seconds: float, gone: Mask | None = None
+) -> Picture:
+    """The picture after one more image.
+
+    Args:
+        picture: As known.
+        image: (h, w, 3) float32.
+        moving: (h, w) bool, where objects are told: there the rest is not easily given up.
+        seconds: Since the last image.
+        gone: (h, w) bool, where something that was taken for the rest has left: it is forgotten.
+
+    Returns:
+        The new picture.
+    """
+    pace = Pace(
+        seconds,
+        1 - float(np.exp(-seconds / SETTLE_S)),
+        1 - float(np.exp(-seconds / RESTLESS_S)),
+        FAR**2,
+        RARE,
+        NOISE**2,
+        (8 * NOISE) ** 2,
+        3 * (FAR * NOISE) ** 2,
+    )
+    known = Planes(*(getattr(picture, f.name) for f in fields(picture)))
+    nowhere = np.zeros(moving.shape, dtype=bool)
+    return Picture(*renewed(known, image, moving, nowhere if gone is None else gone, pace))
+
+
+def edges(image: Floats, box: tuple[int, int, int, int]) -> Floats:
+    """Strength of the edges of a (h, w, 3) image in a box (x0, y0, x1, y1), (y, x) float32."""
+    x, y = max(box[0] - 1, 0), max(box[1] - 1, 0)
+    grey = image[y : box[3] + 1, x : box[2] + 1].mean(axis=2)
+    strength = np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1))
+    inner = strength[box[1] - y : box[3] - y, box[0] - x : box[2] - x]
+    return np.asarray(inner, np.float32)
+
+
+def exposed(picture: Picture, image: Floats) -> Picture:
+    """The picture as it would look at the exposure of an image, after the median change of tone."""
+    step = 4
+    rest, now = picture.mean[::step, ::step], image[::step, ::step]
+    ratio = np.median((now + 1.0) / (rest + 1.0), axis=(0, 1))
+    if np.abs(ratio - 1).max() < EVEN:
+        return picture
+    gain = np.clip(ratio, 0.3, 3.0).astype(np.float32)
+    return replace(picture, mean=picture.mean * gain, other=picture.other * gain)

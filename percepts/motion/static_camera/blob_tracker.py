@@ -1,0 +1,247 @@
+"""Objects before a background that rests, each followed by its silhouette.
+
+Where the camera rests, what differs from the picture of the rest falls into blobs. One blob may
+show several objects and one object several blobs: each object keeps a template of its silhouette
+and tones from when it stood alone, which says what part of a common blob is its own, and where it
+is while others hide it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.static_camera.blob import (
+    Mask,
+    Silhouette,
+    Silhouettes,
+    View,
+    at_border,
+    cropped,
+    cut,
+    histogram_of,
+    window_of,
+)
+from visup.percepts.motion.static_camera.templates import shared, sought
+
+CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
+VISIBLE = 0.2  # share of its template below which an object is hidden
+FRAGMENT = 0.2  # gap between fragments of one object, as a share of its length
+FOLLOW = 0.35  # weight of a newly measured velocity
+APART = 2  # frames apart from others after which an object is one of its own
+PASSED = 0.6  # lengths that an object goes in pieces before they are taken for several objects
+PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an object
+GROWN = 1.3  # how much more than its template is seen of an object that has come into view
+
+
+def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]:
+    """Bring objects to the next frame, and add those that are new.
+
+    Args:
+        known: Those of the frame before.
+        view: The frame.
+        born: How many were born before.
+
+    Returns:
+        All objects, hidden ones too; how many were born.
+    """
+    ahead = [_moved(s, view.seconds) for s in known]
+    claims = _claims(ahead, view)
+    out: list[Silhouette] = []
+    taken = np.zeros(view.count + 1, dtype=bool)
+    rivals = [_rivals(b, claims, ahead) for b in range(view.count + 1)]
+    claims = [[b for b in c if i in rivals[b]] for i, c in enumerate(claims)]
+    parts: list[list[Mask]] = [[] for _ in ahead]
+    for b in range(1, view.count + 1):
+        for i, mask in shared(b, [(i, ahead[i]) for i in rivals[b]], view):
+            parts[i].append(mask)
+            taken[b] = True
+    left = []
+    for i, s in enumerate(ahead):
+        alone = all(len(rivals[b]) == 1 for b in claims[i])
+        whole, others = _whole(s, parts[i], alone)
+        left += others
+        pieces = (
+            alone
+            and sum(_is_much(p, max(parts[i], key=np.count_nonzero)) for p in parts[i]) > 1
+            and not others
+        )
+        out.append(_seen(s, known[i], whole, alone, view, pieces=pieces))
+    fresh = [view.labels == b for b in range(1, view.count + 1) if not taken[b]] + left
+    for mask in fresh:
+        born += 1
+        out.append(_born(mask, view, born))
+    return tuple(out), born
+
+
+def _moved(s: Silhouette, seconds: float) -> Silhouette:
+    x, y = s.corner
+    return replace(s, corner=(x + s.velocity[0] * seconds, y + s.velocity[1] * seconds))
+
+
+def _claims(ahead: Sequence[Silhouette], view: View) -> list[list[int]]:
+    """The blobs that each object claims by where it is expected; else the nearest free one."""
+    areas = np.bincount(view.labels.ravel(), minlength=view.count + 1)
+    claims: list[list[int]] = []
+    for s in ahead:
+        at, own = window_of(s, view.labels.shape)
+        common = np.bincount(cut(view.labels, at)[cut(s.shape, own)], minlength=view.count + 1)
+        least = CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
+        claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
+    _reach_out(ahead, view, claims, areas)
+    return claims
+
+
+def _rivals(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[Silhouette]) -> list[int]:
+    """Those who share a blob: what was never seen apart is no object of its own."""
+    all_ = [i for i, c in enumerate(claims) if blob in c]
+    known = [i for i in all_ if ahead[i].alone >= APART]
+    return known or all_[:1]
+
+
+def _reach_out(
+    ahead: Sequence[Silhouette], view: View, claims: list[list[int]], areas: NDArray[np.int64]
+) -> None:
+    """Let objects that claim nothing have the free blobs nearby, all in all at the least cost."""
+    free = sorted(set(range(1, view.count + 1)) - {b for c in claims for b in c})
+    lost = [i for i, c in enumerate(claims) if not c]
+    if not free or not lost:
+        return
+    cost = np.full((len(lost), len(free)), 1e3)
+    looks = [_look(view.labels == b, view) for b in free]
+    for row, i in enumerate(lost):
+        s = ahead[i]
+        size = float(np.hypot(*s.shape.shape))
+        waited = view.time - s.seen
+        allowed = (
+            0.6 * size + 0.5 * float(np.hypot(*s.velocity)) * waited + 0.2 * size * min(waited, 3)
+        )
+        for col, (b, (centre, histogram)) in enumerate(zip(free, looks, strict=True)):
+            far = np.hypot(centre[0] - s.centre[0], centre[1] - s.centre[1]) / allowed
+            unlike = 1 - float(np.sqrt(histogram * s.histogram).sum())
+            ratio = areas[b] / max(np.count_nonzero(s.shape), 1)
+            if far < 1 and unlike < 0.45 and 0.3 < ratio < 3:
+                cost[row, col] = far + 2 * unlike
+    for row, col in zip(*linear_sum_assignment(cost), strict=True):
+        if cost[row, col] < 1e3:
+            claims[lost[row]].append(free[col])
+
+
+def _look(mask: Mask, view: View) -> tuple[tuple[float, float], Floats]:
+    ys, xs = np.nonzero(mask)
+    centre = (
+        (float(xs.min()) + float(xs.max()) + 1) / 2,
+        (float(ys.min()) + float(ys.max()) + 1) / 2,
+    )
+    return centre, histogram_of(view.image[ys, xs])
+
+
+def _whole(s: Silhouette, parts: Sequence[Mask], alone: bool) -> tuple[Mask | None, list[Mask]]:
+    """The parts of an object as one mask, and those too far from the largest to be its own."""
+    if not parts:
+        return None, []
+    order = sorted(parts, key=lambda m: -int(np.count_nonzero(m)))
+    whole, others = order[0], []
+    reach = max(3, round(FRAGMENT * max(s.shape.shape)))
+    # What rests before an object parts it for as long as it takes to pass, and no longer.
+    two = s.parted > PASSED * max(s.shape.shape)
+    for part in order[1:]:
+        if two and _is_much(part, whole):
+            others.append(part)
+            continue
+        near = cv2.dilate(whole.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+        if not alone or (near.astype(bool) & part).any():
+            whole = whole | part
+        else:
+            others.append(part)
+    return whole, others
+
+
+def _is_much(part: Mask, whole: Mask) -> bool:
+    return int(np.count_nonzero(part)) > PIECE * int(np.count_nonzero(whole))
+
+
+def _born(mask: Mask, view: View, key: int) -> Silhouette:
+    box, shape = cropped(mask)
+    tone = cut(view.image, box)
+    histogram = histogram_of(tone[shape])
+    corner = (float(box[0]), float(box[1]))
+    now = (box, shape)
+    t = view.time
+    start = np.array(box, dtype=np.float32)
+    return Silhouette(
+        key,
+        0,
+        t,
+        t,
+        1,
+        corner,
+        (0.0, 0.0),
+        shape,
+        tone,
+        histogram,
+        start,
+        0 * start,
+        1,
+        now,
+        cut=at_border(box, view),
+    )
+
+
+def _seen(
+    s: Silhouette,
+    before: Silhouette,
+    mask: Mask | None,
+    alone: bool,
+    view: View,
+    *,
+    pieces: bool,
+) -> Silhouette:
+    """An object after what is seen of it in a frame."""
+    full = np.count_nonzero(s.shape)
+    if mask is None or np.count_nonzero(mask) < VISIBLE * full:
+        return replace(s, now=None, crowded=not alone)
+    box, shape = cropped(mask)
+    elapsed = max(view.time - before.seen, view.seconds, 1e-3)
+    if not alone and np.count_nonzero(mask) < GROWN * full:
+        # Of what is partly hidden only the shift of its template tells where it is.
+        _, dx, dy = sought(s, mask.astype(np.float32), view)
+        corner = (s.corner[0] + dx, s.corner[1] + dy)
+        gain = 0.3 * FOLLOW
+        velocity = (
+            s.velocity[0] + gain * dx / view.seconds,
+            s.velocity[1] + gain * dy / view.seconds,
+        )
+        moved = replace(s, corner=corner, velocity=velocity)
+    else:
+        corner = (float(box[0]), float(box[1]))
+        old = before.centre
+        new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+        gain = max(FOLLOW, 1 / (s.frames + 0.0))
+        velocity = (
+            s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
+            s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
+        )
+        tone = cut(view.image, box)
+        histogram = 0.8 * s.histogram + 0.2 * histogram_of(tone[shape])
+        moved = replace(
+            s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram
+        )
+    step = float(np.abs(moved.sides - before.sides).mean())
+    return replace(
+        moved,
+        seen=view.time,
+        frames=s.frames + 1,
+        way=s.way + np.abs(moved.sides - before.sides),
+        alone=s.alone + int(alone),
+        now=(box, shape),
+        crowded=not alone,
+        cut=s.cut or at_border(box, view),
+        parted=before.parted + step if pieces else 0.0,
+    )

@@ -1,0 +1,47 @@
+"""Whether the camera rests, from the motions measured in a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from visup.percepts.motion.layers.dominant import GRID
+from visup.percepts.motion.layers.layers import STILL, Affine, distances
+from visup.percepts.motion.tracks.scene import Scene
+
+TELLS = 16.0  # information, 1 / pixels squared, of a point that would show a motion
+FITS = 9.0  # squared distance within which a point rests
+SPREAD = 0.5  # share of the view in which points must be seen to rest
+RESTS = 0.85  # share of those parts that rest when the camera does
+MOVES = 0.6  # the same below which the camera moves
+
+
+def camera_rests(scene: Scene) -> bool | None:
+    """Whether the camera is seen to rest: all over the view, away from objects, nothing moves.
+
+    Args:
+        scene: A frame as measured.
+
+    Returns:
+        None when too little structure is seen to tell, or the view is divided.
+    """
+    shares = [_still_share(scene, i) for i in range(len(scene.measured))]
+    if any(s is not None and s < MOVES for s in shares):
+        return False
+    return True if shares and all(s is not None and s >= RESTS for s in shares) else None
+
+
+def _still_share(scene: Scene, number: int) -> float | None:
+    c = scene.measured[number].constraints
+    use = c.information[:, 0] + c.information[:, 2] > TELLS
+    use &= scene.owner[scene.cell_of(c)] == 0
+    rows, cols = GRID
+    row = np.clip(c.xy[:, 1] * rows / scene.image.shape[0], 0, rows - 1).astype(np.int64)
+    col = np.clip(c.xy[:, 0] * cols / scene.image.shape[1], 0, cols - 1).astype(np.int64)
+    place = (row * cols + col)[use]
+    fits = distances(Affine(STILL), c, 0.15)[use] < FITS
+    all_ = np.bincount(place, minlength=rows * cols)
+    rest = np.bincount(place[fits], minlength=rows * cols)
+    filled = all_ >= 2
+    if filled.sum() < SPREAD * rows * cols:
+        return None
+    return float(np.mean(rest[filled] > 0.5 * all_[filled]))

@@ -1,0 +1,233 @@
+"""A camera that rests: what moves is seen pixel by pixel, before the picture of what rests.
+
+Layers of motion need no still camera and know slow things from the first frame on; but small and
+thin things have too few constraints for them. Where the camera is seen to rest, silhouettes before
+the picture of the rest are reported instead, and of the layers' regions those that the picture does
+not know: what was there, and slow, when the picture was made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from visup.agent import Frame, Region
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.static_camera.background_model import (
+    Picture,
+    changed,
+    exposed,
+    filled,
+    first_picture,
+    forgotten,
+    learnt,
+)
+from visup.percepts.motion.static_camera.blob import Mask, Silhouette, Silhouettes, View, view_of
+from visup.percepts.motion.static_camera.blob_filters import is_deep_shadow, is_ghost, joined
+from visup.percepts.motion.static_camera.blob_tracker import follow
+from visup.percepts.motion.static_camera.camera_static import camera_rests
+from visup.percepts.motion.static_camera.track_fusion import Evidence, Telling
+from visup.percepts.motion.tracks.scene import Scene
+
+REST_S = 1.0  # how long the camera must rest before the picture is believed, seconds
+LONGEST_S = 4.0  # most seconds of rest that make up for times when too little is seen
+FLOODED = 0.6  # share of the image that no change of what is seen in it explains
+MANY_CELLS = 15  # superpixels of a region whose outline the layers know well
+YOUNG_S = 0.3  # how long what was never told is missed, seconds
+SIZE = 768  # longer side of the picture, pixels
+KNOWN = 0.6  # share of a region that differs from the picture when it shows the rest behind
+START_S = 2.4  # age of the picture up to which it may show what has only begun to be told, seconds
+STRIDE_PX, MOST_STRIDES = 4.0, 32
+HALO = 7  # pixels: a region's outline may be off by half as much
+
+
+class RestingView:
+    """Silhouettes before the picture of what rests; one per video.
+
+    Attributes:
+        active: Whether the camera rests, and has done so for long enough.
+    """
+
+    def __init__(self) -> None:
+        self._forget()
+        self._telling = Telling()
+
+    def _forget(self) -> None:
+        self._picture: Picture | None = None
+        self._known: Silhouettes = ()
+        self._time = self._since = self._rested_s = 0.0
+        self._born = 0
+        self.active = False
+
+    def step(
+        self,
+        frame: Frame,
+        scene: Scene,
+        regions: Sequence[Region],
+        ids: int,
+        settings: MotionSettings,
+        evidence: Evidence,
+    ) -> tuple[tuple[Region, ...], int]:
+        """What is to be reported of a frame.
+
+        Args:
+            frame: The frame.
+            scene: As measured.
+            regions: Those of the layers of motion.
+            ids: The last public id given.
+            settings: Gives how long objects are remembered.
+            evidence: Which points are seen to move by themselves.
+
+        Returns:
+            Regions by id: those of the layers unless the camera rests; the last public id given.
+        """
+        fresh = [r for r in regions if not self._telling.knows(r.id)]
+        self._telling.note(regions, frame.time, settings.memory_s)
+        many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
+        if not self._is_at_rest(camera_rests(scene), scene.seconds):
+            return self._telling.alone(regions, many), ids
+        image = _prepared(frame)
+        if self._picture is None:
+            hidden = covered(regions, frame.size, image.shape[:2])
+            self._picture = forgotten(first_picture(image), hidden)
+            self._time = self._since = frame.time
+            return self._telling.alone(regions, many), ids
+        self._reveal(image, frame, regions, fresh)
+        view = self._seen(image, frame.time, settings)
+        if view is None:
+            return self._telling.alone(regions, many), ids
+        self.active = min(frame.time - self._since, self._rested_s) >= REST_S
+        if not self.active:
+            return self._telling.alone(regions, many), ids
+        told, self._known, ids = self._telling.together(
+            frame.size, view, self._known, regions, ids, evidence, many
+        )
+        return told, ids
+
+    def _reveal(
+        self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
+    ) -> None:
+        """Forget what a region hid since the picture was begun, and look where none hides it now."""
+        assert self._picture is not None
+        picture, shape = self._picture, image.shape[:2]
+        age = frame.time - self._since
+        if fresh and age < START_S:
+            change = changed(exposed(picture, image), image)
+            for r in fresh:
+                here = covered([r], frame.size, shape)
+                if change[here].mean() < KNOWN:
+                    picture = forgotten(picture, here & ~change)
+                was = swept(here, r, age, shape[1] / frame.size[0])
+                picture = forgotten(picture, was & ~here & change)
+        told = covered(regions, frame.size, shape)
+        self._picture = filled(picture, image, ~told)
+
+    def _is_at_rest(self, rests: bool | None, seconds: float) -> bool:
+        """Whether the camera rests, as far as is known; else all is forgotten."""
+        step = seconds if rests else -seconds
+        self._rested_s = min(max(self._rested_s + step, 0.0), LONGEST_S)
+        if rests is False or self._rested_s <= 0:
+            self._forget()
+        return self._rested_s > 0
+
+    def _seen(self, image: Floats, now: float, settings: MotionSettings) -> View | None:
+        """Follow the silhouettes into a frame, and learn from it; None when it shows another view."""
+        assert self._picture is not None
+        seconds = max(now - self._time, 1e-3)
+        self._time = now
+        picture = exposed(self._picture, image)
+        change = changed(picture, image)
+        if change.mean() > FLOODED:
+            self._forget()
+            return None
+        view = view_of(image, change, settings.least_blob * change.size, now, seconds)
+        known, self._born = follow(self._known, view, self._born)
+        known = joined(known)
+        known = tuple(
+            s if s.id else replace(s, shadow=is_deep_shadow(s, image, picture.mean)) for s in known
+        )
+        ghosts = [s for s in known if is_ghost(s, image, picture.mean)]
+        known = tuple(s for s in known if s not in ghosts)
+        told = painted([s for s in known if s.id], change.shape)
+        held = (cv2.dilate(told.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
+        self._picture = learnt(picture, image, held, seconds, painted(ghosts, change.shape))
+        self._known = tuple(
+            s
+            for s in known
+            if now - s.seen <= (settings.missed_s if s.id else max(YOUNG_S, 2.5 * seconds))
+        )
+        return view
+
+
+def _prepared(frame: Frame) -> Floats:
+    image = frame.image
+    if image.ndim == 2 or image.shape[2] == 1:
+        image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    scale = SIZE / max(frame.size)
+    if scale < 1:
+        size = (max(8, round(frame.size[0] * scale)), max(8, round(frame.size[1] * scale)))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.7), dtype=np.float32)
+
+
+def covered(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
+    """(h, w) bool: the pixels of the picture that some regions may hide.
+
+    Args:
+        regions: In frame pixels.
+        size: (width, height) of the frame.
+        shape: (h, w) of the picture.
+    """
+    out = np.zeros(shape, dtype=np.uint8)
+    scale = shape[1] / size[0], shape[0] / size[1]
+    for r in regions:
+        x, y, w, h = r.bbox
+        left, top = round(x * scale[0]), round(y * scale[1])
+        right, bottom = (
+            min(round((x + w) * scale[0]), shape[1]),
+            min(round((y + h) * scale[1]), shape[0]),
+        )
+        if right > left and bottom > top:
+            mask = cv2.resize(
+                r.mask.view(np.uint8), (right - left, bottom - top), interpolation=cv2.INTER_NEAREST
+            )
+            out[top:bottom, left:right] |= np.asarray(mask, dtype=np.uint8)
+    if not regions:
+        return out.view(bool)
+    return np.asarray(cv2.dilate(out, np.ones((HALO, HALO), np.uint8)) > 0)
+
+
+def swept(here: Mask, region: Region, seconds: float, scale: float) -> Mask:
+    """Where a region was during the last seconds if it moved as it does now, (h, w) bool.
+
+    Args:
+        here: (h, w) bool, where it is.
+        region: Gives the velocity, frame pixels per second.
+        seconds: How far back.
+        scale: Pixels of the picture per frame pixel.
+    """
+    way = -np.asarray(region.velocity) * seconds * scale
+    steps = int(np.clip(np.ceil(np.hypot(*way) / STRIDE_PX), 1, MOST_STRIDES))
+    out = here.copy()
+    for k in range(1, steps + 1):
+        dx, dy = way * k / steps
+        matrix = np.array([[1, 0, dx], [0, 1, dy]])
+        moved = cv2.warpAffine(
+            here.view(np.uint8), matrix, here.shape[::-1], flags=cv2.INTER_NEAREST
+        )
+        out |= moved > 0
+    return out
+
+
+def painted(known: Sequence[Silhouette], shape: tuple[int, int]) -> Mask:
+    """(h, w) bool: what is visible of some objects."""
+    out = np.zeros(shape, dtype=bool)
+    for s in known:
+        if s.now is not None:
+            (x0, y0, x1, y1), mask = s.now
+            out[y0:y1, x0:x1] |= mask
+    return out

@@ -1,0 +1,100 @@
+"""What part of a common blob is whose, and where an object is that others hide in part.
+
+Each object brings the template of its silhouette and tones from when it stood alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.static_camera._templates_jit import best_shift
+from visup.percepts.motion.static_camera.blob import Mask, Silhouette, View, cut, window_of
+
+SEARCH = 3  # pixels around the prediction in which a template is sought
+ENOUGH = 1200  # pixels of a template that are compared, about
+TAKEN = 0.3  # how far a pixel that another object shows still speaks for one behind it
+
+
+def shared(
+    blob: int, rivals: Sequence[tuple[int, Silhouette]], view: View
+) -> list[tuple[int, Mask]]:
+    """What part of a blob each of its claimants has.
+
+    Args:
+        blob: Its number.
+        rivals: The claimants, each with a number.
+        view: The frame.
+
+    Returns:
+        For each claimant its number and an (h, w) mask.
+    """
+    whole = view.labels == blob
+    if len(rivals) < 2:
+        return [(i, whole) for i, _ in rivals]
+    ys, xs = np.nonzero(whole)
+    tones = view.image[ys, xs]
+    costs = [np.empty(0, np.float32)] * len(rivals)
+    for n, dx, dy in _arranged([s for _, s in rivals], whole, view):
+        costs[n] = _cost(rivals[n][1], dx, dy, xs, ys, tones)
+    winner = np.argmin(costs, axis=0)
+    out = []
+    for n, (i, _) in enumerate(rivals):
+        mask = np.zeros_like(whole)
+        mask[ys[winner == n], xs[winner == n]] = True
+        out.append((i, mask))
+    return out
+
+
+def _arranged(rivals: Sequence[Silhouette], blob: Mask, view: View) -> list[tuple[int, int, int]]:
+    """Number and shift of each object in a blob; the best seen first, the others beside it."""
+    free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
+    while left:
+        fits = [(sought(rivals[n], free, view), n) for n in left]
+        (_, dx, dy), n = min(fits)
+        left.remove(n)
+        out.append((n, dx, dy))
+        where, own = window_of(rivals[n], blob.shape, dx, dy)
+        cut(free, where)[cut(rivals[n].shape, own)] *= TAKEN
+    return out
+
+
+def sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
+    """The shift from its prediction at which a template fits a blob best.
+
+    Args:
+        s: The object.
+        blob: (h, w) float32, how far each pixel is free for it, 0 to 1.
+        view: The frame.
+
+    Returns:
+        The cost, grey levels, and the shift (x, y), whole pixels.
+    """
+    # A large template says enough by some of its pixels.
+    step = max(1, int(np.sqrt(np.count_nonzero(s.shape) / ENOUGH)))
+    reach = min(8, SEARCH + round(0.3 * float(np.hypot(*s.velocity)) * view.seconds))
+    corner = round(s.corner[0]), round(s.corner[1])
+    tone = np.ascontiguousarray(s.tone)
+    return best_shift(view.image, blob, s.shape, tone, corner, reach, step)
+
+
+def _cost(
+    s: Silhouette, dx: int, dy: int, xs: NDArray[np.int64], ys: NDArray[np.int64], tones: Floats
+) -> Floats:
+    """How little each of N pixels looks like a part of an object, (N,) float32."""
+    pad = 30
+    outer = cv2.copyMakeBorder(
+        (~s.shape).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1
+    )
+    far = cv2.distanceTransform(outer, cv2.DIST_L2, 3)
+    x = np.clip(xs - round(s.corner[0]) - dx + pad, 0, far.shape[1] - 1)
+    y = np.clip(ys - round(s.corner[1]) - dy + pad, 0, far.shape[0] - 1)
+    away = far[y, x]
+    h, w = s.shape.shape
+    tone = s.tone[np.clip(y - pad, 0, h - 1), np.clip(x - pad, 0, w - 1)]
+    gap = np.minimum(np.abs(tones - tone).mean(axis=1), 60.0)
+    return np.asarray(np.where(away > 0, 60.0 + 5 * away, gap), dtype=np.float32)

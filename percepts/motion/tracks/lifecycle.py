@@ -1,0 +1,242 @@
+"""The life of tracks: born, updated, confirmed, forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.layers.dense import CLIP
+from visup.percepts.motion.layers.discovery import discover, rate_of, slack_of
+from visup.percepts.motion.layers.layers import distances
+from visup.percepts.motion.tracks.merge_split import NEAR_STEPS, joined
+from visup.percepts.motion.tracks.salience import is_salient, is_swallowing
+from visup.percepts.motion.tracks.scene import Measured, Scene, least_area, moves_like
+from visup.percepts.motion.tracks.tracking import Indices, Motion, Track, Tracks, remember
+
+LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
+SURE = 200.0  # the same for one that has only just appeared
+BEHIND = 0.3  # share of a cell in which an object is expected behind another
+SLIVER = 3.5  # length over width of a strip that is no object
+
+
+def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> Tracks:
+    """Add tracks for groups of constraints that no layer explains.
+
+    Args:
+        tracks: Those known.
+        scene: The frame.
+        settings: Gives the most tracks.
+        born: How many were born before.
+
+    Returns:
+        The known tracks, then the new ones.
+    """
+    out = list(tracks)
+    owned = scene.owner > 0
+    for m in scene.measured:
+        c = m.constraints
+        free = _unexplained(m, out, scene, owned)
+        for model, index in discover(c, free, scene.image.shape, settings.cell):
+            if len(out) >= settings.max_regions:
+                return tuple(out)
+            share = np.zeros(scene.cells.count, dtype=np.float32)
+            share[scene.cell_of(c)[index]] = 1
+            share = scene.cells.reach(share[:, None] > 0, 1)[:, 0] * 0.7 * ~owned
+            born += 1
+            middle = c.xy[index].mean(axis=0)
+            motion = Motion().with_rate(c.lag, rate_of(model, c, scene.time), float(len(index)))
+            t = Track(
+                born,
+                0,
+                scene.time,
+                scene.time,
+                share.astype(np.float32),
+                motions=(motion,),
+                centre=(float(middle[0]), float(middle[1])),
+            )
+            host = _territory(out, share > 0, motion, scene)
+            if host is None:
+                out.append(t)
+            else:
+                out[host] = joined(out[host], t)
+            owned = owned | (share > 0)
+    return tuple(out)
+
+
+def _territory(
+    tracks: Sequence[Track], where: NDArray[np.bool_], motion: Motion, scene: Scene
+) -> int | None:
+    """The track that is hidden in most of these cells, or else was of late in most of them."""
+    if not where.any():
+        return None
+    for i, t in enumerate(tracks):
+        if (
+            t.id
+            and t.hidden is not None
+            and (scene.cells.mean(t.hidden)[where] > BEHIND).mean() > 0.5
+            and moves_like(motion, t)
+        ):
+            return i
+    for i, t in enumerate(tracks):
+        if not t.id or t.recent is None:
+            continue
+        # What comes out from behind an object is not a part of it.
+        others = [
+            o.own > BEHIND
+            for o in tracks
+            if o is not t and o.hidden is not None and o.own is not None
+        ]
+        free = where & ~np.any(others, axis=0) if others else where
+        most = np.count_nonzero(free) > 0.5 * np.count_nonzero(where)
+        if most and np.mean(t.recent[free] > 0.3) > 0.5:
+            return i if moves_like(motion, t) else _uncovered(tracks, i, where, motion, scene)
+    return None
+
+
+def _uncovered(
+    tracks: Sequence[Track], host: int, where: NDArray[np.bool_], motion: Motion, scene: Scene
+) -> int | None:
+    """Whose part it is that turned up where a track was: the track's, unless another moves so.
+
+    What an occluder uncovers moves as what it hid, and lies beside the rest of that.
+    """
+    near = scene.cells.reach(where[:, None], NEAR_STEPS)[:, 0]
+    best, most = host, 0
+    for i, t in enumerate(tracks):
+        if i != host and t.id and t.own is not None and moves_like(motion, t):
+            there = int(np.count_nonzero(near & ((t.own > BEHIND) | (t.share > BEHIND))))
+            if there > most:
+                best, most = i, there
+    return best
+
+
+def _unexplained(
+    m: Measured, tracks: Sequence[Track], scene: Scene, owned: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    c = m.constraints
+    at = scene.cell_of(c)
+    out = ~owned[at] & (m.background.distances(c) > 16)
+    if not (tracks and out.any()):
+        return np.asarray(out)
+    members = np.stack([t.share for t in tracks], axis=1) > 0.3
+    near = scene.cells.reach(members, NEAR_STEPS)[at]
+    for k, t in enumerate(tracks):
+        left = np.flatnonzero(out & near[:, k])
+        if not len(left):
+            continue
+        parts = t.predicted(c.lag, c.span_s)
+        some = c.take(left)
+        off = np.min([distances(p, some, slack_of(p, t.centre)) for p in parts], axis=0)
+        out[left] = off >= 16
+    return np.asarray(out)
+
+
+def update(
+    tracks: Tracks,
+    scene: Scene,
+    posterior: Floats,
+    winner: Indices,
+    likelihood: Floats,
+    settings: MotionSettings,
+) -> Tracks:
+    """Bring each track's shape and evidence up to date with the posterior."""
+    least = 0.3 * least_area(scene, settings)
+    at = winner[scene.at]
+    out = []
+    for k, t in enumerate(tracks, 1):
+        gain = np.clip(likelihood[:, k] - likelihood[:, 0], -CLIP, CLIP)[at == k]
+        t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
+        out.append(remember(t, posterior, winner, k, scene.cells, scene.time, least))
+    return tuple(out)
+
+
+def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
+    """Drop what was never confirmed and is gone, and what has been hidden too long."""
+    out = []
+    for t in tracks:
+        gone = scene.time - t.seen
+        if t.id == 0:
+            keep = gone <= 0.2 and t.evidence > -20
+        else:
+            keep = gone <= (settings.memory_s if t.hidden is not None else 0.5)
+            # As surely the background as it had to be something else to be told.
+            keep = keep and t.evidence > -LIKELY and not is_swallowing(t, scene)
+        if keep:
+            out.append(t)
+    keys = {t.key for t in out}
+    return tuple(_with_known(t, keys) for t in out)
+
+
+def _with_known(t: Track, keys: set[int]) -> Track:
+    """A track that has forgotten how it stood to others than these: keys never come back."""
+    if t.apart.keys() <= keys and t.alike.keys() <= keys:
+        return t
+
+    def known(values: Mapping[int, float]) -> Mapping[int, float]:
+        return MappingProxyType({k: v for k, v in values.items() if k in keys})
+
+    return replace(t, apart=known(t.apart), alike=known(t.alike))
+
+
+def _is_thin(t: Track, scene: Scene) -> bool:
+    """Whether no cell of a track lies inside it: such a one must move more surely to be told."""
+    rest = t.share <= 0.5
+    return bool(scene.cells.reach(rest[:, None], 1)[:, 0].all())
+
+
+def _is_sliver(t: Track, scene: Scene) -> bool:
+    """Whether a thin track is a long strip.
+
+    Where two backgrounds meet, and along a straight edge that tells of one component of motion
+    only, such strips turn up; objects so thin are given up for that.
+    """
+    mine = t.share > 0.5
+    if not mine.any():
+        return False
+    spread = np.cov(scene.cells.centre[mine].T, aweights=scene.cells.area[mine], ddof=0)
+    long, short = np.sqrt(np.maximum(np.linalg.eigvalsh(np.atleast_2d(spread))[::-1], 1.0))
+    return bool(long > SLIVER * short)
+
+
+def confirm(
+    tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings, sought: Sequence[bool]
+) -> tuple[Tracks, int]:
+    """Give public ids to tracks that have lasted and surely move.
+
+    Args:
+        tracks: All tracks.
+        scene: The frame.
+        ids: The last public id given.
+        settings: Says how long is lasting.
+        sought: Which tracks lie where cogitation asked to look: half as much will do for those.
+
+    Returns:
+        The tracks and the last public id given.
+    """
+    out = []
+    for t, wanted in zip(tracks, sought, strict=True):
+        need = 0.5 if wanted else 1.0
+        if not t.id and t.seen == scene.time and _is_sure(t, scene, settings, need):
+            ids += 1
+            t = replace(t, id=ids)
+        out.append(t)
+    return tuple(out), ids
+
+
+def _is_sure(t: Track, scene: Scene, settings: MotionSettings, need: float) -> bool:
+    """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
+    thin = _is_thin(t, scene)
+    if t.frames < 2 or t.evidence < need * (2 if thin else 1) * LIKELY:
+        return False
+    if thin and _is_sliver(t, scene):
+        return False
+    if t.evidence > need * SURE and is_salient(t, scene, at_once=True, need=need):
+        return True
+    lasts = t.frames >= 3 and scene.time - t.born >= need * settings.confirm_s
+    return lasts and is_salient(t, scene, need=need)

@@ -1,0 +1,289 @@
+"""Which tracks are one object: parts are absorbed, pieces joined, what was hidden is released."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.layers._layers_jit import quantile
+from visup.percepts.motion.layers.discovery import middle, rate_of, same_motion, slack_of
+from visup.percepts.motion.layers.layers import Affine, distances, fit_affine
+from visup.percepts.motion.tracks.salience import LITTLE_BORDER, border_share
+from visup.percepts.motion.tracks.scene import Measured, Scene, least_area, moves_like
+from visup.percepts.motion.tracks.tracking import Indices, Motion, Track, Tracks
+
+NEAR_STEPS = 4  # cells between tracks that touch
+APART_S = 1.5
+VOTES = 3.0
+MOST_PARTS = 3
+LIMB = 0.5  # how large, as a share of its object, a part may be that is taken for a limb of it
+SURROUNDED = 0.75  # share of what is around a track that is one other, of which it is a part
+CONTACT = 5.0  # affinity of two cells that are flat and of one tone
+
+
+def absorb(
+    tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings, born: int
+) -> Tracks:
+    """Give parts that move as no layer does to the track that they touch, or make them tracks.
+
+    Limbs, wheels and shadows join their object; what stands alone is something new.
+    """
+    unknown = np.flatnonzero(winner == len(tracks) + 1)
+    if not len(unknown):
+        return tracks
+    out = list(tracks)
+    count, number = connected_components(scene.cells.link[unknown][:, unknown], directed=False)
+    for i in range(count):
+        part = np.zeros(scene.cells.count, dtype=bool)
+        part[unknown[number == i]] = True
+        ring = scene.cells.reach(part[:, None], 1)[:, 0] & ~part
+        # Whose place it was counts first, then whom it touches.
+        k = _most(scene.owner[part], len(tracks), 0.3)
+        k = _most(winner[ring], len(tracks), 0.25) if k is None else k
+        size = scene.cells.area[part].sum()
+        if k is not None:
+            share = np.where(part, 1, out[k].share).astype(np.float32)
+            out[k] = replace(out[k], share=share)
+        elif size > least_area(scene, settings):
+            t = _alone(part, scene, born + 1)
+            if t is not None and len(out) < settings.max_regions:
+                born += 1
+                out.append(t)
+    return tuple(out)
+
+
+def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: Scene) -> bool:
+    """Whether a part is too large, and reaches too far beyond the image, for a limb of its host."""
+    area = scene.cells.area
+    return bool(
+        area[part].sum() > LIMB * area[host].sum()
+        and border_share(part.astype(np.float32), scene.cells) > LITTLE_BORDER
+    )
+
+
+def _most(labels: Indices, count: int, share: float) -> int | None:
+    """The track, from 0, that has more than a share of some labels and more than any other."""
+    if not count or not len(labels):
+        return None
+    numbers = np.bincount(labels, minlength=count + 2)[1 : count + 1]
+    k = int(numbers.argmax())
+    return k if numbers[k] > share * len(labels) else None
+
+
+def _alone(part: NDArray[np.bool_], scene: Scene, key: int) -> Track | None:
+    """A new track for cells that move as no layer does; None when there is too little to go by."""
+    c = scene.measured[0].constraints
+    inside = np.flatnonzero(part[scene.cell_of(c)])
+    if len(inside) < 6:
+        return None
+    weight = np.zeros(len(c), dtype=np.float32)
+    weight[inside] = 1
+    start = middle(c, inside)
+    fit = fit_affine(c, weight, start, slack=slack_of(start))
+    motion = Motion().with_rate(c.lag, rate_of(fit, c, scene.time), float(len(inside)))
+    centre = scene.cells.centre[part].mean(axis=0)
+    return Track(
+        key,
+        0,
+        scene.time,
+        scene.time,
+        part.astype(np.float32),
+        motions=(motion,),
+        centre=(float(centre[0]), float(centre[1])),
+        evidence=10.0,
+    )
+
+
+def release(tracks: Tracks, scene: Scene, winner: Indices) -> Tracks:
+    """Give back to a hidden track what its occluder holds but what moves as the hidden one did.
+
+    The occluder has gone on: where points move as the track did when it was last in view, and not
+    as the occluder does, the track is in view again.
+    """
+    out = list(tracks)
+    for j, t in enumerate(tracks):
+        if not t.id or not t.mostly_hidden or t.hidden is None:
+            continue
+        there = scene.cells.mean(t.hidden) > 0.5
+        for k, o in enumerate(tracks):
+            held = there & (winner == k + 1)
+            if k != j and held.any() and _moves_as(t, o, held, scene):
+                out[j] = replace(out[j], share=np.where(held, 1, out[j].share).astype(np.float32))
+                kept = tuple(m for m in out[k].motions if not moves_like(m, t))
+                out[k] = replace(
+                    out[k],
+                    share=np.where(held, 0, out[k].share).astype(np.float32),
+                    motions=kept or out[k].motions[:1],
+                )
+    return tuple(out)
+
+
+def _moves_as(hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: Scene) -> bool:
+    """Whether points in some cells move as a hidden track did, and not as its occluder."""
+    m = scene.measured[-1]
+    c = m.constraints
+    inside = where[scene.cell_of(c)]
+    rate = occluder.best_rate()
+    if np.count_nonzero(inside) < 6 or rate is None or c.span_s > 0.7:
+        return False
+    own, other = np.zeros((2, 3)), np.zeros((2, 3))
+    own[:, 2] = np.asarray(hidden.pace) * c.span_s
+    other[:, 2] = np.asarray(occluder.pace) * c.span_s
+    if np.hypot(*(own[:, 2] - other[:, 2])) < 1.0:
+        return False
+    to_own = np.median(distances(Affine(own), c, 0.3)[inside])
+    to_other = np.median(distances(Affine(other), c, 0.3)[inside])
+    return bool(to_own < 6 and to_other > 16)
+
+
+def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:
+    """Join tracks that were never seen apart and again and again move as one.
+
+    Two objects that came together stay two, however rigidly they are coupled: they have been seen
+    apart. Pieces of one object, born side by side, become one.
+    """
+    if len(tracks) < 2:
+        return tracks
+    members = winner[:, None] == np.arange(1, len(tracks) + 1)
+    ring = scene.cells.reach(members, 1) & ~members
+    near = scene.cells.reach(members | ring, NEAR_STEPS - 1)
+    touch = (near.astype(np.float32).T @ members.astype(np.float32)) > 0
+    around = ring.astype(np.float32).T @ members.astype(np.float32)
+    inside = around > SURROUNDED * ring.sum(axis=0)[:, None]
+    grown = _grown_together(scene, winner, len(tracks))
+    seen = members.any(axis=0)
+    touch = (touch | touch.T) & seen & seen[:, None]
+    moving = _moving(scene, members)
+    out = _kept_apart(tracks, (seen & seen[:, None]) & ~touch, scene.seconds)
+    for j in range(len(tracks) - 1, 0, -1):
+        for i in np.flatnonzero(touch[:j, j]):
+            a, b = out[i], out[j]
+            apart = a.apart.get(b.key, 0.0)
+            if apart > APART_S or not _may_join(a, b, members[:, i], members[:, j], scene):
+                continue
+            votes = a.alike.get(b.key, 0.0)
+            # One all but surrounded by the other is a part of it.
+            if grown[i, j] or inside[i, j] or inside[j, i]:
+                votes += 1.0
+            else:
+                both = tuple(bool(m[i] and m[j]) for m in moving)
+                votes += _vote(scene, a, members[:, i], members[:, j], both)
+            votes = max(votes, -VOTES)
+            out[i] = replace(a, alike=_with(a.alike, b.key, votes))
+            if votes >= VOTES:
+                out[i] = joined(out[i], b)
+                out[j] = replace(b, id=-1)
+                break
+    return tuple(t for t in out if t.id >= 0)
+
+
+def _may_join(
+    a: Track, b: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], scene: Scene
+) -> bool:
+    """Whether one is not the ground on which the other goes; what was told is no ground.
+
+    What goes behind another is surrounded by it at last, and is no part of it for that.
+    """
+    if bool(a.id) == bool(b.id):
+        return not (a.id and (a.mostly_hidden or b.mostly_hidden))
+    told, other = (in_a, in_b) if a.id else (in_b, in_a)
+    return not _is_ground(other, told, scene)
+
+
+def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, float]:
+    return MappingProxyType({**values, key: value})
+
+
+def _kept_apart(tracks: Tracks, apart: NDArray[np.bool_], seconds: float) -> list[Track]:
+    """The tracks with the time for which each was seen apart from those behind it."""
+    out = []
+    for i, t in enumerate(tracks):
+        others = [tracks[j].key for j in np.flatnonzero(apart[i]) if j > i]
+        longer = {key: t.apart.get(key, 0.0) + seconds for key in others}
+        out.append(replace(t, apart=MappingProxyType({**t.apart, **longer})) if longer else t)
+    return out
+
+
+def _vote(
+    scene: Scene,
+    a: Track,
+    in_a: NDArray[np.bool_],
+    in_b: NDArray[np.bool_],
+    moving: tuple[bool, ...],
+) -> float:
+    votes = 0.0
+    for m, both in zip(scene.measured, moving, strict=True):
+        c = m.constraints
+        if c.lag == 1 and len(scene.measured) > 1:
+            continue
+        at = scene.cell_of(c)
+        start = a.predicted(c.lag, c.span_s)[0]
+        mine, other = in_a[at], in_b[at]
+        if not both:
+            continue
+        same = same_motion(c, mine, other, start, slack_of(start, a.centre))
+        votes += 0.0 if same is None else (1.0 if same else -1.0)
+    return votes
+
+
+def _grown_together(scene: Scene, winner: Indices, count: int) -> NDArray[np.bool_]:
+    """(count, count): whether no image edge parts two tracks where they touch, as links of an arm."""
+    link = scene.cells.link
+    strong = np.flatnonzero(link.data > CONTACT)
+    a = winner[np.searchsorted(link.indptr, strong, side="right") - 1] - 1
+    b = winner[link.indices[strong]] - 1
+    both = (a >= 0) & (b >= 0) & (a < count) & (b < count)
+    out = np.zeros((count, count), dtype=bool)
+    out[a[both], b[both]] = True
+    return out
+
+
+def _moving(scene: Scene, members: NDArray[np.bool_]) -> list[list[bool]]:
+    """Which of K tracks with (count, K) members are told to move, over each baseline."""
+    return [
+        [_moves(m, mine) for mine in members[scene.cell_of(m.constraints)].T]
+        for m in scene.measured
+    ]
+
+
+def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:
+    """Whether these constraints tell that something moves against the background."""
+    if np.count_nonzero(which) < 4:
+        return False
+    return quantile(m.background.distances(m.constraints)[which], 0.7) > 9
+
+
+def joined(a: Track, b: Track) -> Track:
+    """Two tracks as one.
+
+    Args:
+        a: The one that goes on, under the older of their public ids.
+        b: The one that becomes a part of it.
+
+    Returns:
+        The first with the cells and motions of both.
+    """
+    ids = [i for i in (a.id, b.id) if i]
+    apart = {k: max(a.apart.get(k, 0.0), b.apart.get(k, 0.0)) for k in {*a.apart, *b.apart}}
+    return replace(
+        a,
+        id=min(ids) if ids else 0,
+        born=min(a.born, b.born),
+        share=np.clip(a.share + b.share, 0, 1),
+        motions=_parts(a.motions + b.motions),
+        evidence=a.evidence + b.evidence,
+        frames=max(a.frames, b.frames),
+        apart=MappingProxyType(apart),
+    )
+
+
+def _parts(motions: tuple[Motion, ...]) -> tuple[Motion, ...]:
+    """The best supported motions, few enough that they do not explain everything."""
+    keep = sorted(range(len(motions)), key=lambda i: -motions[i].support)[:MOST_PARTS]
+    return tuple(motions[i] for i in sorted(keep))

@@ -1,0 +1,158 @@
+"""Dense comparison: the older image, brought along by each layer's motion, beside the newest one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.features._superpixels_jit import means_of_half
+from visup.percepts.motion.features.image import Floats, WorkImage
+from visup.percepts.motion.features.superpixels import Superpixels
+from visup.percepts.motion.layers.layers import Affine
+from visup.percepts.motion.tracks.scene import Scene
+from visup.percepts.motion.tracks.tracking import Track
+
+
+def flow_back(new: NDArray[np.uint8], old: NDArray[np.uint8], engine: cv2.DISOpticalFlow) -> Floats:
+    """Dense flow from the newest image back to the old one, (h, w, 2) float32 pixels."""
+    return np.asarray(engine.calc(new, old, np.zeros((*new.shape, 2), np.float32)))
+
+
+def compare(
+    new: WorkImage,
+    old: WorkImage,
+    models: Sequence[Affine],
+    box: tuple[int, int, int, int],
+    precision: Floats,
+) -> Floats:
+    """Log likelihood of pixels when the old image is warped by a layer's motions (the best counts).
+
+    At half the size: what is asked is which cells fit, and each is several pixels wide.
+
+    Args:
+        new: The newest image.
+        old: The older image.
+        models: Displacements from old to new, working pixels; at least one.
+        box: (x, y, width, height) of the part to compare, pixels at half the size.
+        precision: (height, width) float32 inverse variance of grey values there.
+
+    Returns:
+        (height, width) float32, from -4.5 to 0.
+    """
+    x, y, w, h = box
+    part = np.s_[y : y + h, x : x + w]
+    gaps = [cv2.absdiff(new.half[part], _warp(old.half, model, box)) for model in models]
+    off = np.square(reduce(np.minimum, gaps), dtype=np.float32)
+    np.multiply(off, precision, out=off)
+    np.minimum(off, 9.0, out=off)
+    return np.multiply(off, np.float32(-0.5), out=off)
+
+
+def precision_of(image: WorkImage, noise: float, box: tuple[int, int, int, int]) -> Floats:
+    """Inverse variance to expect of a warped image's grey values, (h, w) float32.
+
+    Where the image is steep, a small error of the motion makes a large one of the grey value.
+    The box is of pixels at half the size.
+    """
+    x, y, w, h = box
+    every = np.s_[2 * y : 2 * (y + h) : 2, 2 * x : 2 * (x + w) : 2]
+    gx, gy = image.gx[every], image.gy[every]
+    slope2 = gx * gx + gy * gy
+    return np.asarray(1 / ((1.5 * noise) ** 2 + 0.35**2 * slope2), dtype=np.float32)
+
+
+def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]) -> NDArray[Any]:
+    """An old image, at half the size, as a layer's motion brings it to a part of the newest one.
+
+    The middle of pixel u lies at 2 u + 1/2 in the working image, to which motions refer.
+    """
+    x, y, w, h = box
+    if model.bend is not None:
+        ys, xs = np.mgrid[y : y + h, x : x + w]
+        at = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
+        source = (at - model.at(2 * at + np.float32(0.5)) / 2).reshape(h, w, 2)
+        from_x, from_y = (np.ascontiguousarray(source[..., i]) for i in (0, 1))
+        return cv2.remap(grey, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    back = np.eye(2, 3)
+    back[:, :2] -= model.matrix[:, :2]
+    back[:, 2] -= np.asarray(model.shift((0.5, 0.5))) / 2
+    back[:, 2] += back[:, :2] @ np.array([x, y])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return cv2.warpAffine(grey, back, (w, h), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+
+
+def warped(
+    scene: Scene, tracks: Sequence[Track], old: WorkImage, near: NDArray[np.bool_], noise: float
+) -> Floats:
+    """Dense evidence: which motion brings the older image to look like the newest one.
+
+    Args:
+        scene: The frame; its longest baseline is used.
+        tracks: K tracks.
+        old: The image at the other end of that baseline.
+        near: (count, K) bool, the cells that each track can reach.
+        noise: Standard deviation of grey values.
+
+    Returns:
+        (count, K + 2) float32 log likelihood of each label in each cell.
+    """
+    cells, m = scene.cells, scene.measured[-1]
+    c = m.constraints
+    out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
+    any_near = np.asarray(near.any(axis=1))
+    if not any_near.any():
+        return out
+    box = _halved(cells.box(any_near), cells)
+    precision = precision_of(scene.image, noise, box)
+    zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, precision), box)
+    out[any_near, 0] = zero[any_near]
+    out[any_near, 1:] = -4.5
+    for k, t in enumerate(tracks, 1):
+        mine = np.flatnonzero(near[:, k - 1])
+        if len(mine):
+            models = t.predicted(c.lag, c.span_s)
+            x, y, w, h = own = _halved(cells.box(near[:, k - 1]), cells)
+            there = np.s_[y - box[1] : y - box[1] + h, x - box[0] : x - box[0] + w]
+            fit = compare(scene.image, old, models, own, precision[there])
+            out[mine, k] = _cell_mean(cells, fit, own)[mine]
+            hid = mine[_was_hidden(scene, mine, models[0], k)]
+            out[hid, 0] = np.maximum(out[hid, 0], out[hid, k])
+    out[any_near, -1] = out[any_near, :-1].max(axis=1)
+    return out
+
+
+def _was_hidden(scene: Scene, which: NDArray[np.int64], model: Affine, k: int) -> NDArray[np.bool_]:
+    """Which of some cells, were they background, the track would have hidden in the older image.
+
+    There the background need not look as it does now, so a poor comparison says nothing against it.
+    """
+    cells, background = scene.cells, scene.measured[-1].background.models
+    height, width = cells.labels.shape
+    centre = cells.centre[which]
+    out = np.zeros(len(which), dtype=bool)
+    for ground in background:
+        away = model.at(centre) - ground.at(centre)
+        away += 2.0 * away / np.maximum(np.hypot(away[:, :1], away[:, 1:]), 1e-3)
+        at = np.rint(centre + 1.2 * away).astype(np.int64)
+        x, y = np.clip(at[:, 0], 0, width - 1), np.clip(at[:, 1], 0, height - 1)
+        out |= scene.owner[cells.labels[y, x]] == k
+    return out
+
+
+def _halved(box: tuple[int, int, int, int], cells: Superpixels) -> tuple[int, int, int, int]:
+    """A box of working pixels as one at half the size, at least one pixel wide, in the image."""
+    x, y, w, h = box
+    height, width = (n // 2 for n in cells.labels.shape)
+    left, top = min(x // 2, width - 1), min(y // 2, height - 1)
+    right, bottom = min((x + w + 1) // 2, width), min((y + h + 1) // 2, height)
+    return left, top, max(right - left, 1), max(bottom - top, 1)
+
+
+def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
+    """Mean of a map of a box, at half the size, in each cell; 0 where none of its pixels is seen."""
+    return means_of_half(cells.labels, np.ascontiguousarray(values), box, cells.count)

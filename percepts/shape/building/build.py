@@ -1,0 +1,296 @@
+"""Building a model database: views of meshes, exemplars of silhouettes, masks of a video.
+
+Models are called as their mesh files. Nothing here depends on the order in which processes finish.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import DatabaseError, SettingsError
+from visup.percepts.shape.building.parts import Part, made, parts_of, read_part
+from visup.percepts.shape.building.views import half_sphere_directions, load_mesh, render_views
+from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.directions import merged
+from visup.percepts.shape.index.records import NewView
+from visup.percepts.shape.matching.exemplars import medoids, similarity_matrix
+from visup.percepts.shape.matching.similarity import shape_of
+from visup.percepts.shape.silhouette.silhouette import binary_picture, looks_cut, normalise
+
+VIEWS = 32
+"""Views rendered of each mesh unless asked otherwise."""
+
+CLUSTERS = 8
+"""Exemplars kept of a folder of silhouettes unless asked otherwise."""
+
+MOST_CLUSTERED = 400
+"""Silhouettes that are clustered at most; of more, so many evenly spaced ones are."""
+
+PICTURES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
+"""Endings of the picture files that are read as silhouettes."""
+
+UNSCORED = 128
+"""Value of mask pixels that belong to no object for certain."""
+
+Progress = Callable[[int, int, str], None]
+"""Called with how many views are done, of how many, and the name of the model they were done of."""
+
+
+def read_silhouette(path: Path) -> NDArray[np.bool_]:
+    """A silhouette picture as a mask (H, W) bool, whichever of object and background is brighter.
+
+    Raises:
+        DatabaseError: The file is missing or no picture.
+    """
+    return binary_picture(_read_grey(path))
+
+
+def _read_grey(path: Path) -> NDArray[np.uint8]:
+    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.is_file() else None
+    if image is None:
+        raise DatabaseError(
+            "this is not a picture that can be read"
+            if path.exists()
+            else "there is no such picture",
+            where=str(path),
+            expected="a silhouette, one shade on another, in a PNG or similar",
+        )
+    return np.asarray(image, dtype=np.uint8)
+
+
+def read_silhouettes(folder: Path) -> list[NDArray[np.bool_]]:
+    """All silhouette pictures in a folder as masks (H, W) bool, by file name.
+
+    Raises:
+        DatabaseError: The folder is missing, holds no pictures, or a picture cannot be read.
+    """
+    return [read_silhouette(f) for f in _pictures_in(folder)]
+
+
+def read_masks(folder: Path, label: int | None = None) -> list[NDArray[np.bool_]]:
+    """An object's masks in the frames of a video, (H, W) bool each, by file name.
+
+    Args:
+        folder: Label pictures: 0 is background, 128 is not scored, every other value is one object.
+        label: Value of the object; all objects are taken as one when None.
+
+    Returns:
+        A mask for each frame in which the object is seen.
+
+    Raises:
+        DatabaseError: The folder is missing, holds no pictures, a picture cannot be read, or no frame
+            shows the object.
+    """
+    frames = (_read_grey(f) for f in _pictures_in(folder))
+    masks = [(f == label) if label is not None else (f != 0) & (f != UNSCORED) for f in frames]
+    seen = [np.asarray(m) for m in masks if m.any()]
+    if not seen:
+        raise DatabaseError(
+            f"none of {len(masks)} masks shows {'anything' if label is None else f'label {label}'}",
+            where=str(folder),
+            expected="label pictures: 0 is background, other values are objects",
+        )
+    return seen
+
+
+def _pictures_in(folder: Path) -> list[Path]:
+    files = sorted(p for p in folder.glob("*") if p.suffix.lower() in PICTURES)
+    if not files:
+        raise DatabaseError(
+            "there are no silhouette pictures here"
+            if folder.is_dir()
+            else "there is no such folder",
+            where=str(folder),
+            expected=f"a folder of pictures ({', '.join(PICTURES)})",
+        )
+    return files
+
+
+def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
+    """Views of a mesh file, ready to be stored under the name of the file; symmetric ones are one.
+
+    Raises:
+        DatabaseError: The file is no mesh.
+        ExtraMissingError: What renders meshes is not installed.
+    """
+    return merged(rendered(mesh, half_sphere_directions(count, seed)))
+
+
+def rendered(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
+    """Views of a mesh file from these directions (V, 3), as `mesh_views` but none merged."""
+    views = []
+    for seen in render_views(load_mesh(mesh), directions):
+        silhouette = normalise(seen.mask)
+        if silhouette is not None:
+            x, y, z = (float(c) for c in seen.direction)
+            views.append(NewView(mesh.stem, (x, y, z), seen.area, shape_of(silhouette)))
+    return views
+
+
+def silhouette_views(
+    name: str, masks: Sequence[NDArray[np.bool_]], clusters: int = CLUSTERS
+) -> list[NewView]:
+    """Exemplars of silhouettes, ready to be stored.
+
+    Whole silhouettes and those that a border cuts are clustered apart: none stands for the other.
+
+    Args:
+        name: Of the model.
+        masks: (H, W) bool each, whole pictures.
+        clusters: How many exemplars, shared between whole and cut ones by their numbers.
+
+    Raises:
+        DatabaseError: No mask shows anything.
+    """
+    found = [normalise(m, cut=looks_cut(m)) for m in masks]
+    shapes = [shape_of(s) for s in found if s is not None]
+    if not shapes:
+        raise DatabaseError(
+            f"none of {len(masks)} silhouettes for {name!r} shows anything",
+            expected="pictures with an object of at least 24 pixels",
+        )
+    # All pairs are compared: of a long video, every so manyth frame stands for those around it.
+    every = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
+    some = [shapes[k] for k in every]
+    cut = [s for s in some if s.cut]
+    of_cut = round(clusters * len(cut) / len(some))
+    if 0 < len(cut) < len(some) and clusters > 1:
+        of_cut = min(max(1, of_cut), clusters - 1)
+    groups = (([s for s in some if not s.cut], clusters - of_cut), (cut, of_cut))
+    return [
+        NewView(name, None, None, group[k])
+        for group, count in groups
+        if count
+        for k in medoids(similarity_matrix(group), count)
+    ]
+
+
+def build_database(
+    path: Path | str,
+    meshes: Sequence[Path],
+    silhouettes: Mapping[str, Sequence[NDArray[np.bool_]]] = MappingProxyType({}),
+    *,
+    views: int = VIEWS,
+    seed: int = 0,
+    clusters: int = CLUSTERS,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> ModelDatabase:
+    """Build a database from mesh files; each model's name is its file's stem.
+
+    What is done is kept in a folder beside the target until all is done: a build that was killed, or
+    that stopped at a bad mesh, goes on where it was when it is started again.
+
+    Args:
+        path: Where the database is written; what stands there is replaced when all is done.
+        meshes: Mesh files with different stems.
+        silhouettes: Name -> masks (H, W) bool, whole pictures; their exemplars are added to that name.
+        views: Views of each mesh, before symmetric ones are merged.
+        seed: Turns the directions of the views; 0 leaves them.
+        clusters: Exemplars of each name's silhouettes.
+        jobs: Processes.
+        progress: Told of views done.
+
+    Returns:
+        The database; the same bytes for the same input, whatever `jobs` is and however often the
+        build was begun.
+
+    Raises:
+        SettingsError: Two meshes have the same stem, or a number is out of range.
+        DatabaseError: A mesh cannot be read, or the file cannot be written.
+        ExtraMissingError: What renders meshes is not installed.
+    """
+    _check_names(meshes)
+    if not 1 <= views <= 10_000:
+        raise SettingsError(f"{views} views of each mesh were asked for", expected="1 to 10000")
+    target = Path(path)
+    folder = building_folder(target)
+    every = [parts_of(mesh, folder, views, seed) for mesh in meshes]
+    _make([p for parts in every for p in parts], jobs, progress)
+
+    def stored() -> Iterator[NewView]:
+        for parts in every:
+            yield from merged([v for part in parts for v in read_part(part)])
+        for name, masks in silhouettes.items():
+            yield from silhouette_views(name, masks, clusters)
+
+    built = ModelDatabase.create(target, stored())
+    shutil.rmtree(folder, ignore_errors=True)
+    return built
+
+
+def building_folder(target: Path) -> Path:
+    """Where what is done of a build is kept until all is done."""
+    return target.parent / f".{target.name}.building"
+
+
+def _check_names(meshes: Sequence[Path]) -> None:
+    stems = [m.stem for m in meshes]
+    twice = sorted({s for s in stems if stems.count(s) > 1})
+    if twice:
+        raise SettingsError(
+            f"several meshes would be named {twice[0]!r}",
+            expected="mesh files with different stems",
+            hint="rename one of them: a model is called as its file",
+        )
+
+
+def _make(parts: Sequence[Part], jobs: int, progress: Progress | None) -> None:
+    """Make all parts that are not made yet."""
+    done, total = 0, sum(p.count for p in parts)
+
+    def tell(part: Part) -> None:
+        nonlocal done
+        done += part.count
+        if progress is not None:
+            progress(done, total, part.mesh.stem)
+
+    left = []
+    for part in parts:
+        if made(part):
+            tell(part)
+        else:
+            left.append(part)
+    if jobs <= 1 or len(left) <= 1:
+        for part in left:
+            make_part(part)
+            tell(part)
+        return
+    with ProcessPoolExecutor(min(jobs, len(left)), mp_context=get_context("spawn")) as pool:
+        waiting = {pool.submit(make_part, part): part for part in left}
+        try:
+            for finished in as_completed(waiting):
+                finished.result()
+                tell(waiting[finished])
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def make_part(part: Part) -> None:
+    """Render a part's views and keep them in its file.
+
+    Raises:
+        DatabaseError: The mesh cannot be read, or the file cannot be written.
+        ExtraMissingError: What renders meshes is not installed.
+    """
+    directions = half_sphere_directions(part.views, part.seed)[part.first : part.first + part.count]
+    new = rendered(part.mesh, directions)
+    try:
+        part.path.parent.mkdir(exist_ok=True)
+    except OSError as e:
+        raise DatabaseError(
+            f"the database cannot be written ({e.strerror})",
+            where=str(part.path.parent.parent),
+            expected="a folder that exists and can be written to",
+        ) from e
+    ModelDatabase.create(part.path, new)

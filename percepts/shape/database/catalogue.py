@@ -1,0 +1,179 @@
+"""What the code sees of a database file: its views and its shapes, made when they are asked for.
+
+A database of a hundred thousand views is a few arrays and one open file. `Views` and `Shapes` are
+sequences like any other; an element is made from its record when it is asked for, and the shapes asked
+for last are kept.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import weakref
+from collections import OrderedDict
+from collections.abc import Collection, Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from threading import Lock
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import DatabaseError
+from visup.percepts.shape.database.storage import (
+    Contents,
+    damaged,
+    open_checked,
+    read_contents,
+    read_shape,
+)
+from visup.percepts.shape.index.records import Direction, NotAsExpectedError, View, decode
+from visup.percepts.shape.matching.similarity import Shape
+
+KEPT = 4096
+"""Shapes kept in memory at most, about 20 kB each."""
+
+
+class Views(Sequence[View]):
+    """The views of a database.
+
+    Args:
+        contents: What stands in the file.
+    """
+
+    def __init__(self, contents: Contents) -> None:
+        self._contents = contents
+
+    @classmethod
+    def read(cls, path: Path) -> Views:
+        """The views of a file.
+
+        Raises:
+            DatabaseError: It is no sound model database.
+        """
+        return cls(read_contents(path))
+
+    def __len__(self) -> int:
+        return len(self._contents.views)
+
+    @overload
+    def __getitem__(self, key: int) -> View: ...
+    @overload
+    def __getitem__(self, key: slice) -> tuple[View, ...]: ...
+    def __getitem__(self, key: int | slice) -> View | tuple[View, ...]:
+        """A view by its number in the file, from 0; or some of them."""
+        if isinstance(key, slice):
+            return tuple(self._view(k) for k in range(len(self))[key])
+        return self._view(range(len(self))[key])
+
+    def __iter__(self) -> Iterator[View]:
+        return (self._view(k) for k in range(len(self)))
+
+    def _view(self, number: int) -> View:
+        row = self.records[number]
+        direction = None if np.isnan(row["direction"][0]) else _direction(row["direction"])
+        return View(
+            id=number + 1,
+            name=self.names[row["model"]],
+            number=int(row["number"]),
+            direction=direction,
+            area=None if np.isnan(row["area"]) else float(row["area"]),
+            cut=bool(row["cut"]),
+            also=self._also.get(number, ()),
+            smoothing=float(row["smoothing"]),
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the models, in the order of the file."""
+        return self._contents.names
+
+    @property
+    def records(self) -> NDArray[Any]:
+        """(V,) records of `records.VIEW`: all that is known but the shapes."""
+        return self._contents.views
+
+    @property
+    def cut(self) -> NDArray[np.bool_]:
+        """(V,) whether the picture's border cuts each silhouette."""
+        return np.asarray(self.records["cut"] > 0)
+
+    @cached_property
+    def _also(self) -> dict[int, tuple[Direction, ...]]:
+        out: dict[int, tuple[Direction, ...]] = {}
+        for row in self._contents.also:
+            number = int(row["view"])
+            out[number] = (*out.get(number, ()), _direction(row["direction"]))
+        return out
+
+    def named(self, names: Collection[str] | None) -> NDArray[np.intp]:
+        """Numbers of the views of these models, rising; of all when None."""
+        if names is None:
+            return np.arange(len(self))
+        codes = [code for code, name in enumerate(self.names) if name in names]
+        return np.flatnonzero(np.isin(self.records["model"], codes))
+
+
+def _direction(vector: NDArray[np.float64]) -> Direction:
+    x, y, z = vector.tolist()
+    return (x, y, z)
+
+
+class Shapes(Sequence[Shape]):
+    """The shapes of a database, read one by one when they are asked for. Safe in several threads.
+
+    Args:
+        path: The file.
+        views: Its views.
+    """
+
+    def __init__(self, path: Path, views: Views) -> None:
+        self._path = path
+        self._views = views
+        self._kept: OrderedDict[int, Shape] = OrderedDict()
+        self._lock = Lock()
+
+    def __len__(self) -> int:
+        return len(self._views)
+
+    @overload
+    def __getitem__(self, key: int) -> Shape: ...
+    @overload
+    def __getitem__(self, key: slice) -> tuple[Shape, ...]: ...
+    def __getitem__(self, key: int | slice) -> Shape | tuple[Shape, ...]:
+        """A shape by its view's number in the file, from 0; or some of them.
+
+        Raises:
+            DatabaseError: The file is damaged there.
+        """
+        if isinstance(key, slice):
+            return tuple(self._shape(k) for k in range(len(self))[key])
+        return self._shape(range(len(self))[key])
+
+    @cached_property
+    def _file(self) -> sqlite3.Connection:
+        file = open_checked(self._path)
+        weakref.finalize(self, file.close)
+        return file
+
+    def _shape(self, number: int) -> Shape:
+        with self._lock:
+            kept = self._kept.get(number)
+            if kept is None:
+                kept = self._kept[number] = self._read(number)
+                if len(self._kept) > KEPT:
+                    self._kept.popitem(last=False)
+            else:
+                self._kept.move_to_end(number)
+            return kept
+
+    def _read(self, number: int) -> Shape:
+        stored = read_shape(self._path, self._file, number)
+        try:
+            return decode(stored, self._views.records[number])
+        except NotAsExpectedError as e:
+            raise _damaged_shape(self._path, number, e) from e
+
+
+def _damaged_shape(path: Path, number: int, found: NotAsExpectedError) -> DatabaseError:
+    return damaged(path, f"view {number + 1} with {found}", "a rooted graph and its outline")

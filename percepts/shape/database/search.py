@@ -1,0 +1,262 @@
+"""The search: from a shape to the views that it looks like, best first.
+
+Whole shapes: the index leaves the likeliest views; their areas and outlines are compared at once, then their
+shock graphs, until no other view can do better. Shapes that the image border cuts: the views that look
+most like it once they are cut in the same way (`cuts.py`) are compared likewise, their graphs as a whole
+of which the shape is a part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.database.catalogue import Shapes, Views
+from visup.percepts.shape.index.index import Summaries, ViewIndex
+from visup.percepts.shape.index.records import View
+from visup.percepts.shape.matching.graph_matching import (
+    Match,
+    MatchWeights,
+    match_ceiling,
+    match_nodes,
+)
+from visup.percepts.shape.matching.similarity import GRAPH_SHARE, Likeness, Shape, second_looks
+from visup.percepts.shape.matching.truncated import Cut, CutIndex, query_map, what_is_left
+from visup.percepts.shape.shocks.shock_graph import ShockGraph
+from visup.percepts.shape.silhouette.areas import Overlaps
+
+CUT_SHARE = 0.95
+"""What a likeness counts for which a whole view had to be cut: where to cut is free to fit."""
+
+CUT_VIEWS = 1000
+"""Whole views that are cut for one silhouette at most; of more, those whose areas lie best on it."""
+
+_PART_WEIGHTS = MatchWeights(
+    kind=0.3, length=0.8, profile=3.5, context=0.0, signature=0.0, root=0.0
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ViewMatch:
+    """A view that a silhouette looks like.
+
+    Attributes:
+        view: The view.
+        likeness: How alike the two are, and why; pairs of nodes are (query, view, similarity).
+        cut: Where the view was cut to look like a silhouette that the image border cuts.
+    """
+
+    view: View
+    likeness: Likeness
+    cut: Cut | None = None
+
+    @property
+    def similarity(self) -> float:
+        """0 to 1."""
+        return self.likeness.similarity
+
+    @property
+    def rotation(self) -> float:
+        """In-plane rotation from view to query, radians (positive from x towards y, y down).
+
+        Of a mirrored match, the rotation from the view's left-right mirror image, which is what is seen
+        from the opposite direction.
+        """
+        return self.likeness.rotation
+
+    @property
+    def direction(self) -> tuple[float, float, float] | None:
+        """Unit vector from the object to the viewer, model frame; None when it is not known.
+
+        In parallel projection the silhouette from behind is the mirror image of the one from before,
+        so that a mirrored match tells of the opposite direction.
+        """
+        if self.view.direction is None or not self.likeness.mirrored:
+            return self.view.direction
+        x, y, z = self.view.direction
+        return (-x, -y, -z)
+
+
+@dataclass(frozen=True, slots=True)
+class Ranking:
+    """The result of a query.
+
+    Attributes:
+        matches: Best first.
+        compared: How many views were compared in full.
+    """
+
+    matches: tuple[ViewMatch, ...]
+    compared: int
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is wanted of a search.
+
+    Attributes:
+        top: How many matches.
+        per_name: How many of one model at most; any number when None.
+        threshold: Least similarity.
+        most: How many views may be compared in full.
+        mirror: Whether mirror images count.
+    """
+
+    top: int
+    per_name: int | None
+    threshold: float
+    most: int
+    mirror: bool
+
+    def best(self, found: Iterable[ViewMatch]) -> list[ViewMatch]:
+        """The best matches, no more than so many of one model."""
+        seen: dict[str, int] = {}
+        kept = []
+        for m in sorted(found, key=lambda m: (-m.similarity, m.view.id)):
+            seen[m.view.name] = seen.get(m.view.name, 0) + 1
+            within = self.per_name is None or seen[m.view.name] <= self.per_name
+            if within and m.similarity >= self.threshold:
+                kept.append(m)
+        return kept[: self.top]
+
+    def least(self, found: Sequence[ViewMatch]) -> float:
+        """What a further match must reach to change the result."""
+        return found[-1].similarity if len(found) >= self.top else self.threshold
+
+
+class Search:
+    """Searches the views of a database.
+
+    Args:
+        views: The views.
+        shapes: Their shapes.
+    """
+
+    def __init__(self, views: Views, shapes: Shapes) -> None:
+        self._views = views
+        self._shapes = shapes
+
+    @cached_property
+    def index(self) -> ViewIndex:
+        """The sieves that leave the likeliest views."""
+        rows = self._views.records
+        return ViewIndex(self._shapes, summaries=Summaries.read(rows))
+
+    @cached_property
+    def _part_index(self) -> ViewIndex:
+        return ViewIndex(self._shapes, _PART_WEIGHTS)
+
+    @cached_property
+    def _cut_index(self) -> CutIndex:
+        return CutIndex(self._shapes)
+
+    def whole(
+        self,
+        query: Shape,
+        among: NDArray[np.intp],
+        wanted: Wanted,
+        favoured: NDArray[np.intp] | None = None,
+    ) -> Ranking:
+        """The views that a shape looks like as it is.
+
+        Args:
+            query: The shape.
+            among: Numbers of the views to be searched, rising.
+            wanted: What is wanted.
+            favoured: Numbers of views of which as many are compared, whatever the index says.
+        """
+        likely = self.index.candidates(query, among, wanted.most, favoured)
+        shapes = [self._shapes[k] for k in likely.numbers]
+        looks = second_looks(query, shapes, likely.overlaps, mirror=wanted.mirror)
+        ceilings = GRAPH_SHARE * likely.bounds + looks.worth
+        found: list[ViewMatch] = []
+        for n in np.argsort(-ceilings, kind="stable"):
+            if ceilings[n] < wanted.least(found):
+                break
+            number = int(likely.numbers[n])
+            graph, root = self._shapes[number].graph, self.index.weights.root
+            ceiling = match_ceiling(query.graph, graph, likely.similar[n], root)
+            if GRAPH_SHARE * ceiling + looks.worth[n] < wanted.least(found):
+                continue
+            likeness = looks.joined(int(n), self._match(query, number, likely.similar[n]))
+            found = wanted.best([*found, ViewMatch(self._views[number], likeness)])
+        return Ranking(tuple(found), len(likely.numbers))
+
+    def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> Match:
+        """Graphs matched in their own order, so that the result does not depend on who asks."""
+        a, b = query.graph, self._shapes[number].graph
+        root = self.index.weights.root
+        if b.key < a.key:
+            return match_nodes(b, a, similar.T, root).turned()
+        return match_nodes(a, b, similar, root)
+
+    def cut(self, query: Shape, among: NDArray[np.intp], wanted: Wanted) -> Ranking:
+        """The whole views that a shape looks like which the image border cuts.
+
+        Args:
+            query: The shape; its border must be known.
+            among: Numbers of whole views to be searched, rising.
+            wanted: What is wanted.
+        """
+        border = query.border
+        if border is None or not len(among):
+            return Ranking((), 0)
+        if len(among) > CUT_VIEWS:
+            among = self.index.best_covered(query, among, CUT_VIEWS)
+        own = query_map(query.contour, border)
+        likely = self._cut_index.likeliest(own, among, wanted.most, mirror=wanted.mirror)
+        left = [_left_of(self._shapes[number], cut) for number, cut in likely]
+        looks = second_looks(query, left, _covered([c for _, c in likely], border))
+        found: list[ViewMatch] = []
+        for n in np.argsort(-looks.worth, kind="stable"):
+            if CUT_SHARE * (GRAPH_SHARE + float(looks.worth[n])) < wanted.least(found):
+                break
+            number, cut = likely[n]
+            graphs = self._part(
+                query, number, cut, wanted.least(found) / CUT_SHARE - looks.worth[n]
+            )
+            likeness = looks.joined(int(n), graphs)
+            lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
+            found = wanted.best([*found, ViewMatch(self._views[number], lowered, cut)])
+        return Ranking(tuple(found), len(likely))
+
+    def _part(self, query: Shape, number: int, cut: Cut, least: float) -> Match:
+        """The query's graph as a part of a view's, in the view's unit of length.
+
+        Where they cannot give so much to the similarity as is needed, nothing is matched.
+        """
+        graph = _scaled(query.graph, (1.0 - cut.share) ** 0.5)
+        bounds, similar = self._part_index.bounds(graph, np.array([number]), part=True)
+        if GRAPH_SHARE * bounds[0] < least:
+            return Match(0.0, ())
+        return match_nodes(graph, self._shapes[number].graph, similar[0], 0.0, part=True)
+
+
+def _left_of(whole: Shape, cut: Cut) -> Shape:
+    """What a cut leaves of a shape; its graph stays that of the whole."""
+    return replace(whole, contour=what_is_left(whole.contour, cut), cut=True)
+
+
+def _covered(cuts: Sequence[Cut], border: float) -> Overlaps:
+    """How what cuts leave lies on the silhouette: the border tells the rotation."""
+    mirrored = np.array([c.mirrored for c in cuts], dtype=bool)
+    alike = np.array([c.similarity for c in cuts])
+    bearings = np.array([c.bearing for c in cuts])
+    straight = np.angle(np.exp(1j * (border - bearings)))
+    turned = np.angle(np.exp(1j * (border + bearings - np.pi)))
+    # A cut is found for one side only: the other counts nothing.
+    similarity = np.stack([np.where(mirrored, 0.0, alike), np.where(mirrored, alike, 0.0)], axis=1)
+    return Overlaps(similarity, np.stack([straight, turned], axis=1))
+
+
+def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:
+    """The graph of the same shape in a larger unit."""
+    return replace(
+        graph,
+        lengths=graph.lengths * np.float32(scale),
+        profiles=graph.profiles * np.float32(scale),
+    )

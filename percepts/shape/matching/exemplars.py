@@ -1,0 +1,75 @@
+"""Exemplars: a few silhouettes that stand for many.
+
+The paper clusters the arm's silhouettes, one for each frame, into 4 by K-means (section 7.2). Here the
+clusters are around medoids, since shock graphs have distances but no means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.matching.graph_matching import match
+from visup.percepts.shape.matching.similarity import GRAPH_SHARE, Shape, second_looks
+from visup.percepts.shape.silhouette.areas import AreaIndex
+
+
+def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
+    """Similarities of all pairs, (N, N) float64 with ones on the diagonal."""
+    out = np.eye(len(shapes))
+    index = AreaIndex(np.stack([s.areas for s in shapes]))
+    for i, shape in enumerate(shapes):
+        looks = second_looks(shape, shapes[:i], index.overlaps(shape.areas, np.arange(i)))
+        graphs = np.array([match(shape.graph, o.graph).similarity for o in shapes[:i]])
+        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + looks.worth
+    return out
+
+
+def medoids(similarity: NDArray[np.float64], count: int) -> list[int]:
+    """The members that stand best for all: K-medoids, built greedily and then improved by swaps.
+
+    Args:
+        similarity: (N, N), symmetric.
+        count: How many exemplars; all members when there are fewer.
+
+    Returns:
+        Numbers of the exemplars, rising; the same for the same input.
+
+    Example:
+        >>> near = np.array([[1, .9, .1], [.9, 1, .1], [.1, .1, 1]])
+        >>> medoids(near, 2)
+        [0, 2]
+    """
+    size = len(similarity)
+    if count >= size:
+        return list(range(size))
+    chosen: list[int] = []
+    while len(chosen) < count:
+        rest = [k for k in range(size) if k not in chosen]
+        chosen.append(max(rest, key=lambda k: (_covered(similarity, [*chosen, k]), -k)))
+    return sorted(_improve(similarity, chosen))
+
+
+def _covered(similarity: NDArray[np.float64], chosen: list[int]) -> float:
+    """How well all members are stood for: the sum of their similarities to the nearest exemplar."""
+    return float(similarity[:, chosen].max(axis=1).sum())
+
+
+def _improve(similarity: NDArray[np.float64], chosen: list[int]) -> list[int]:
+    """Swap an exemplar for a better one until no swap helps; at most 20 rounds."""
+    best = _covered(similarity, chosen)
+    for _ in range(20):
+        swaps = [
+            [*chosen[:i], k, *chosen[i + 1 :]]
+            for i in range(len(chosen))
+            for k in range(len(similarity))
+            if k not in chosen
+        ]
+        trial = max(swaps, key=lambda s: _covered(similarity, s), default=chosen)
+        value = _covered(similarity, trial)
+        if value <= best + 1e-9:
+            return chosen
+        chosen, best = trial, value
+    return chosen

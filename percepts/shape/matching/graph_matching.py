@@ -1,0 +1,187 @@
+"""Matching two shock graphs: which part of one is which part of the other.
+
+After figure 3 of the paper (Shokoufandeh et al. 2005): every node of the one graph is compared with every
+node of the other, by what it looks like and by its topological signature; a maximum-cardinality,
+best-weight bipartite matching is found; its best pair is taken for true; the graphs are split at that
+pair, so that what hangs below one node should match what hangs below the other; and so on. Where two
+limbs are about as thick, noise decides which of them hangs below the other. Therefore, other than in the
+paper, a pair that contradicts a better one is not forbidden, it is worth less.
+
+Node features are embedded such that the similarity of two nodes is exp(-|a - b|^2): one matrix product
+compares a silhouette with a whole database.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from visup.percepts.shape.shocks.shock_graph import ShockGraph
+
+BREAK = 0.9
+"""What a pair is worth that contradicts the hierarchy of a better one, for each such one."""
+
+
+@dataclass(frozen=True, slots=True)
+class MatchWeights:
+    """How much each feature of a node counts when two nodes are compared.
+
+    Attributes:
+        kind: Different kinds of shock.
+        length: Square root of the length along the skeleton.
+        profile: Square roots of the radii along the node.
+        context: What the shape looks like from the node.
+        signature: Topology of what hangs below.
+        root: Share of the similarity that the root has: the shape as a whole.
+    """
+
+    kind: float = 0.15
+    length: float = 0.25
+    profile: float = 3.0
+    context: float = 1.9
+    signature: float = 0.05
+    root: float = 0.15
+
+
+WEIGHTS = MatchWeights()
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """What two graphs have in common.
+
+    Attributes:
+        similarity: 0 to 1; 1 for equal graphs.
+        pairs: (node of the first, node of the second, similarity of the two) in the order found.
+    """
+
+    similarity: float
+    pairs: tuple[tuple[int, int, float], ...]
+
+    def turned(self) -> Match:
+        """The same with the graphs exchanged."""
+        return Match(self.similarity, tuple((v, u, s) for u, v, s in self.pairs))
+
+
+def embed(graph: ShockGraph, weights: MatchWeights = WEIGHTS) -> NDArray[np.float32]:
+    """Nodes as points: their similarity is exp(-squared distance).
+
+    Returns:
+        (N, D) float32.
+    """
+    kind = np.eye(5, dtype=np.float32)[graph.kinds] * weights.kind
+    length = np.sqrt(graph.lengths)[:, None] * weights.length
+    scale = weights.profile / graph.profiles.shape[1] ** 0.5
+    profile = np.sqrt(graph.profiles) * scale
+    context = np.sqrt(graph.contexts) * weights.context
+    signature = graph.signatures * weights.signature
+    return np.hstack([kind, length, profile, context, signature]).astype(np.float32)
+
+
+def node_similarities(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Similarity of every node of one embedding with every node of another; (N, M) in (0, 1]."""
+    squares = (a**2).sum(axis=1)[:, None] - 2 * (a @ b.T) + (b**2).sum(axis=1)[None]
+    return np.asarray(np.exp(-np.maximum(squares, 0.0)), dtype=np.float32)
+
+
+def match(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) -> Match:
+    """Match two graphs.
+
+    Args:
+        a: The first graph.
+        b: The second graph.
+        weights: How much each feature counts.
+
+    Returns:
+        The similarity, the same whichever comes first, and the corresponding nodes.
+    """
+    if b.key < a.key:
+        return match(b, a, weights).turned()
+    similar = node_similarities(embed(a, weights), embed(b, weights))
+    return match_nodes(a, b, similar, weights.root)
+
+
+def match_nodes(
+    a: ShockGraph,
+    b: ShockGraph,
+    similar: NDArray[np.float32],
+    root: float,
+    *,
+    part: bool = False,
+) -> Match:
+    """Match two graphs whose nodes are compared already.
+
+    Args:
+        a: The first graph, N nodes.
+        b: The second graph, M nodes.
+        similar: (N, M), similarity of each pair of nodes.
+        root: Share of the similarity that the root has.
+        part: Whether the first is a part only; nodes of the second without a partner then cost nothing.
+
+    Returns:
+        The match. Each pair counts by the mean of its two nodes' shares of the area, or by the first's
+        when it is a part.
+    """
+    theirs = a.weights[:, None] if part else b.weights[None]
+    shares = 0.5 * (a.weights[:, None] + theirs) * similar
+    pairs = correspond(a.below, b.below, shares)
+    whole = float(similar[0, 0])
+    total = sum(worth for _, _, worth in pairs)
+    found = ((0, 0, whole), *((u, v, float(similar[u, v])) for u, v, _ in pairs))
+    return Match(min(1.0, root * whole + (1 - root) * total), found)
+
+
+def match_ceiling(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> float:
+    """What the similarity of `match_nodes` cannot exceed: the best matching, whatever hangs below what.
+
+    Args:
+        a: The first graph, N nodes.
+        b: The second graph, M nodes.
+        similar: (N, M), similarity of each pair of nodes.
+        root: Share of the similarity that the root has.
+    """
+    worth = (0.5 * (a.weights[:, None] + b.weights[None]) * similar)[1:, 1:]
+    rows, columns = linear_sum_assignment(worth, maximize=True)
+    return float(root * similar[0, 0] + (1 - root) * worth[rows, columns].sum())
+
+
+def correspond(
+    below_a: NDArray[np.bool_], below_b: NDArray[np.bool_], value: NDArray[np.floating]
+) -> list[tuple[int, int, float]]:
+    """Corresponding nodes by recursive bipartite matching; roots (node 0) are left out.
+
+    The best pair of a best matching is taken for true; every pair that contradicts it, one node below
+    its node and the other not, is from then on worth `BREAK` of what it was; and so on with what is
+    left. The matching is solved anew only when a pair of it has lost: what is left of a best matching
+    whose pairs keep their worth is a best matching of what is left.
+
+    Args:
+        below_a: (N, N) bool, row u marks u and its descendants.
+        below_b: (M, M) bool, the same for the second graph.
+        value: (N, M), worth of each pair, 0 or more.
+
+    Returns:
+        Pairs of nodes with what they are worth in the end, in the order found.
+    """
+    left = np.array(value, dtype=np.float64)[1:, 1:]
+    rows, columns = linear_sum_assignment(left, maximize=True)
+    pairs: list[tuple[int, int, float]] = []
+    while len(rows):
+        worth = left[rows, columns]
+        best = int(np.argmax(worth))
+        u, v = int(rows[best]) + 1, int(columns[best]) + 1
+        if worth[best] <= 0.0:
+            break
+        pairs.append((u, v, float(worth[best])))
+        broken = below_a[u, 1:, None] != below_b[v, None, 1:]
+        broken |= below_a[1:, u, None] != below_b[None, 1:, v]
+        left[broken] *= BREAK
+        left[u - 1, :] = left[:, v - 1] = 0.0
+        others = np.arange(len(rows)) != best
+        rows, columns = rows[others], columns[others]
+        if broken[rows, columns].any():
+            rows, columns = linear_sum_assignment(left, maximize=True)
+    return pairs

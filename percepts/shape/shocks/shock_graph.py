@@ -1,0 +1,306 @@
+"""Shock graphs: a silhouette as a rooted graph of parts, from the thickest to the thinnest.
+
+After Siddiqi et al. (1999): every shock is a node; where two meet, the one of the greater radius (the
+one that formed later as the fire burned inwards) is the parent. A symbolic root stands above the
+shocks that have no parent. The grammar that follows: seeds hang only below the root; necks are leaves;
+a bend or protrusion has at most two parents, one for each of its ends. Each node carries what it
+looks like (radii along it, length) and what the shape looks like from it, so that nodes can be
+compared without looking at edges.
+
+Read next: `signature.py`, then `match.py`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.shocks.context import (
+    Places,
+    SkeletonTree,
+    directed_contexts,
+    whole_context,
+)
+from visup.percepts.shape.shocks.shocks import Kind, label_branch
+from visup.percepts.shape.shocks.signature import descendants
+from visup.percepts.shape.shocks.signature import signatures as topological_signatures
+from visup.percepts.shape.shocks.skeleton import Skeleton, skeletonise
+from visup.percepts.shape.silhouette.silhouette import Silhouette
+
+PROFILE = 8
+"""Radii sampled along each node."""
+
+MOST_NODES = 120
+"""Nodes kept; a silhouette with more significant parts than this loses its smallest ones."""
+
+POINT_LENGTH = 0.05
+"""Length that every node counts beyond its own, so that necks and seeds count too; units."""
+
+OUTLOOK = 0.15
+"""Length of skeleton to both sides of a node's middle that tells its direction; units."""
+
+AREA_STEP = 1 / 25
+"""Distance between the points at which the area is sampled, units."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShockGraph:
+    """A shape as a rooted directed acyclic graph; node 0 is the root, parents come before children.
+
+    Lengths are in units of the square root of the silhouette's area, about its centroid, y down.
+
+    Attributes:
+        kinds: (N,) int8, `Kind` of each node.
+        edges: (M, 2) int16, (parent, child), sorted.
+        weights: (N,) float32, share of the skeleton's length that each node stands for, every node a
+            little longer than it is; they sum to 1, and the root's is 0.
+        lengths: (N,) float32, length along the skeleton; 0 for necks, seeds and the root.
+        profiles: (N, PROFILE) float32, radius from the node's thicker end to its thinner.
+        contexts: (N, CONTEXT) float32, how much of the shape lies how far and in which direction from
+            the node, see `context.py`; rows but the root's sum to 1.
+        positions: (N, 2) float32, (x, y) of the node's middle.
+        directions: (N, 2) float32, unit vector along the node at its middle, away from the greater
+            part of the shape; 0 for points.
+        signatures: (N, signature.LENGTH) float32, topological signature vectors.
+        below: (N, N) bool, row u marks u and its descendants.
+        key: Digest of the content; orders graphs where an order must not depend on the caller.
+    """
+
+    kinds: NDArray[np.int8]
+    edges: NDArray[np.int16]
+    weights: NDArray[np.float32]
+    lengths: NDArray[np.float32]
+    profiles: NDArray[np.float32]
+    contexts: NDArray[np.float32]
+    positions: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    signatures: NDArray[np.float32]
+    below: NDArray[np.bool_]
+    key: bytes
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A shock and where it lies: on which branch, between which offsets, thicker end first."""
+
+    kind: Kind
+    branch: int
+    thick: float
+    thin: float
+    ends: tuple[int, int]
+    """Skeleton points of both ends, the same for a neck or seed."""
+    mean: float
+    """Mean radius."""
+
+    @property
+    def length(self) -> float:
+        return abs(self.thin - self.thick)
+
+
+def shock_graph(silhouette: Silhouette) -> ShockGraph:
+    """The shock graph of a silhouette.
+
+    Args:
+        silhouette: In normal form.
+
+    Returns:
+        A graph of at least two nodes, the root and one shock.
+
+    Example:
+        >>> from visup.percepts.shape.silhouette.silhouette import normalise
+        >>> y, x = np.mgrid[-40:41, -40:41]
+        >>> disc = shock_graph(normalise(np.hypot(x, y) < 30))
+        >>> [Kind(k).name for k in disc.kinds]
+        ['ROOT', 'SEED']
+        >>> ellipse = shock_graph(normalise(np.hypot(x, 2 * y) < 36))
+        >>> [Kind(k).name for k in ellipse.kinds]
+        ['ROOT', 'SEED', 'PROTRUSION', 'PROTRUSION']
+        >>> ellipse.edges.tolist()
+        [[0, 1], [1, 2], [1, 3]]
+    """
+    skeleton = skeletonise(silhouette.contour)
+    tree = SkeletonTree(skeleton)
+    parts, links = _parts_and_links(skeleton, tree)
+    return _assemble(silhouette, tree, *_ordered(parts, links))
+
+
+def _parts_and_links(
+    skeleton: Skeleton, tree: SkeletonTree
+) -> tuple[list[_Part], list[tuple[int, int]]]:
+    """Shocks of the whole skeleton and (parent, child) pairs between them, without the root."""
+    if not skeleton.branches:
+        return [_Part(Kind.SEED, 0, 0.0, 0.0, (0, 0), float(skeleton.radii[0]))], []
+    parts: list[_Part] = []
+    meets: dict[int, list[int]] = {}
+    for number, branch in enumerate(skeleton.branches):
+        for part in _parts_of_branch(skeleton, branch, number, tree.offsets(number)):
+            for end in dict.fromkeys(part.ends):
+                meets.setdefault(end, []).append(len(parts))
+            parts.append(part)
+    links: list[tuple[int, int]] = []
+    for point in sorted(meets):
+        links.extend(_link(point, meets[point], parts))
+    return parts, links
+
+
+def _parts_of_branch(
+    skeleton: Skeleton, branch: NDArray[np.intp], number: int, along: NDArray[np.float64]
+) -> list[_Part]:
+    radii = skeleton.radii[branch]
+    parts = []
+    for shock in label_branch(radii, along):
+        a, b = shock.start, shock.stop
+        thick, thin = (a, b) if radii[a] >= radii[b] else (b, a)
+        ends = (int(branch[thick]), int(branch[thin]))
+        mean = float(radii[a : b + 1].mean())
+        parts.append(_Part(shock.kind, number, float(along[thick]), float(along[thin]), ends, mean))
+    return parts
+
+
+def _link(point: int, meeting: Sequence[int], parts: list[_Part]) -> list[tuple[int, int]]:
+    """Parent and children among the parts that meet at one skeleton point."""
+    spots = [p for p in meeting if parts[p].kind in (Kind.NECK, Kind.SEED)]
+    runs = [p for p in meeting if p not in spots]
+    if spots:
+        node = spots[0]
+        is_seed = parts[node].kind is Kind.SEED
+        return [(node, r) if is_seed else (r, node) for r in runs]
+    if all(parts[r].kind is Kind.PROTRUSION and parts[r].ends[0] == point for r in runs):
+        first = parts[runs[0]]
+        at, radius = first.thick, max(parts[r].mean for r in runs)
+        parts.append(_Part(Kind.SEED, first.branch, at, at, (point, point), radius))
+        return [(len(parts) - 1, r) for r in runs]
+    if len(runs) < 2:
+        return []
+    parent = runs[int(np.argmax([parts[r].mean for r in runs]))]
+    return [(parent, r) for r in runs if r != parent]
+
+
+def _ordered(
+    parts: list[_Part], links: list[tuple[int, int]]
+) -> tuple[list[_Part], NDArray[np.int16]]:
+    """Parts in the order of their node numbers, and all edges, those from the root among them."""
+    order = _order(parts, links)
+    number = {p: n + 1 for n, p in enumerate(order)}
+    pairs = [(number[a], number[b]) for a, b in links if a in number and b in number]
+    headless = set(number.values()) - {b for _, b in pairs}
+    edges = sorted(pairs + [(0, n) for n in headless])
+    return [parts[p] for p in order], np.array(edges, dtype=np.int16).reshape(-1, 2)
+
+
+def _order(parts: list[_Part], links: list[tuple[int, int]]) -> list[int]:
+    """Part numbers, parents before children, longer first; the shortest dropped when too many."""
+    lengths = np.array([p.length for p in parts])
+    kept = set(np.argsort(-lengths, kind="stable")[:MOST_NODES].tolist())
+    waiting = {p: {a for a, b in links if b == p and a in kept} for p in kept}
+    order: list[int] = []
+    while waiting:
+        free = [p for p, parents in waiting.items() if not parents]
+        best = max(free, key=lambda p: (lengths[p], -p))
+        order.append(best)
+        del waiting[best]
+        for parents in waiting.values():
+            parents.discard(best)
+    return order
+
+
+def _assemble(
+    silhouette: Silhouette, tree: SkeletonTree, parts: list[_Part], edges: NDArray[np.int16]
+) -> ShockGraph:
+    """Measure the nodes and freeze the arrays."""
+    branch = np.array([p.branch for p in parts])
+    thick, thin = np.array([(p.thick, p.thin) for p in parts]).T
+    middle = Places(branch, 0.5 * (thick + thin))
+    positions = tree.points_at(branch, middle.offset)
+    area = _sample_area(silhouette)
+    homes, thickness = _explain_area(area, tree)
+    ways, onwards = tree.ways(middle, homes)
+    directions = _directions(tree, middle, np.abs(thick - thin), onwards.mean(axis=1))
+    contexts = directed_contexts(area, thickness, ways, positions, directions)
+    at = thick[:, None] + (thin - thick)[:, None] * np.linspace(0.0, 1.0, PROFILE)
+    lengths = np.concatenate([[0.0], np.abs(thick - thin)])
+    counted = np.concatenate([[0.0], lengths[1:] + POINT_LENGTH])
+    profiles = [np.full(PROFILE, tree.radii.max()), tree.radii_at(branch[:, None], at)]
+    return frozen_graph(
+        kinds=np.array([0, *(int(p.kind) for p in parts)], dtype=np.int8),
+        edges=edges,
+        weights=(counted / counted.sum()).astype(np.float32),
+        lengths=lengths.astype(np.float32),
+        profiles=np.vstack(profiles).astype(np.float32),
+        contexts=np.vstack([whole_context(area), contexts]).astype(np.float32),
+        positions=np.vstack([np.zeros(2), positions]).astype(np.float32),
+        directions=np.vstack([np.zeros(2), directions]).astype(np.float32),
+    )
+
+
+def _directions(
+    tree: SkeletonTree,
+    middle: Places,
+    lengths: NDArray[np.float64],
+    onwards: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Unit vectors (N, 2) along the nodes, away from the greater part of the shape.
+
+    Args:
+        tree: The skeleton.
+        middle: The nodes' middles.
+        lengths: (N,) lengths of the nodes.
+        onwards: (N,) share of the area that lies towards the end of each node's branch.
+    """
+    reach = np.minimum(OUTLOOK, 0.5 * lengths)
+    forth = tree.points_at(middle.branch, middle.offset + reach)
+    way = forth - tree.points_at(middle.branch, middle.offset - reach)
+    way *= np.where(onwards > 0.5, -1.0, 1.0)[:, None]
+    length = np.hypot(*way.T)[:, None]
+    return np.where(length > 1e-9, way / np.maximum(length, 1e-9), 0.0)
+
+
+def frozen_graph(
+    *,
+    kinds: NDArray[np.int8],
+    edges: NDArray[np.int16],
+    weights: NDArray[np.float32],
+    lengths: NDArray[np.float32],
+    profiles: NDArray[np.float32],
+    contexts: NDArray[np.float32],
+    positions: NDArray[np.float32],
+    directions: NDArray[np.float32],
+    signatures: NDArray[np.float32] | None = None,
+) -> ShockGraph:
+    """A graph from its stored arrays; what follows from them is computed. See `ShockGraph`."""
+    digest = hashlib.blake2b(digest_size=12)
+    for array in (kinds, edges, weights, profiles, contexts, positions):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    size = len(kinds)
+    arrays = (kinds, edges, weights, lengths, profiles, contexts, positions, directions)
+    vectors = topological_signatures(edges, size) if signatures is None else signatures
+    return ShockGraph(*arrays, vectors, descendants(edges, size), digest.digest())
+
+
+def _sample_area(silhouette: Silhouette) -> NDArray[np.float64]:
+    """Some hundred points (P, 2) evenly spread over the silhouette's inside."""
+    low = silhouette.contour.min(axis=0) - AREA_STEP
+    grid = np.round((silhouette.contour - low) / AREA_STEP * 16).astype(np.int32)
+    extent = np.ceil(np.ptp(silhouette.contour, axis=0) / AREA_STEP).astype(int) + 3
+    canvas = np.zeros((extent[1], extent[0]), dtype=np.uint8)
+    cv2.fillPoly(canvas, [grid], 1, lineType=cv2.LINE_8, shift=4)
+    rows, columns = np.nonzero(canvas)
+    return np.asarray(np.stack([columns, rows], axis=1) * AREA_STEP + low, dtype=np.float64)
+
+
+def _explain_area(
+    area: NDArray[np.float64], tree: SkeletonTree
+) -> tuple[Places, NDArray[np.float64]]:
+    """The place on the skeleton whose disc holds each point of the area deepest, and its radius."""
+    power = -2 * area @ tree.points.T
+    power += (tree.points**2).sum(axis=1) - tree.radii**2
+    best = power.argmin(axis=1)
+    return Places(tree.places.branch[best], tree.places.offset[best]), tree.radii[best]

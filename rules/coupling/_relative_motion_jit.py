@@ -1,0 +1,76 @@
+"""How fast places on a path go on, compiled; see `joint.py`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from visup.compiled import compiled
+from visup.rules.geometry.hysteresis import Floats
+
+
+@compiled
+def recent_of(path: Floats, now: float, window: float, least: int) -> int:
+    """Number of the first place on a path that tells how it goes on now.
+
+    Args:
+        path: (N, 6); see `course`.
+        now: Seconds.
+        window: Over how long, seconds; longer where gaps leave too few places within.
+        least: Fewest places.
+    """
+    count = len(path)
+    inside = long = 0
+    for n in range(count):
+        inside += path[n, 0] > now - window - 1e-6
+        long += path[n, 0] > path[count - 1, 0] - 0.6 * window + 1e-6
+    return max(0, count - max(inside, long + 1, least))
+
+
+@compiled
+def course(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floats]:
+    """The slope of places, joined with the mean of velocities, each by its precision.
+
+    Args:
+        path: (N, 6) of time, place (x, y), velocity (x, y) and the variance of that; see `Joint.path`.
+        begin: The first place that counts; those before tell of noise alone.
+        lasts: Errors of velocities are alike for so long, seconds.
+
+    Returns:
+        (2,) velocity and (2, 2) its covariance.
+    """
+    count = len(path)
+    # Neighbouring places differ by noise alone, however the bodies move; the rest of the noise lasts
+    # longer, and is believed to be as large.
+    xx = xy = yy = 0.0
+    for n in range(count - 1):
+        dx, dy = path[n + 1, 1] - path[n, 1], path[n + 1, 2] - path[n, 2]
+        xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
+    steps = max(count - 1, 1)
+    xx, xy, yy = xx / steps + 1e-4, xy / steps, yy / steps + 1e-4
+    middle = 0.0
+    for n in range(begin, count):
+        middle += path[n, 0]
+    middle /= count - begin
+    lever = sx = sy = 0.0
+    for n in range(begin, count):
+        t = path[n, 0] - middle
+        lever, sx, sy = lever + t * t, sx + t * path[n, 1], sy + t * path[n, 2]
+    lever = max(lever, 1e-9)
+    sx, sy, xx, xy, yy = sx / lever, sy / lever, xx / lever, xy / lever, yy / lever
+    vx = vy = variance = 0.0
+    known = 0
+    for n in range(begin, count):
+        if np.isfinite(path[n, 5]):
+            vx, vy, variance = vx + path[n, 3], vy + path[n, 4], variance + path[n, 5]
+            known += 1
+    if not known:
+        return np.array((sx, sy)), np.array(((xx, xy), (xy, yy)))
+    vx, vy, variance = vx / known, vy / known, variance / known
+    sure = max(1.0, (path[count - 1, 0] - path[begin, 0]) / lasts) / variance
+    determinant = xx * yy - xy * xy
+    px, pxy, py = yy / determinant, -xy / determinant, xx / determinant
+    bx, by = px * sx + pxy * sy + sure * vx, pxy * sx + py * sy + sure * vy
+    px, py = px + sure, py + sure
+    determinant = px * py - pxy * pxy
+    xx, xy, yy = py / determinant, -pxy / determinant, px / determinant
+    return np.array((xx * bx + xy * by, xy * bx + yy * by)), np.array(((xx, xy), (xy, yy)))

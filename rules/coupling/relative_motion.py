@@ -1,0 +1,262 @@
+"""How two bodies that meet move relative to each other: by their outlines, and by image motion.
+
+The velocities that the segmenter reports are used where there are any; outlines always. Each outline
+is kept as it was when the two came near, and laid upon every later one: points are moved along their
+normals until they lie on it (iterated closest points, Chen and Medioni 1992, translation alone,
+robust). Hundreds of points say more than the few by which a body reaches furthest, errors of single
+stretches hardly count, and what is wrong with the kept outline is wrong in the same way each time, so
+that it does not look like motion. Once both are seen as one region, both kept outlines are laid upon
+that.
+
+Points at the image border, and those beside the other body, where the outline ends because the
+other begins, have no say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+from math import log
+
+import numpy as np
+
+from visup.agent import Region
+from visup.agent.model.fast_replace import replace
+from visup.rules.coupling._relative_motion_jit import course, recent_of
+from visup.rules.geometry._outlines_jit import beside, boxes_of, evenly, laid
+from visup.rules.geometry.outlines import EVEN_POINTS, ready
+from visup.rules.geometry.regions import Floats
+
+REACH = 12.0
+"""How far a point may be from the outline on which it is laid, pixels."""
+
+BESIDE = 6.0
+"""How near the other body an outline is not trusted, pixels."""
+
+LEAST_SIGMA = 0.3
+"""No velocity in the image is believed to be known better, pixels per second."""
+
+LASTS_S = 0.2
+"""Errors of velocities are alike for so long, seconds."""
+
+LEAST_POINTS = 12
+LEAST_PLACES = 5
+_WILD = 1.5  # pixels beyond which a point counts less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """Points of an outline that say how a body moves.
+
+    Attributes:
+        points: (N, 2) pixels.
+        normals: (N, 2) unit vectors across the outline.
+        shift: (x, y) by which the body has moved since, pixels.
+    """
+
+    points: Floats
+    normals: Floats
+    shift: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """What is remembered of two bodies that are near each other.
+
+    Attributes:
+        first: Outline of the one, and
+        second: of the other.
+        since: Seconds when they were kept.
+        before: Relative shift up to then, pixels.
+        path: (time, x, y, vx, vy, variance): how far the second had moved relative to the first,
+            pixels, and how fast it did by image motion, pixels per second; NaN where unknown. Oldest
+            first.
+    """
+
+    first: Kept
+    second: Kept
+    since: float
+    before: tuple[float, float] = (0.0, 0.0)
+    path: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def path_end(self) -> float:
+        """Seconds of the last sight of both."""
+        return self.path[-1][0] if self.path else self.since
+
+
+def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]) -> Kept | None:
+    """The points of a region's outline that can be followed, or None when there are too few.
+
+    Args:
+        region: The region.
+        others: Bodies near it.
+        size: (width, height) of the image, pixels.
+    """
+    points = evenly(ready(region).points, EVEN_POINTS)
+    tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    length = np.linalg.norm(tangent, axis=1)
+    normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
+    x, y = points.T
+    free = (x > 3) & (y > 3) & (x < size[0] - 4) & (y < size[1] - 4) & (length > 0)
+    for other in others:
+        near = ready(other)
+        free &= ~beside(points, near.points, near.boxes, BESIDE)
+    return Kept(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """An outline upon which kept ones are laid.
+
+    Attributes:
+        points: (M, 2) pixels; points no further apart than a few pixels.
+        boxes: Of their runs; see `outline_loops.py`.
+    """
+
+    points: Floats
+    boxes: Floats
+
+    @classmethod
+    def of(cls, points: Floats) -> Target:
+        """The target with these points."""
+        return cls(points, boxes_of(points))
+
+
+def target_of(region: Region) -> Target:
+    """The outline of a region as a target; one region is the target of several pairs."""
+    made = ready(region)
+    return Target(made.even, made.even_boxes)
+
+
+def laid_upon(kept: Kept, target: Target) -> Kept | None:
+    """A kept outline moved onto a later one.
+
+    Args:
+        kept: The outline, with its shift so far.
+        target: The later outline.
+
+    Returns:
+        The same with the new shift; None when too little of it finds its place, or when it has but one
+        direction.
+    """
+    limits = REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _WILD
+    found, x, y = laid(kept.points, kept.normals, kept.shift, target.points, target.boxes, limits)
+    return Kept(kept.points, kept.normals, (x, y)) if found else None
+
+
+def follow(
+    joint: Joint | None,
+    regions: tuple[Region, Region],
+    now: float,
+    size: tuple[int, int],
+    *,
+    lasts_s: float,
+    anew_s: float,
+) -> Joint | None:
+    """What is known of two bodies after another sight of them.
+
+    Args:
+        joint: What was known.
+        regions: Of the first and the second; twice the same when they are one region.
+        now: Seconds.
+        size: (width, height) of the image, pixels.
+        lasts_s: How far back the path is kept.
+        anew_s: Outlines older than this are kept anew, as bodies turn.
+
+    Returns:
+        The same with a further place on its path; None when the two cannot be followed.
+    """
+    apart = regions[0] is not regions[1]
+    if joint is None:
+        return begun(regions, now, size) if apart else None
+    first = laid_upon(joint.first, target_of(regions[0]))
+    second = laid_upon(joint.second, target_of(regions[1]))
+    if first is None or second is None:
+        return begun(regions, now, size) if apart else replace(joint, path=())
+    x, y = (b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True))
+    place = (now, x, y, *_image_motion(regions))
+    path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
+    if apart and now - joint.since > anew_s:
+        fresh = begun(regions, now, size)
+        if fresh is not None:
+            return replace(fresh, before=(x, y), path=path)
+    return replace(joint, first=first, second=second, path=path)
+
+
+def begun(regions: tuple[Region, Region], now: float, size: tuple[int, int]) -> Joint | None:
+    """Two bodies followed from now on; None when too little of them is in the clear."""
+    first = kept_outline(regions[0], regions[1:], size)
+    second = kept_outline(regions[1], regions[:1], size)
+    if first is None or second is None:
+        return None
+    return Joint(first, second, now, path=((now, 0.0, 0.0, *_image_motion(regions)),))
+
+
+def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
+    """Relative velocity as the segmenter reports it, and the variance of each component."""
+    a, b = regions
+    if a is b or a.velocity_sigma <= 0.0 or b.velocity_sigma <= 0.0:
+        return (np.nan, np.nan, np.nan)
+    variance = max(a.velocity_sigma, LEAST_SIGMA) ** 2 + max(b.velocity_sigma, LEAST_SIGMA) ** 2
+    return b.velocity[0] - a.velocity[0], b.velocity[1] - a.velocity[1], variance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A relative velocity.
+
+    Attributes:
+        velocity: (2,) pixels per second.
+        covariance: (2, 2) of it.
+        span: Seconds over which it was taken.
+    """
+
+    velocity: Floats
+    covariance: Floats
+    span: float
+
+    def rest_odds(self, still: float, moving: float) -> float:
+        """Logarithm of the odds of rest against motion that this velocity tells.
+
+        Args:
+            still: Relative speed that still is rest, pixels per second.
+            moving: Usual relative speed of bodies that are not at rest. In a direction in which
+                velocity is hardly known, as that of a long arm along itself, nothing is told.
+
+        Returns:
+            At most what the ratio of both speeds allows; no bound below.
+        """
+        (xx, xy), (_, yy) = self.covariance.tolist()
+        vx, vy = self.velocity.tolist()
+
+        def told(variance: float) -> tuple[float, float]:
+            """Determinant of the covariance with more variance, and the velocity's distance by it."""
+            a, c = xx + variance, yy + variance
+            determinant = a * c - xy * xy
+            return determinant, (c * vx * vx - 2.0 * xy * vx * vy + a * vy * vy) / determinant
+
+        (rest, rests), (free, moves) = told(0.5 * still**2), told(moving**2)
+        return 0.5 * (log(free / rest) - (rests - moves))
+
+
+def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
+    """How two bodies move relative to each other.
+
+    Args:
+        joint: What is known of them.
+        now: Seconds.
+        window_s: Over how long; longer where gaps leave too few places within.
+
+    Returns:
+        The motion up to now; None while too little is known.
+    """
+    if len(joint.path) <= LEAST_PLACES:
+        return None
+    places = np.fromiter(chain.from_iterable(joint.path), float, 6 * len(joint.path)).reshape(-1, 6)
+    begin = recent_of(places, now, window_s, LEAST_PLACES)
+    span = float(places[-1, 0] - places[begin, 0])
+    if span < 0.6 * window_s - 1e-6:
+        return None
+    return Motion(*course(places, begin, LASTS_S), span)

@@ -1,0 +1,319 @@
+"""The tree of a rule file: frozen nodes that print themselves back as source."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from visup.agent import Severity
+from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.units import Number, Span, Unit
+
+ZERO = Number(0.0, Unit.S)
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """`[2 s .. 5 s]`: a stretch of time, counted from now into the past or into the future."""
+
+    low: Number
+    high: Number
+
+    def __str__(self) -> str:
+        return f"[{self.high}]" if self.low == ZERO else f"[{self.low} .. {self.high}]"
+
+
+@dataclass(frozen=True, slots=True)
+class Predicate:
+    """`converging(a, b)`: a relation or a fact."""
+
+    name: str
+    words: tuple[str, ...]
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.name}({', '.join(self.words)})"
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """`gap(a, b) < 20 px`; with `leave 25 px`, once true it ends only there (hysteresis)."""
+
+    left: Term
+    operator: str
+    right: Term
+    leave: Number | None = None
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        leave = "" if self.leave is None else f" leave {self.leave}"
+        return f"{self.left} {self.operator} {self.right}{leave}"
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """`not f`."""
+
+    part: Formula
+
+    def __str__(self) -> str:
+        return f"not {_wrapped(self.part, *_LOOSER)}"
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    """`f and g`."""
+
+    parts: tuple[Formula, ...]
+
+    def __str__(self) -> str:
+        return " and ".join(_wrapped(p, And, Or) for p in self.parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    """`f or g`."""
+
+    parts: tuple[Formula, ...]
+
+    def __str__(self) -> str:
+        return " or ".join(_wrapped(p, Or) for p in self.parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """`always f`, `once f`: so far; `f for 2 s`, `f within 2 s`: in a window that ends now.
+
+    Attributes:
+        kind: 'always' or 'once'.
+        part: Of what.
+        window: The window, or None for all that was watched.
+    """
+
+    kind: str
+    part: Formula
+    window: Window | None = None
+
+    def __str__(self) -> str:
+        if self.window is None:
+            return f"{self.kind} {_wrapped(self.part, *_LOOSER)}"
+        word = "for" if self.kind == "always" else "within"
+        low, high = self.window.low, self.window.high
+        span = f"{high}" if low == ZERO else f"{low} to {high} ago"
+        return f"{_wrapped(self.part, *_LOOSER, *_PREFIXED)} {word} {span}"
+
+
+@dataclass(frozen=True, slots=True)
+class Future:
+    """`eventually[5 s] f`, `henceforth[5 s] f`: in a window that begins now; told when it is over."""
+
+    kind: str
+    part: Formula
+    window: Window | None
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.kind}{self.window or ''} {_wrapped(self.part, *_LOOSER)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """`f since g`: g was true, and f has been ever after; with a window, g was so in it."""
+
+    left: Formula
+    right: Formula
+    window: Window | None = None
+
+    def __str__(self) -> str:
+        left, right = (_wrapped(p, *_LOOSER) for p in (self.left, self.right))
+        return f"{left} since{self.window or ''} {right}"
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """`f until[5 s] g`: g will be true within 5 s, and f is up to then; told 5 s late."""
+
+    left: Formula
+    right: Formula
+    window: Window | None
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        left, right = (_wrapped(p, *_LOOSER) for p in (self.left, self.right))
+        return f"{left} until{self.window or ''} {right}"
+
+
+@dataclass(frozen=True, slots=True)
+class Often:
+    """`f in 60 % of 2 s`: in at least that share of the time; `f in 3 of 5 samples`: in as many."""
+
+    part: Formula
+    least: Number
+    of: Number
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    @property
+    def counts_samples(self) -> bool:
+        """Whether samples are counted, and not time."""
+        return self.of.unit is Unit.NONE
+
+    def __str__(self) -> str:
+        samples = " samples" if self.counts_samples else ""
+        part = _wrapped(self.part, *_LOOSER, *_PREFIXED)
+        return f"{part} in {self.least} of {self.of}{samples}"
+
+
+@dataclass(frozen=True, slots=True)
+class Last:
+    """`last(f, 0.5 s)`: as it was when last known, while that is at most so old."""
+
+    part: Formula
+    duration: Number
+
+    def __str__(self) -> str:
+        return f"last({self.part}, {self.duration})"
+
+
+@dataclass(frozen=True, slots=True)
+class Quantified:
+    """`exists b: f`, `forall b: f`: of some, of all other objects.
+
+    Attributes:
+        kind: 'exists' or 'forall'.
+        variable: Name that the objects have in `part`.
+        part: What is true of them.
+        may_repeat: Whether objects that stand for other variables count too.
+    """
+
+    kind: str
+    variable: str
+    part: Formula
+    may_repeat: bool = False
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        repeat = " may repeat" if self.may_repeat else ""
+        return f"{self.kind} {self.variable}{repeat}: {_wrapped(self.part, *_LOOSER)}"
+
+
+Formula = (
+    Predicate
+    | Comparison
+    | Not
+    | And
+    | Or
+    | Past
+    | Future
+    | Since
+    | Until
+    | Often
+    | Last
+    | Quantified
+)
+Node = Formula | Term
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One rule.
+
+    Attributes:
+        name: Also the kind of its concerns.
+        variables: Names of its objects; distinct objects but for those of `may_repeat`.
+        severity: How grave its concerns are.
+        when: What must be true.
+        say: The sentence, with `{a}` for objects and `{is}` for the verb.
+        unless: What must not be true, or None.
+        hold: How long a concern stays after the rule was last true, or None.
+        cooldown: How long the same objects raise no concern after one was over, or None.
+        may_repeat: Variables that may stand for an object that another one stands for.
+        file: Where it was read, for messages.
+    """
+
+    name: str
+    variables: tuple[str, ...]
+    severity: Severity
+    when: Formula
+    say: str
+    unless: Formula | None = None
+    hold: Number | None = None
+    cooldown: Number | None = None
+    may_repeat: tuple[str, ...] = ()
+    span: Span = field(default=Span(), compare=False, repr=False)
+    file: str = field(default="", compare=False, repr=False)
+
+    def __str__(self) -> str:
+        names = (f"{v} may repeat" if v in self.may_repeat else v for v in self.variables)
+        lines = [f"rule {self.name}({', '.join(names)}): {self.severity.name.lower()}"]
+        lines.append(f"    when {self.when}")
+        for word in ("unless", "hold", "cooldown"):
+            clause = getattr(self, word)
+            if clause is not None:
+                lines.append(f"    {word} {clause}")
+        lines.append(f'    say "{self.say}"')
+        return "\n".join(lines)
+
+    @property
+    def formulas(self) -> tuple[Formula, ...]:
+        """`when`, and `unless` if there is one."""
+        return (self.when,) if self.unless is None else (self.when, self.unless)
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """The nodes that a node is made of directly; numbers of windows and durations left out."""
+    match node:
+        case And(parts=parts) | Or(parts=parts) | Combined(parts=parts):
+            return parts
+        case Not(part=part) | Past(part=part) | Future(part=part) | Often(part=part):
+            return (part,)
+        case Last(part=part) | Quantified(part=part) | Negative(part=part) | OverTime(part=part):
+            return (part,)
+        case Since(left=left, right=right) | Until(left=left, right=right):
+            return (left, right)
+        case Comparison(left=left, right=right) | Arithmetic(left=left, right=right):
+            return (left, right)
+    return ()
+
+
+def walk(node: Node | None) -> Iterator[Node]:
+    """A node and all that it is made of, in the order of the text."""
+    if node is not None:
+        yield node
+        for part in children(node):
+            yield from walk(part)
+
+
+def calls(node: Node | None) -> tuple[Predicate | Measure, ...]:
+    """All relations, facts and quantities that a formula names, in the order of the text."""
+    return tuple(n for n in walk(node) if isinstance(n, Predicate | Measure))
+
+
+def named(node: Node, names: Mapping[str, str]) -> Node:
+    """The same tree with variables replaced by the names of objects."""
+    if isinstance(node, Predicate | Measure):
+        return replace(node, words=tuple(names.get(w, w) for w in node.words))
+    if isinstance(node, Number):
+        return node
+    changes: dict[str, Any] = {}
+    if isinstance(node, And | Or | Combined):
+        changes["parts"] = tuple(named(p, names) for p in node.parts)
+    elif isinstance(node, Since | Until | Comparison | Arithmetic):
+        changes = {"left": named(node.left, names), "right": named(node.right, names)}
+    else:
+        changes["part"] = named(node.part, names)
+    return replace(node, **changes)
+
+
+def mark(variable: str) -> str:
+    """What stands for a variable in a text until it is known which object it is."""
+    return f"\0{variable}\0"
+
+
+_LOOSER = (And, Or, Since, Until)
+_PREFIXED = (Not, Quantified, Future, Past)
+
+
+def _wrapped(formula: Formula, *loose: type) -> str:
+    """Its source, in parentheses where it is of a looser kind; `for` within `for` also for the eye."""
+    return f"({formula})" if isinstance(formula, loose) else str(formula)

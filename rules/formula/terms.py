@@ -1,0 +1,81 @@
+"""Quantities in the tree of a rule: frozen nodes that print themselves back as source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from visup.rules.formula.units import Number, Span
+
+SPLIT = ("abs", "min", "max")
+"""Functions of quantities of one moment."""
+OVER_TIME = ("rate", "before", "lowest", "highest", "last")
+"""Functions of a quantity and of a time span."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """`time_to_contact(a, b)`: a quantity of objects."""
+
+    name: str
+    words: tuple[str, ...] = ()
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.name}({', '.join(self.words)})"
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic:
+    """`gap(a, b) - 3 px`, also with `+`, `*` and `/`."""
+
+    left: Term
+    operator: str
+    right: Term
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        loose = ("+", "-") if self.operator in "*/" else ()
+        return f"{_wrapped(self.left, loose)} {self.operator} {_wrapped(self.right, '+-*/')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Negative:
+    """`-gap(a, b)`; the negative of a number is a number."""
+
+    part: Term
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"-{_wrapped(self.part, '+-*/')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Combined:
+    """`min(gap(a, b), gap(a, c))`: one of `SPLIT` of quantities of one dimension."""
+
+    name: str
+    parts: tuple[Term, ...]
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.name}({', '.join(map(str, self.parts))})"
+
+
+@dataclass(frozen=True, slots=True)
+class OverTime:
+    """`rate(gap(a, b), 2 s)`: one of `OVER_TIME` of a quantity."""
+
+    name: str
+    part: Term
+    duration: Number
+    span: Span = field(default=Span(), compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.name}({self.part}, {self.duration})"
+
+
+Term = Number | Measure | Arithmetic | Negative | Combined | OverTime
+
+
+def _wrapped(term: Term, loose: str | tuple[str, ...]) -> str:
+    return f"({term})" if isinstance(term, Arithmetic) and term.operator in loose else str(term)

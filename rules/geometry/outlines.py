@@ -1,0 +1,159 @@
+"""How far outlines reach and how near they are to each other, worked out once for each region and each pair.
+
+In one step several thinkers ask about the same regions: who may hide a part of whom, who touches, who
+is within whom. Regions never change, so that what was found of the most recent ones is remembered;
+nothing but time hangs on that.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Region
+from visup.rules.geometry._outlines_jit import (
+    boxes_of,
+    evenly,
+    least_distance,
+    reached,
+    signed_extent,
+    widest_step,
+)
+from visup.rules.geometry.regions import (
+    DIRECTIONS,
+    Floats,
+    box_gap,
+    dense,
+    masks_overlap,
+    outline,
+)
+
+NEAR = 0.05
+"""How near outlines must be for anybody to care how near they are, image diagonals."""
+
+RECENT = 128
+"""Regions that are remembered: those of two steps with fifty objects."""
+
+EVEN_POINTS = 96
+"""Least points of an outline that another one is laid upon."""
+
+CLOSE = 2.0
+"""Neighbouring points of an outline that are so near each other leave no gap, pixels."""
+
+MOST_POINTS = 200
+"""Points of an outline that are measured against another one."""
+
+
+class Outline:
+    """An outline made ready for looking up what is nearest to a point.
+
+    Args:
+        region: Any region.
+
+    Attributes:
+        points: (N, 2) pixels; see `outline`.
+    """
+
+    def __init__(self, region: Region) -> None:
+        self._region = region
+        self.points = outline(region)
+
+    @cached_property
+    def boxes(self) -> Floats:
+        """Of the runs of `points`; see `outline_loops.py`."""
+        return boxes_of(self.points)
+
+    @cached_property
+    def closed(self) -> Floats:
+        """(M, 2) points without wide gaps between neighbours; see `dense`."""
+        return self.points if widest_step(self.points) <= CLOSE else dense(self.points, CLOSE)
+
+    @cached_property
+    def closed_boxes(self) -> Floats:
+        """Of the runs of `closed`."""
+        return self.boxes if self.closed is self.points else boxes_of(self.closed)
+
+    @cached_property
+    def even(self) -> Floats:
+        """(M, 2) points evenly spaced, as many as it has, `EVEN_POINTS` at least."""
+        return evenly(self.points, max(EVEN_POINTS, len(self.points)))
+
+    @cached_property
+    def even_boxes(self) -> Floats:
+        """Of the runs of `even`."""
+        return boxes_of(self.even)
+
+    @cached_property
+    def mask(self) -> NDArray[np.bool_]:
+        """(h, w) of the region, in the one layout that loops are compiled for."""
+        mask = self._region.mask
+        plain = mask.flags.c_contiguous and mask.flags.writeable and mask.dtype == np.bool_
+        return mask if plain else np.array(mask, dtype=np.bool_, order="C")
+
+
+@lru_cache(maxsize=RECENT)
+def ready(region: Region) -> Outline:
+    """The outline of a region, made ready."""
+    return Outline(region)
+
+
+def reach(
+    region: Region, frame_size: tuple[int, int], support: Floats, free: NDArray[np.bool_]
+) -> None:
+    """How far a region's outline reaches.
+
+    Args:
+        region: Any region.
+        frame_size: (width, height), pixels.
+        support: (16,) written, pixels: max over the outline of p . n for each of `DIRECTIONS`.
+        free: (16,) written: whether the furthest point is clear of the image border, so that it
+            belongs to the body and not to where the image ends.
+    """
+    reached(ready(region).points, DIRECTIONS, *frame_size, support, free)
+
+
+def outline_gap(a: Region, b: Region, near: float) -> float | None:
+    """Least distance between two outlines, when it is at most `near`.
+
+    Args:
+        a: One region.
+        b: Another.
+        near: Distance beyond which nobody cares, pixels.
+
+    Returns:
+        Pixels, 0 where the masks overlap or the outlines are neighbours (1 pixel apart or less),
+        or None when it is greater than `near`.
+    """
+    if box_gap(a.bbox, b.bbox) > near:
+        return None
+    return _gap(a, b, near) if a.id <= b.id else _gap(b, a, near)
+
+
+@lru_cache(maxsize=8 * RECENT)
+def _gap(a: Region, b: Region, near: float) -> float | None:
+    # A pixel is as wide as 1: outlines of neighbours are so far apart.
+    one, two = ready(a), ready(b)
+    distance = least_distance(one.points, one.boxes, two.points, two.boxes, near + 1.0)
+    # One may also lie deep within the other.
+    if distance > 1.5 and masks_overlap(a, b):
+        return 0.0
+    gap = max(0.0, distance - 1.0)
+    return gap if gap <= near else None
+
+
+def signed_distances(a: Region, b: Region) -> tuple[float, float]:
+    """How far the outline of one region lies outside another, nearest and farthest point.
+
+    Args:
+        a: A region; of its outline at most `MOST_POINTS` points are looked at.
+        b: Another.
+
+    Returns:
+        The least and the greatest distance of a's points to b's outline, pixels, negative within b.
+    """
+    points, body = ready(a).closed, ready(b)
+    step = -(-len(points) // MOST_POINTS)
+    x, y, _, _ = b.bbox
+    return signed_extent(points, step, body.closed, body.closed_boxes, body.mask, x, y)

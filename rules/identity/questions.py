@@ -1,0 +1,134 @@
+"""Asking the operator who is who, where votes alone do not tell (paper, section 5).
+
+Two names that stay close for a while will hardly be told apart by more of the same. The operator is
+then asked once, and again only after a long time. The question stays in the mind until it is
+answered, settles by itself, or its object is gone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from visup.agent import (
+    Directive,
+    Event,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Presence,
+    Question,
+)
+from visup.agent.model.fast_replace import replace
+from visup.rules.wording.sentences import called, spaced
+
+QUESTIONS = "rules.questions"
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionSettings:
+    """When the operator is asked.
+
+    Attributes:
+        close: Difference in likelihood within which two names are close.
+        least: Likelihood below which a name is not worth asking about.
+        patience_s: How long two names must be close.
+        again_s: Least time between two questions about an object.
+        most: Names offered.
+    """
+
+    close: float = 0.5
+    least: float = 0.1
+    patience_s: float = 3.0
+    again_s: float = 30.0
+    most: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Doubtful:
+    """Since when an object's names are close, and when it was last asked about; seconds or None."""
+
+    since: float | None = None
+    asked: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Thinker of the cogitate phase, after the votes: keeps the questions that wait."""
+
+    settings: QuestionSettings = field(default_factory=QuestionSettings)
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Thinker`."""
+        old: Mapping[int, Doubtful] = mind.memory.get(QUESTIONS, MappingProxyType({}))
+        open_now = {q.object_id: q for q in mind.questions}
+        doubts: dict[int, Doubtful] = {}
+        waiting: list[Question] = []
+        asked: list[Question] = []
+        for belief in mind.present():
+            doubt = self._doubt(belief, old.get(belief.id, Doubtful()), mind)
+            question = open_now.get(belief.id)
+            if doubt.since is None:
+                question = None
+            elif question is None and self._ripe(doubt, mind.time):
+                question = self._question(mind, belief)
+                doubt = replace(doubt, asked=mind.time)
+                asked.append(question)
+            waiting += [question] if question else []
+            if doubt != Doubtful():
+                doubts[belief.id] = doubt
+        mind = mind.remember(QUESTIONS, MappingProxyType(doubts), questions=tuple(waiting))
+        events = tuple(_event(q, observation) for q in asked)
+        return Outcome(mind, events, directives=tuple(_directives(waiting)))
+
+    def _doubt(self, belief: ObjectBelief, before: Doubtful, mind: Mind) -> Doubtful:
+        if belief.presence is not Presence.SEEN:
+            return before
+        close = belief.id not in mind.answers and len(self._names(belief)) > 1
+        if not close:
+            return replace(before, since=None)
+        return before if before.since is not None else replace(before, since=mind.time)
+
+    def _ripe(self, doubt: Doubtful, now: float) -> bool:
+        s = self.settings
+        again = doubt.asked is None or now - doubt.asked >= s.again_s
+        return again and doubt.since is not None and now - doubt.since >= s.patience_s - 1e-6
+
+    def _names(self, belief: ObjectBelief) -> tuple[str, ...]:
+        """The names that are close to the best one, with it."""
+        s = self.settings
+        best = belief.candidates[0].confidence if belief.candidates else 0.0
+        return tuple(
+            c.name
+            for c in belief.candidates[: s.most]
+            if c.confidence >= max(s.least, best - s.close)
+        )
+
+    def _question(self, mind: Mind, belief: ObjectBelief) -> Question:
+        names = self._names(belief)
+        return Question(belief.id, names, mind.time, wording(mind, belief.id, names))
+
+
+def wording(mind: Mind, object_id: int, names: tuple[str, ...]) -> str:
+    """The question in words: 'Is object 2 the arm or the guitar?'."""
+    spoken = [f"the {spaced(called(mind, name))}" for name in names]
+    return f"Is object {object_id} {', '.join(spoken[:-1])} or {spoken[-1]}?"
+
+
+def _event(question: Question, observation: Observation) -> Event:
+    return Event(
+        "question",
+        observation.time,
+        observation.frame_index,
+        question.text,
+        (question.object_id,),
+        data=MappingProxyType({"names": question.names}),
+    )
+
+
+def _directives(waiting: list[Question]) -> Iterator[Directive]:
+    for q in waiting:
+        data = {"object": q.object_id, "names": q.names, "question": q.text}
+        yield Directive("ask", f"Votes do not tell who object {q.object_id} is.", data)

@@ -1,0 +1,106 @@
+"""Units: what is compared or added must measure the same; products and quotients make new measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from visup.rules.formula.nodes import Comparison
+from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.units import SHARE, TIME, Dimension, Number, Span, units_of
+from visup.rules.language.transform import Fault
+from visup.rules.predicates.vocabulary import Vocabulary
+
+
+def dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault]:
+    """The faults of units of a comparison.
+
+    Args:
+        node: The comparison.
+        vocabulary: Tells what quantities measure; of one that it does not hold nothing is said.
+
+    Yields:
+        Place, what is wrong, what was expected, hint.
+    """
+    faults: list[Fault] = []
+    left, right = (_measured(side, vocabulary, faults) for side in (node.left, node.right))
+    yield from faults
+    if _constant(node.left) and _constant(node.right):
+        yield node.span, "two numbers are compared", "a quantity on one side", None
+    elif left and right and left != right:
+        what = f"{_named(left)} is compared with {_named(right)}"
+        wanted = right if _constant(node.left) else left
+        yield node.span, what, units_of(wanted), _no_unit(node, left, right)
+    if node.leave is not None:
+        yield from _leave(node, left)
+
+
+def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
+    leave = node.leave
+    assert leave is not None
+    if dimension and leave.dimension != dimension:
+        yield leave.span, f"'leave' wants {units_of(dimension)}", None, None
+    elif not isinstance(node.right, Number):
+        what = "'leave' wants a number before it too"
+        yield leave.span, what, "such as speed(a) > 5 px/s leave 3 px/s", None
+    elif (leave.base - node.right.base) * (1 if ">" in node.operator else -1) > 0:
+        what = f"'leave {leave}' ends it where it does not yet begin"
+        side = "at most" if ">" in node.operator else "at least"
+        yield leave.span, what, f"{side} {node.right}", None
+
+
+def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimension | None:
+    """What a quantity measures; None when it is not known."""
+    match term:
+        case Number():
+            return term.dimension
+        case Measure(name=name):
+            known = vocabulary.quantities.get(name)
+            return None if known is None else known.dimension
+        case Negative(part=part):
+            return _measured(part, vocabulary, faults)
+        case OverTime(name=name, part=part):
+            inner = _measured(part, vocabulary, faults)
+            return inner / TIME if inner and name == "rate" else inner
+        case Arithmetic(left=one, operator="*" | "/" as operator, right=other):
+            first, second = (_measured(t, vocabulary, faults) for t in (one, other))
+            if first is None or second is None:
+                return None
+            return first * second if operator == "*" else first / second
+        case Arithmetic(left=one, operator=operator, right=other):
+            word = "added to" if operator == "+" else "subtracted from"
+            return _alike((one, other), word, term.span, vocabulary, faults)
+        case Combined(name=name, parts=parts):
+            if not parts or (name == "abs") != (len(parts) == 1):
+                wanted = "abs(gap(a, b))" if name == "abs" else f"{name}(gap(a, b), 20 px)"
+                what = f"'{name}' does not take {len(parts)} quantities"
+                faults.append((term.span, what, f"such as {wanted}", None))
+            return _alike(parts, "set beside", term.span, vocabulary, faults)
+
+
+def _alike(
+    parts: tuple[Term, ...], word: str, span: Span, vocabulary: Vocabulary, faults: list[Fault]
+) -> Dimension | None:
+    kinds = [k for p in parts if (k := _measured(p, vocabulary, faults)) is not None]
+    for kind in kinds[1:]:
+        if kind != kinds[0]:
+            pair = (kinds[0], kind) if word != "subtracted from" else (kind, kinds[0])
+            what = f"{_named(pair[0])} is {word} {_named(pair[1])}"
+            faults.append((span, what, units_of(kinds[0]), None))
+            return None
+    return kinds[0] if kinds else None
+
+
+def _constant(term: Term) -> bool:
+    if isinstance(term, Arithmetic):
+        return _constant(term.left) and _constant(term.right)
+    return isinstance(term, Number)
+
+
+def _named(dimension: Dimension) -> str:
+    article = "an" if str(dimension)[0] in "aeiou" else "a"
+    return f"{article} {'number' if dimension == SHARE else dimension}"
+
+
+def _no_unit(node: Comparison, left: Dimension, right: Dimension) -> str | None:
+    plain = any(isinstance(s, Number) and not s.unit for s in (node.left, node.right))
+    return "write the unit" if plain and SHARE in (left, right) else None

@@ -1,0 +1,203 @@
+"""From the text of a rule file to rules, with every fault of the file told at once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import cast
+
+from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
+
+from visup.agent.model.errors import ManyErrors, Place, RuleError, VisupError
+from visup.rules.formula.nodes import Formula, Rule
+from visup.rules.language.transform import read_tree
+from visup.rules.language.typecheck import Checker
+from visup.rules.predicates.vocabulary import RULES, Vocabulary
+
+_HEAD = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
+_WANTED = {
+    "LPAR": "'('",
+    "RPAR": "')'",
+    "COLON": "':'",
+    "COMMA": "','",
+    "SEVERITY": "info, warning or critical",
+    "NAME": "a name",
+    "NUMBER": "a number",
+    "UNIT": "a unit (s, ms, min, px, px/s, px/s2, %, deg, deg/s, /s)",
+    "STRING": "a sentence in double quotes on one line",
+    "OPERATOR": "<, <=, > or >=",
+    "LSQB": "'['",
+    "RSQB": "']'",
+    "__ANON_0": "'..'",
+    "PLUS": "'+'",
+    "MINUS": "'-'",
+    "TIMES": "'*'",
+    "OVER": "'/'",
+    "PAST": "'once', 'always'",
+    "FUTURE": "'eventually', 'henceforth'",
+    "QUANTIFIER": "'exists', 'forall'",
+    "REPEAT": "'may repeat'",
+    "$END": "the end of the file",
+}
+
+
+def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
+    """Read rules from text.
+
+    Args:
+        text: A whole rule file.
+        file: Its name, for messages.
+
+    Returns:
+        The rules in the order of the text; `parse_rules(str(rule)) == (rule,)`.
+
+    Raises:
+        RuleError: The text has one fault; says where, what was expected and what to do.
+        ManyErrors: It has several; each rule is read by itself, so that one syntax fault in a rule
+            hides nothing of the others.
+    """
+    checker = Checker(text, file)
+    errors: list[VisupError] = []
+    rules: list[Rule] = []
+    sound: list[Rule] = []
+    for block in _blocks(text):
+        try:
+            tree = _parser().parse(block, start="start")
+        except UnexpectedInput as fault:
+            errors.append(_syntax_error(fault, text, file))
+            continue
+        found, faults = read_tree(tree, file)
+        errors += [checker.fault(*f) for f in faults]
+        rules += found
+        sound += () if faults else found
+    errors += [*checker.twice(rules), *(fault for rule in sound for fault in checker.rule(rule))]
+    raise_all(errors)
+    return tuple(rules)
+
+
+def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
+    """Read one formula without object variables, such as one of signals.
+
+    Args:
+        text: The formula.
+        vocabulary: What it may name.
+
+    Returns:
+        Its tree.
+
+    Raises:
+        RuleError: It has one fault.
+        ManyErrors: It has several.
+    """
+    file = "<formula>"
+    try:
+        tree = _parser().parse(text, start="formula")
+    except UnexpectedInput as fault:
+        raise _syntax_error(fault, text, file) from None
+    checker = Checker(text, file, vocabulary)
+    found, faults = read_tree(tree, file)
+    raise_all([checker.fault(*f) for f in faults] or list(checker.formula(found)))
+    return cast("Formula", found)
+
+
+def raise_all(errors: Sequence[VisupError]) -> None:
+    """Raise what is wrong: one error as itself, several as one, none not at all."""
+    errors = list(errors)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise ManyErrors(sorted(errors, key=_place))
+
+
+def load_rules(path: str | Path) -> tuple[Rule, ...]:
+    """Read a rule file.
+
+    Args:
+        path: A text file in UTF-8.
+
+    Returns:
+        Its rules.
+
+    Raises:
+        RuleError: It cannot be read or has a fault.
+        ManyErrors: It has several faults.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise RuleError("this is not text", where=str(path), expected="UTF-8") from None
+    except OSError as fault:
+        what = f"the rule file cannot be read: {fault.strerror or fault}"
+        raise RuleError(what, where=str(path), hint="check the path") from None
+    return parse_rules(text, str(path))
+
+
+def shipped_rules() -> tuple[Rule, ...]:
+    """The rules of `safety.rules`, which ships with visup."""
+    text = files("visup.rules.safety").joinpath("safety.rules").read_text(encoding="utf-8")
+    return parse_rules(text, "safety.rules")
+
+
+@lru_cache(maxsize=1)
+def _parser() -> Lark:
+    grammar = files("visup.rules.language").joinpath("rules.lark").read_text(encoding="utf-8")
+    starts = ["start", "formula"]
+    return Lark(
+        grammar, start=starts, parser="lalr", propagate_positions=True, maybe_placeholders=True
+    )
+
+
+def _blocks(text: str) -> list[str]:
+    """The text of each rule by itself, each with the lines before it blank so that places hold."""
+    starts = [m.start() for m in _HEAD.finditer(text)]
+    if not starts or text[: starts[0]].strip():
+        starts = [0, *starts]
+    ends = [*starts[1:], len(text)]
+    return ["\n" * text.count("\n", 0, s) + text[s:e] for s, e in zip(starts, ends, strict=True)]
+
+
+def _place(error: VisupError) -> tuple[int, int]:
+    where = error.where
+    return (where.line, where.column) if isinstance(where, Place) else (0, 0)
+
+
+def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
+    lines = text.splitlines() or [""]
+    if isinstance(fault, UnexpectedEOF) or fault.line < 1:
+        line, column, found = len(lines), len(lines[-1]) + 1, ""
+    else:
+        line, column = fault.line, fault.column
+        token = getattr(fault, "token", None)
+        found = "" if token is None or token.type == "$END" else str(token)
+        if isinstance(fault, UnexpectedCharacters):
+            found = lines[line - 1][column - 1 : column]
+    if getattr(getattr(fault, "token", None), "type", "") == "$END":
+        line, column = _end_before(lines, line)
+    wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
+    wanted = wanted or getattr(fault, "allowed", set()) or set()
+    where = Place(file, line, column, lines[line - 1], max(1, len(found)))
+    what = f"'{found}' does not belong here" if found else "the rule ends too early"
+    return RuleError(what, where=where, expected=_expected(wanted), hint=_slip(found, wanted))
+
+
+def _end_before(lines: list[str], line: int) -> tuple[int, int]:
+    at = min(line, len(lines))
+    while at > 1 and not lines[at - 1].split("#")[0].strip():
+        at -= 1
+    return at, len(lines[at - 1].split("#")[0].rstrip()) + 1
+
+
+def _expected(wanted: set[str]) -> str:
+    words = sorted({_WANTED.get(w, f"'{w.lower()}'") for w in wanted})
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
+
+
+def _slip(found: str, wanted: set[str]) -> str | None:
+    known = [w.lower() for w in wanted if w not in _WANTED]
+    known += ["info", "warning", "critical"] if "SEVERITY" in wanted else []
+    close = get_close_matches(found.lower(), known, 1, 0.6) if found else []
+    return f"did you mean '{close[0]}'?" if close else None

@@ -1,0 +1,314 @@
+"""From Lark's tree to ours; finds where a quantity stands for something true or false, or reversed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+from lark import Token, Transformer, Tree
+from lark import v_args as with_meta
+
+from visup.agent import Severity
+from visup.rules.formula.nodes import (
+    ZERO,
+    And,
+    Comparison,
+    Formula,
+    Future,
+    Last,
+    Not,
+    Often,
+    Or,
+    Past,
+    Quantified,
+    Rule,
+    Since,
+    Until,
+    Window,
+)
+from visup.rules.formula.nodes import Predicate as Fact
+from visup.rules.formula.terms import (
+    OVER_TIME,
+    SPLIT,
+    Arithmetic,
+    Combined,
+    Measure,
+    Negative,
+    OverTime,
+    Term,
+)
+from visup.rules.formula.units import TIME, Number, Span, Unit
+
+Fault = tuple[Span, str, str | None, str | None]
+"""Place, what is wrong, what was expected, hint."""
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """`name(...)` while it is not yet known whether it stands for a quantity or for a fact."""
+
+    name: str
+    arguments: tuple[Any, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A bare name among arguments."""
+
+    name: str
+    span: Span
+
+
+class Meaning:
+    """What a call stands for, by where it stands.
+
+    Args:
+        fault: Takes a fault.
+    """
+
+    def __init__(self, fault: Callable[[Fault], None]) -> None:
+        self.fault = fault
+
+    def formula(self, node: Any) -> Formula:
+        """A node where something true or false is wanted."""
+        if isinstance(node, Call):
+            if node.name == "last":
+                spanned = self._spanned(node)
+                if spanned is None:
+                    return Fact("", (), node.span)
+                return Last(self.formula(spanned[0]), spanned[1])
+            if node.name in (*SPLIT, *OVER_TIME):
+                what = f"'{node.name}' is a quantity, neither true nor false"
+                self.fault((node.span, what, None, "compare it with a number"))
+            return Fact(node.name, self._words(node), node.span)
+        if isinstance(node, Term):
+            what = f"'{node}' is a quantity, neither true nor false"
+            self.fault((_place(node), what, None, "compare it with another quantity"))
+            return Fact("", (), _place(node))
+        return cast("Formula", node)
+
+    def term(self, node: Any) -> Term:
+        """A node where a quantity is wanted."""
+        if isinstance(node, Call):
+            if node.name in SPLIT:
+                return Combined(
+                    node.name,
+                    tuple(self.term(self._unworded(a)) for a in node.arguments),
+                    node.span,
+                )
+            if node.name in OVER_TIME:
+                spanned = self._spanned(node)
+                if spanned is None:
+                    return Number(0.0, span=node.span)
+                part, duration = spanned
+                return OverTime(node.name, self.term(part), duration, node.span)
+            return Measure(node.name, self._words(node), node.span)
+        if isinstance(node, Term):
+            return node
+        what = f"'{node}' is true or false, and no quantity"
+        self.fault((_place(node), what, "a quantity or a number", None))
+        return Number(0.0, span=_place(node))
+
+    def _words(self, call: Call) -> tuple[str, ...]:
+        for argument in call.arguments:
+            if not isinstance(argument, Word):
+                what = f"'{call.name}' takes names, not what is in its parentheses"
+                self.fault((call.span, what, f"such as {call.name}(a)", None))
+                return ()
+        return tuple(a.name for a in call.arguments)
+
+    def _spanned(self, call: Call) -> tuple[Any, Number] | None:
+        """The parts of `rate(x, 2 s)` and its like, or None after a fault."""
+        parts = call.arguments
+        if len(parts) == 2 and isinstance(parts[1], Number) and parts[1].dimension == TIME:
+            return self._unworded(parts[0]), parts[1]
+        what = f"'{call.name}' takes something and a time"
+        self.fault((call.span, what, f"such as {call.name}(speed(a), 2 s)", None))
+        return None
+
+    def _unworded(self, argument: Any) -> Any:
+        if isinstance(argument, Word):
+            what = f"'{argument.name}' is a name, and no quantity"
+            self.fault((argument.span, what, "a quantity or a number", None))
+            return Number(0.0, span=argument.span)
+        return argument
+
+
+def _place(node: Any) -> Span:
+    own = getattr(node, "span", None)
+    if isinstance(own, Span):
+        return own
+    inner = getattr(node, "part", None) or getattr(node, "left", None)
+    return _place(inner if inner is not None else node.parts[0])
+
+
+def _span_of(meta: Any) -> Span:
+    """The place of a node of Lark's tree; of one that runs over several lines, its beginning."""
+    one_line = meta.end_line == meta.line
+    return Span(meta.line, meta.column, meta.end_column - meta.column if one_line else 1)
+
+
+def read_tree(tree: Tree[Token], file: str) -> tuple[Any, list[Fault]]:
+    """Rules, or one formula, from the tree that the parser gives.
+
+    Args:
+        tree: Of a rule file or of a formula.
+        file: Its name, for messages.
+
+    Returns:
+        A list of rules or a formula; and the faults that were found on the way.
+    """
+    reading = _ToTree(file)
+    return reading.transform(tree), reading.faults
+
+
+@with_meta(meta=True)
+class _ToTree(Transformer[Token, Any]):
+    """Lark's tree to ours.
+
+    Args:
+        file: Name of the file, for messages.
+
+    Attributes:
+        faults: Faults found on the way, in the order of the text.
+    """
+
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self.file = file
+        self.faults: list[Fault] = []
+        self.meaning = Meaning(self.faults.append)
+
+    def start(self, meta: Any, parts: list[Any]) -> list[Rule]:
+        return parts
+
+    def rule(self, meta: Any, parts: list[Any]) -> Rule:
+        name, variables, severity, when, unless, hold, cooldown, say = parts
+        variables = variables or ()
+        return Rule(
+            name=str(name),
+            variables=tuple(v for v, _ in variables),
+            severity=Severity[str(severity).upper()],
+            when=when,
+            say=say,
+            unless=unless,
+            hold=hold,
+            cooldown=cooldown,
+            may_repeat=tuple(v for v, repeats in variables if repeats),
+            span=Span(name.line, name.column, len(name)),
+            file=self.file,
+        )
+
+    def variables(self, meta: Any, parts: list[Any]) -> tuple[Any, ...]:
+        return tuple(parts)
+
+    arguments = variables
+
+    def variable(self, meta: Any, parts: list[Any]) -> tuple[str, bool]:
+        return str(parts[0]), parts[1] is not None
+
+    def word(self, meta: Any, parts: list[Token]) -> Word:
+        return Word(str(parts[0]), _span_of(meta))
+
+    def when(self, meta: Any, parts: list[Any]) -> Formula:
+        return self.meaning.formula(parts[0])
+
+    unless = when
+
+    def hold(self, meta: Any, parts: list[Any]) -> Number:
+        return cast("Number", parts[0])
+
+    cooldown = hold
+
+    def say(self, meta: Any, parts: list[Token]) -> str:
+        return str(parts[0])[1:-1]
+
+    def or_(self, meta: Any, parts: list[Any]) -> Or:
+        return Or(tuple(map(self.meaning.formula, parts)))
+
+    def and_(self, meta: Any, parts: list[Any]) -> And:
+        return And(tuple(map(self.meaning.formula, parts)))
+
+    def not_(self, meta: Any, parts: list[Any]) -> Not:
+        return Not(self.meaning.formula(parts[0]))
+
+    def since(self, meta: Any, parts: list[Any]) -> Since:
+        left, window, right = parts
+        return Since(self.meaning.formula(left), self.meaning.formula(right), window)
+
+    def until(self, meta: Any, parts: list[Any]) -> Until:
+        left, window, right = parts
+        formulas = self.meaning.formula(left), self.meaning.formula(right)
+        return Until(*formulas, window, _span_of(meta))
+
+    def quantified(self, meta: Any, parts: list[Any]) -> Quantified:
+        kind, (variable, repeats), part = parts
+        place = Span(kind.line, kind.column, len(kind))
+        return Quantified(str(kind), variable, self.meaning.formula(part), repeats, place)
+
+    def past(self, meta: Any, parts: list[Any]) -> Past:
+        kind, window, part = parts
+        return Past(str(kind), self.meaning.formula(part), window)
+
+    def future(self, meta: Any, parts: list[Any]) -> Future:
+        kind, window, part = parts
+        place = Span(kind.line, kind.column, len(kind))
+        return Future(str(kind), self.meaning.formula(part), window, place)
+
+    def formula(self, meta: Any, parts: list[Any]) -> Formula:
+        return self.meaning.formula(parts[0])
+
+    def span(self, meta: Any, parts: list[Number]) -> Window:
+        return Window(ZERO, parts[0])
+
+    def window(self, meta: Any, parts: list[Any]) -> Window:
+        low, high = parts
+        return Window(ZERO, low) if high is None else Window(low, high)
+
+    def for_(self, meta: Any, parts: list[Any]) -> Past:
+        part, low, high = parts
+        window = Window(ZERO, low) if high is None else Window(low, high)
+        return Past("always", self.meaning.formula(part), window)
+
+    def within(self, meta: Any, parts: list[Any]) -> Past:
+        return replace(self.for_(meta, parts), kind="once")
+
+    def often_time(self, meta: Any, parts: list[Any]) -> Often:
+        part, least, of = parts
+        return Often(self.meaning.formula(part), least, of, least.span)
+
+    often_samples = often_time
+
+    def comparison(self, meta: Any, parts: list[Any]) -> Comparison:
+        left, operator, right, leave = parts
+        sides = self.meaning.term(left), self.meaning.term(right)
+        return Comparison(sides[0], str(operator), sides[1], leave, _span_of(meta))
+
+    def sum(self, meta: Any, parts: list[Any]) -> Arithmetic:
+        left, operator, right = parts
+        sides = self.meaning.term(left), self.meaning.term(right)
+        return Arithmetic(sides[0], str(operator), sides[1], _span_of(meta))
+
+    product = sum
+
+    def negative(self, meta: Any, parts: list[Any]) -> Term:
+        part = self.meaning.term(parts[1])
+        if isinstance(part, Number):
+            return Number(-part.value, part.unit, _span_of(meta))
+        return Negative(part, _span_of(meta))
+
+    def signed(self, meta: Any, parts: list[Any]) -> Number:
+        minus, number = parts
+        value = -number.value if minus is not None else number.value
+        return Number(value, number.unit, _span_of(meta))
+
+    def call(self, meta: Any, parts: list[Any]) -> Call:
+        return Call(str(parts[0]), parts[1] or (), _span_of(meta))
+
+    def number(self, meta: Any, parts: list[Any]) -> Number:
+        unit = Unit.NONE if parts[1] is None else Unit(str(parts[1]))
+        return Number(float(parts[0]), unit, _span_of(meta))
+
+    duration = number

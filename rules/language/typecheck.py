@@ -1,0 +1,268 @@
+"""Whether the names, arguments and units of rules make sense: every fault, with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
+
+from visup.agent.model.errors import Place, RuleError
+from visup.rules.formula.nodes import (
+    Comparison,
+    Formula,
+    Future,
+    Last,
+    Node,
+    Often,
+    Past,
+    Predicate,
+    Quantified,
+    Rule,
+    Since,
+    Until,
+    Window,
+    children,
+)
+from visup.rules.formula.terms import Measure, OverTime
+from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
+from visup.rules.language.cost import MOST_KEPT, MOST_VARIABLES, bounds_of, variables_of
+from visup.rules.language.dimensions import dimensions
+from visup.rules.language.transform import Fault
+from visup.rules.predicates.snapshot import RELATION_NAMES
+from visup.rules.predicates.vocabulary import KINDS, RULES, Vocabulary
+from visup.rules.wording.sentences import mentions
+
+KEYWORDS = frozenset(
+    (
+        "rule",
+        "when",
+        "unless",
+        "hold",
+        "cooldown",
+        "say",
+        "and",
+        "or",
+        "not",
+        "for",
+        "within",
+        "since",
+        "until",
+        "once",
+        "always",
+        "eventually",
+        "henceforth",
+        "exists",
+        "forall",
+        "in",
+        "of",
+        "samples",
+        "leave",
+        "to",
+        "ago",
+        "may",
+        "repeat",
+    )
+)
+"""Words of the language itself, which name nothing else."""
+
+
+class Checker:
+    """Finds the faults of meaning of one text.
+
+    Args:
+        text: The text that rules were read from, for the lines in messages.
+        file: Its name.
+        vocabulary: What formulas may name.
+    """
+
+    def __init__(self, text: str, file: str, vocabulary: Vocabulary = RULES) -> None:
+        self.lines = text.splitlines() or [""]
+        self.file = file
+        self.vocabulary = vocabulary
+
+    def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
+        """A fault as an error with its line."""
+        line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
+        where = Place(self.file, span.line, span.column, line, span.length)
+        return RuleError(what, where=where, expected=expected, hint=hint)
+
+    def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:
+        """Rules that bear one name."""
+        names: set[str] = set()
+        for rule in rules:
+            if rule.name in names:
+                what = f"there are two rules '{rule.name}'"
+                yield self.fault(rule.span, what, None, "rename one of them")
+            names.add(rule.name)
+
+    def formula(self, formula: Formula) -> Iterator[RuleError]:
+        """The faults of a formula that stands by itself."""
+        for fault in _Reader(self.vocabulary, ()).node(formula):
+            yield self.fault(*fault)
+
+    def rule(self, rule: Rule) -> Iterator[RuleError]:
+        """The faults of one rule."""
+        reader = _Reader(self.vocabulary, rule.variables)
+        found = [f for formula in rule.formulas for f in reader.node(formula)]
+        found += [f for w in ("hold", "cooldown") for f in _time(getattr(rule, w), w)]
+        found += self._head(rule)
+        # A variable that is missing from a faulty call is no second fault.
+        for name in sorted(set(rule.variables) - reader.used) if not found else ():
+            what = f"the variable '{name}' of '{rule.name}' is not used"
+            hint = "leave it out, or the rule is true for every object"
+            found.append((rule.span, what, None, hint))
+        # What a rule keeps can be counted only when all else is well.
+        for fault in found or self._bounds(rule):
+            yield self.fault(*fault)
+
+    def _head(self, rule: Rule) -> Iterator[Fault]:
+        if len(set(rule.variables)) < len(rule.variables):
+            yield rule.span, f"a variable of '{rule.name}' is named twice", "distinct names", None
+        for word in (rule.name, *rule.variables):
+            if word in KEYWORDS:
+                yield rule.span, f"'{word}' is a word of the language", "another name", None
+        for word in mentions(rule.say):
+            if word != "is" and word not in rule.variables:
+                what = (
+                    f"the sentence of '{rule.name}' mentions '{word}', which is no variable of it"
+                )
+                yield rule.span, what, _listed((*rule.variables, "is")), None
+
+    def _bounds(self, rule: Rule) -> Iterator[Fault]:
+        together = variables_of(rule)
+        if together > MOST_VARIABLES:
+            what = f"'{rule.name}' looks at {together} objects together"
+            yield rule.span, what, f"at most {MOST_VARIABLES}", "make it two rules"
+            return
+        kept = bounds_of(rule).kept
+        if kept > MOST_KEPT:
+            what = f"'{rule.name}' would keep {kept:,} values for each choice of objects"
+            hint = "shorten its windows; `for` and `within` of facts keep one moment only"
+            yield rule.span, what, f"at most {MOST_KEPT:,}", hint
+
+
+class _Reader:
+    """Goes through formulas; remembers which variables they use."""
+
+    def __init__(self, vocabulary: Vocabulary, variables: tuple[str, ...]) -> None:
+        self.vocabulary = vocabulary
+        self.scope = variables
+        self.used: set[str] = set()
+
+    def node(self, node: Node) -> Iterator[Fault]:
+        match node:
+            case Predicate() | Measure():
+                yield from self.call(node)
+            case Quantified():
+                yield from self.quantified(node)
+                return
+            case Comparison():
+                yield from dimensions(node, self.vocabulary)
+            case Past(window=Window() as window):
+                yield from _window(window, "for" if node.kind == "always" else "within")
+            case Future(window=window, span=span) | Until(window=window, span=span):
+                word = node.kind if isinstance(node, Future) else "until"
+                if window is None:
+                    what = f"'{word}' without a window would wait without end"
+                    yield span, what, f"such as {word}[5 s]", None
+                else:
+                    yield from _window(window, word)
+            case Since(window=Window() as window):
+                yield from _window(window, "since")
+            case Often():
+                yield from _often(node)
+            case Last(duration=duration) | OverTime(duration=duration):
+                yield from _time(duration, getattr(node, "name", "last"))
+        for part in children(node):
+            yield from self.node(part)
+
+    def quantified(self, node: Quantified) -> Iterator[Fault]:
+        name, outer = node.variable, self.scope
+        if name in outer:
+            yield node.span, f"'{name}' is already the name of an object", "another name", None
+        if name in KEYWORDS:
+            yield node.span, f"'{name}' is a word of the language", "another name", None
+        self.scope = (*outer, name)
+        found = list(self.node(node.part))
+        yield from found
+        if name not in self.used and not found:
+            what = f"the variable '{name}' of '{node.kind}' is not used"
+            yield node.span, what, None, "leave it out"
+        self.used.discard(name)
+        self.scope = outer
+
+    def call(self, call: Predicate | Measure) -> Iterator[Fault]:
+        self.used |= set(call.words) & set(self.scope)
+        words, quantities = self.vocabulary.words, self.vocabulary.quantities
+        fact = isinstance(call, Predicate)
+        table = words if fact else quantities
+        kind = "relation or fact" if fact else "quantity"
+        if call.name not in table:
+            hint = _close(call.name, table)
+            if call.name in (quantities if fact else words):
+                hint = "compare it with a number" if fact else "it is true or false"
+            yield call.span, f"there is no {kind} '{call.name}'", _listed(table), hint
+            return
+        takes = table[call.name].takes
+        if len(takes) != len(call.words):
+            what = f"'{call.name}' takes {len(takes)} argument(s), not {len(call.words)}"
+            yield call.span, what, f"{call.name}({', '.join(takes)})", None
+            return
+        for wanted, word in zip(takes, call.words, strict=True):
+            yield from self.argument(call, wanted, word)
+        names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
+        if len(set(names)) < len(names):
+            yield call.span, f"'{call.name}' is asked of one object twice", None, None
+
+    def argument(self, call: Predicate | Measure, wanted: str, word: str) -> Iterator[Fault]:
+        known: Iterable[str] = {
+            "object": self.scope,
+            "relation": RELATION_NAMES,
+            "kind": (*KINDS, word),
+        }.get(wanted, (word,))
+        if word not in known:
+            what = f"'{word}' is no {'variable of the rule' if wanted == 'object' else wanted}"
+            yield call.span, what, _listed(known), _close(word, known)
+        elif wanted != "object" and word in self.scope:
+            what = f"'{word}' is a variable of the rule, and '{call.name}' wants a {wanted}"
+            yield call.span, what, None, "rename the variable"
+
+
+def _time(number: Number | None, word: str) -> Iterator[Fault]:
+    if number is None:
+        return
+    if number.dimension != TIME:
+        yield number.span, f"'{word}' wants a time", "such as 2 s", None
+    elif number.value <= 0:
+        yield number.span, f"'{word}' wants a time above 0", None, None
+
+
+def _window(window: Window, word: str) -> Iterator[Fault]:
+    yield from _time(window.high, word)
+    if window.low.dimension != TIME:
+        yield window.low.span, f"'{word}' wants a time", "such as 2 s", None
+    elif window.high.dimension == TIME and 0 < window.high.base <= window.low.base:
+        what = f"a window from {window.low} to {window.high} is empty"
+        yield window.high.span, what, "the shorter time first", None
+
+
+def _often(node: Often) -> Iterator[Fault]:
+    least, of = node.least, node.of
+    if node.counts_samples:
+        if not (least.unit is Unit.NONE and 1 <= least.value <= of.value):
+            yield least.span, f"'{least} of {of} samples' cannot be counted", "3 of 5 samples", None
+        elif least.value % 1 or of.value % 1:
+            yield least.span, "samples are counted in whole numbers", "3 of 5 samples", None
+        return
+    yield from _time(of, "of")
+    if least.dimension != SHARE or not 0 < least.base <= 1:
+        yield least.span, f"'{least}' is no share of a time", "such as 60 %", None
+
+
+def _close(word: str, known: Iterable[str]) -> str | None:
+    close = get_close_matches(word, list(known), 1, 0.6)
+    return f"did you mean '{close[0]}'?" if close else None
+
+
+def _listed(words: Iterable[str]) -> str:
+    names = list(words)
+    return "one of " + ", ".join(names) if len(names) > 1 else "".join(names) or "nothing"

@@ -1,0 +1,294 @@
+"""Formulas made ready to run: one list of steps, in which what formulas share is done once.
+
+Every formula becomes a step that reads the results of steps before it. Two formulas that say the
+same of the same variables, in one rule or in several, are one step. An object variable is an axis of
+the arrays, so that one step serves all choices of objects. A program only says what is to be done:
+`monitor` does it to single intervals, `machine` to those of all choices of objects.
+
+What speaks of the future is turned into the past by waiting (Maler and Nickovic's pastification):
+`eventually[5 s] f` is told 5 s late as `f within 5 s`, and what stands beside it waits as long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass, field
+
+from visup.rules.formula.nodes import (
+    And,
+    Comparison,
+    Formula,
+    Future,
+    Last,
+    Not,
+    Often,
+    Or,
+    Past,
+    Predicate,
+    Quantified,
+    Rule,
+    Since,
+    Until,
+    Window,
+)
+from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.units import Number, ticks
+from visup.rules.monitoring.intervals import EQUAL
+from visup.rules.monitoring.operators import (
+    Counting,
+    Lasting,
+    Latching,
+    Operator,
+    Recalling,
+    Sliding,
+    SoFar,
+)
+
+Scope = tuple[tuple[str, bool], ...]
+"""The variables of a formula by axis, each with whether it may repeat another one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of a program.
+
+    Attributes:
+        kind: 'number', 'look', 'remember', 'exists' or 'forall'; or what is done to the intervals of
+            one moment: 'not', 'abs', 'least', 'most', 'above', 'below', 'compare', '+', '-', '*',
+            '/', 'rate'.
+        reads: Steps whose values it reads.
+        axes: Axes of the objects that its value depends on.
+        numbers: Of 'number' the number; of 'above' and 'below' what is added, then what ties decide;
+            of 'compare' the latter; of 'rate' the factor.
+        node: Of 'look' what is looked up.
+        order: Of 'look' the axes in the order in which its objects are named; of a quantifier its
+            axis, then those whose objects it leaves out.
+        operator: Of 'remember'.
+    """
+
+    kind: str
+    reads: tuple[int, ...] = ()
+    axes: frozenset[int] = frozenset()
+    numbers: tuple[float, ...] = ()
+    node: Predicate | Measure | None = None
+    order: tuple[int, ...] = ()
+    operator: Operator | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the value of a formula is found.
+
+    Attributes:
+        step: Its step.
+        delay: How late it comes, microseconds.
+        axes: Axes of the objects that it depends on.
+        certain: Whether it is no matter of degree: its robustness is always infinite.
+    """
+
+    step: int
+    delay: int = 0
+    axes: frozenset[int] = frozenset()
+    certain: bool = False
+
+
+@dataclass
+class Program:
+    """Steps in order, each reading those before it.
+
+    Attributes:
+        steps: The steps.
+        places: What makes a step the same as another -> its number.
+    """
+
+    steps: list[Step] = field(default_factory=list)
+    places: dict[Hashable, int] = field(default_factory=dict)
+
+    def add(self, key: Hashable, step: Step) -> int:
+        """The step of that key, made when there is none yet."""
+        if key not in self.places:
+            self.steps.append(step)
+            self.places[key] = len(self.steps) - 1
+        return self.places[key]
+
+    def looks(self) -> Iterable[tuple[int, Predicate | Measure]]:
+        """What is looked up, each with its step."""
+        return ((k, s.node) for k, s in enumerate(self.steps) if s.node is not None)
+
+    def operators(self) -> Iterable[Operator]:
+        """What remembers."""
+        return (s.operator for s in self.steps if s.operator is not None)
+
+
+class Compiler:
+    """Puts formulas into a program."""
+
+    def __init__(self) -> None:
+        self.program = Program()
+
+    def rule(self, rule: Rule) -> tuple[Place, ...]:
+        """The places of `when` and `unless`, which come equally late."""
+        scope = tuple((v, v in rule.may_repeat) for v in rule.variables)
+        return tuple(self._together([self.formula(f, scope) for f in rule.formulas]))
+
+    def formula(self, node: Formula, scope: Scope = ()) -> Place:
+        """The place of a formula, after its steps have been put into the program."""
+        match node:
+            case Predicate():
+                return self._called(node, scope, certain=True)
+            case Comparison():
+                return self._comparison(node, scope)
+            case Not(part=part):
+                return self._map("not", self.formula(part, scope))
+            case And(parts=parts) | Or(parts=parts):
+                join = "least" if isinstance(node, And) else "most"
+                return self._joined(join, [self.formula(p, scope) for p in parts])
+            case Past(kind=kind, part=part, window=window):
+                return self._past(kind, window, self.formula(part, scope))
+            case Since(left=left, right=right, window=window):
+                sides = self._together([self.formula(left, scope), self.formula(right, scope)])
+                return self._since(window, *sides)
+            case Future(kind=kind, part=part, window=window):
+                assert window is not None
+                past = "once" if kind == "eventually" else "always"
+                low, high = ticks(window.low.base), ticks(window.high.base)
+                return self._slid(past, 0, high - low, high, self.formula(part, scope))
+            case Until(left=left, right=right, window=window):
+                return self._until(window, self.formula(left, scope), self.formula(right, scope))
+            case Often(part=part, least=least, of=of):
+                span = round(of.base) if node.counts_samples else ticks(of.base)
+                counting = Counting(least.base, span, node.counts_samples)
+                return self._operator(counting, self.formula(part, scope))
+            case Last(part=part, duration=age):
+                return self._recalled(age, self.formula(part, scope))
+            case Quantified():
+                return self._quantified(node, scope)
+
+    def term(self, node: Term, scope: Scope = ()) -> Place:
+        """The place of a quantity."""
+        match node:
+            case Number():
+                step = Step("number", numbers=(node.base,))
+                return Place(self.program.add(("number", node.base), step))
+            case Measure():
+                return self._called(node, scope, certain=False)
+            case Negative(part=part):
+                return self._map("not", self.term(part, scope))
+            case Arithmetic(left=left, operator=operator, right=right):
+                return self._map(operator, self.term(left, scope), self.term(right, scope))
+            case Combined(name="abs", parts=(part,)):
+                return self._map("abs", self.term(part, scope))
+            case Combined(name=name, parts=parts):
+                join = "least" if name == "min" else "most"
+                return self._joined(join, [self.term(p, scope) for p in parts])
+            case OverTime():
+                return self._over_time(node, self.term(node.part, scope))
+
+    def _map(self, kind: str, *at: Place, numbers: tuple[float, ...] = ()) -> Place:
+        """A step that remembers nothing."""
+        axes, reads = _axes(at), tuple(p.step for p in at)
+        step = self.program.add((kind, numbers, reads), Step(kind, reads, axes, numbers))
+        return Place(step, at[0].delay, axes, all(p.certain for p in at))
+
+    def _joined(self, join: str, parts: list[Place]) -> Place:
+        together = self._together(parts)
+        at = together[0]
+        for part in together[1:]:
+            at = self._map(join, at, part)
+        return at
+
+    def _together(self, parts: list[Place]) -> list[Place]:
+        """The same parts, those that come earlier made to wait for the latest one."""
+        latest = max(p.delay for p in parts)
+        return [self._waited(p, latest - p.delay) for p in parts]
+
+    def _waited(self, at: Place, wait: int) -> Place:
+        return self._slid("always", wait, wait, wait, at) if wait else at
+
+    def _operator(
+        self, operator: Operator, *at: Place, delay: int = 0, certain: bool = False
+    ) -> Place:
+        """A step that remembers."""
+        axes, reads = _axes(at), tuple(p.step for p in at)
+        step = Step("remember", reads, axes, operator=operator)
+        return Place(self.program.add((operator, reads), step), at[0].delay + delay, axes, certain)
+
+    def _slid(self, kind: str, low: int, high: int, delay: int, *at: Place) -> Place:
+        certain = all(p.certain for p in at)
+        lasting = certain and low == 0 and kind in ("always", "once")
+        operator: Operator = Lasting(kind, high) if lasting else Sliding(kind, low, high)
+        return self._operator(operator, *at, delay=delay, certain=certain)
+
+    def _past(self, kind: str, window: Window | None, at: Place) -> Place:
+        if window is not None:
+            return self._slid(kind, ticks(window.low.base), ticks(window.high.base), 0, at)
+        return self._operator(SoFar(kind), at, certain=at.certain)
+
+    def _since(self, window: Window | None, left: Place, right: Place) -> Place:
+        if window is None:
+            certain = left.certain and right.certain
+            return self._operator(SoFar("since"), left, right, certain=certain)
+        return self._slid("since", 0, ticks(window.high.base), 0, left, right)
+
+    def _until(self, window: Window | None, left: Place, right: Place) -> Place:
+        assert window is not None
+        left, right = self._together([left, right])
+        span = ticks(window.high.base)
+        return self._slid("until", 0, span, span, left, right)
+
+    def _recalled(self, age: Number, at: Place) -> Place:
+        return self._operator(Recalling(ticks(age.base)), at, certain=at.certain)
+
+    def _comparison(self, node: Comparison, scope: Scope) -> Place:
+        entered = self._compared(node.operator, node.left, node.right, scope)
+        if node.leave is None:
+            return entered
+        left = self._compared(node.operator, node.left, node.leave, scope)
+        return self._operator(Latching(), entered, left)
+
+    def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> Place:
+        by = EQUAL if "=" in operator else -EQUAL
+        more, less = (left, right) if operator[0] == ">" else (right, left)
+        # With a number on one side nothing can fail to be a number, and half the work is saved.
+        if isinstance(less, Number):
+            return self._map("above", self.term(more, scope), numbers=(-less.base, by))
+        if isinstance(more, Number):
+            return self._map("below", self.term(less, scope), numbers=(more.base, by))
+        sides = self.term(more, scope), self.term(less, scope)
+        return self._map("compare", *sides, numbers=(by,))
+
+    def _over_time(self, node: OverTime, at: Place) -> Place:
+        span = ticks(node.duration.base)
+        match node.name:
+            case "last":
+                return self._recalled(node.duration, at)
+            case "before":
+                return self._slid("always", span, span, 0, at)
+            case "lowest" | "highest":
+                return self._slid("always" if node.name == "lowest" else "once", 0, span, 0, at)
+        begin = self._slid("always", span, span, 0, at)
+        return self._map("rate", at, begin, numbers=(1.0 / node.duration.base,))
+
+    def _called(self, node: Predicate | Measure, scope: Scope, certain: bool) -> Place:
+        names = [name for name, _ in scope]
+        # An inner variable hides an outer one of its name.
+        axis = {name: i for i, name in enumerate(names)}
+        order = tuple(axis[w] for w in node.words if w in axis)
+        words = tuple(axis.get(w, w) for w in node.words)
+        key = ("look", type(node).__name__, node.name, words)
+        step = Step("look", axes=frozenset(order), node=node, order=order)
+        return Place(self.program.add(key, step), 0, frozenset(order), certain)
+
+    def _quantified(self, node: Quantified, scope: Scope) -> Place:
+        axis = len(scope)
+        at = self.formula(node.part, (*scope, (node.variable, node.may_repeat)))
+        apart = () if node.may_repeat else tuple(i for i, (_, r) in enumerate(scope) if not r)
+        axes, order = (at.axes | frozenset(apart)) - {axis}, (axis, *apart)
+        step = Step(node.kind, (at.step,), axes, order=order)
+        return Place(
+            self.program.add((node.kind, at.step, order), step), at.delay, axes, at.certain
+        )
+
+
+def _axes(at: Iterable[Place]) -> frozenset[int]:
+    return frozenset[int]().union(*(p.axes for p in at))

@@ -1,0 +1,235 @@
+"""A program laid out for a number of objects: where every interval and every state stands.
+
+Most steps are done by `machine`. Those that keep windows are done one by one between its calls, on
+what these have made; few calls are enough, since windows rarely look at windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from visup.rules.formula.nodes import Predicate
+from visup.rules.formula.terms import Measure
+from visup.rules.monitoring import vm as machine
+from visup.rules.monitoring.compiler import Program, Step
+from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Arrays, Interval
+from visup.rules.monitoring.operators import (
+    LONG_AGO,
+    REACH,
+    Counting,
+    Lasting,
+    Latching,
+    Recalling,
+    Sliding,
+    SoFar,
+)
+from visup.rules.monitoring.states import Memory, Moments, States, Window
+from visup.rules.monitoring.vm import Codes, Floats, bits
+
+_ON = Arrays()
+_KINDS = {
+    "not": machine.NOT,
+    "abs": machine.ABS,
+    "least": machine.LEAST,
+    "most": machine.MOST,
+    "above": machine.SHIFT,
+    "below": machine.BELOW,
+    "compare": machine.COMPARE,
+    "+": machine.PLUS,
+    "-": machine.MINUS,
+    "*": machine.TIMES,
+    "/": machine.OVER,
+    "rate": machine.RATE,
+    "exists": machine.SOME,
+    "forall": machine.EVERY,
+    "number": machine.NUMBER,
+}
+
+
+class _Stage(NamedTuple):
+    """What follows from what stages before have made: instructions, their numbers, then windows."""
+
+    rows: list[list[int]]
+    numbers: list[tuple[float, float]]
+    windows: list[int]
+
+
+class Layout:
+    """A program for a number of objects.
+
+    Args:
+        program: The steps.
+        n: Number of objects.
+        facts: Where the codes of each fact begin, by the step that looks it up.
+        codes: How many codes of facts there are.
+
+    Attributes:
+        places: Where the intervals of each step begin.
+        axes: Axes of the objects that each depends on, in order.
+        size: Of all intervals, numbers.
+        looked: Of those of the quantities that are looked up; they come first, in their order.
+        memory: Where states stand.
+        fresh: The states before the first sample.
+    """
+
+    def __init__(self, program: Program, n: int, facts: Mapping[int, int], codes: int) -> None:
+        self.program, self.n, self.facts, self.codes = program, n, facts, codes
+        self.places: list[int] = []
+        self.axes = [tuple(sorted(step.axes)) for step in program.steps]
+        self.size = 0
+        self._stages: list[_Stage] = []
+        self._ready: list[int] = []  # the stage from which on each step's value is there
+        self._wider: dict[tuple[int, frozenset[int]], int] = {}
+        self._moments: list[Moments] = []
+        self._windows: list[Window] = []
+        self._kept = 0
+        # Quantities stand before all else, so that they are put there in one go.
+        measured = [k for k, node in program.looks() if isinstance(node, Measure)]
+        places = {k: self._room(n ** len(self.axes[k])) for k in measured}
+        self.looked = self.size
+        for number, step in enumerate(program.steps):
+            room = places.get(number)
+            self.places.append(self._room(n ** len(step.axes)) if room is None else room)
+            self._lay(number, step)
+        self.memory = Memory(n, tuple(self._moments), tuple(self._windows))
+        self.fresh = self.memory.fresh()
+        rows = [row for stage in self._stages for row in stage.rows]
+        numbers = [pair for stage in self._stages for pair in stage.numbers]
+        self._code = np.array(rows, dtype=np.int64).reshape(-1, machine.WIDTH)
+        self._numbers = np.array(numbers, dtype=np.float64).reshape(-1, 2)
+        self._ends = np.cumsum([len(stage.rows) for stage in self._stages]).tolist()
+
+    def step(self, states: States, now: int, facts: Codes, arena: Floats) -> States:
+        """Judge one sample.
+
+        Args:
+            states: States before, for as many objects.
+            now: Microseconds.
+            facts: Codes of the facts that are looked up.
+            arena: (size,) all intervals; those of the quantities that are looked up stand in it.
+
+        Returns:
+            States after; the arena holds the intervals of all steps.
+        """
+        then, before, windows = states.then, states.moments, list(states.windows)
+        if then is not None and now - then > REACH:
+            before = self.memory.silenced(before, then + REACH)
+        code, numbers, n, moment = self._code, self._numbers, self.n, float(now)
+        after, begin = np.empty_like(before), 0
+        changed = before is not states.moments
+        for end, stage in zip(self._ends, self._stages, strict=True):
+            if machine.run(code, numbers, begin, end, n, moment, facts, arena, before, after):
+                changed = True
+            begin = end
+            for slot in stage.windows:
+                w = self._windows[slot]
+                # What is remembered must not change when the arena does.
+                parts = [arena[read].reshape(2, -1).copy() for read in w.reads]
+                windows[slot], value = w.step(windows[slot], now, *parts)
+                arena[w.place].reshape(2, -1)[:] = value
+        return States(now, after if changed else states.moments, tuple(windows))
+
+    def interval(self, step: int, rows: tuple[int, ...], arena: Floats) -> Interval:
+        """The interval of a step for one choice of objects, by the rows of these along all axes."""
+        axes, at = self.axes[step], 0
+        for axis in axes:
+            at = at * self.n + rows[axis]
+        at += self.places[step]
+        return arena.item(at), arena.item(at + self.n ** len(axes))
+
+    def _lay(self, number: int, step: Step) -> None:
+        """Say how a step is done."""
+        cells = self.n ** len(step.axes)
+        stage = max((self._ready[r] for r in step.reads), default=0)
+        if isinstance(step.operator, Sliding | Counting):
+            self._stage(stage).windows.append(len(self._windows))
+            starts = [self._wide(r, step.axes) for r in step.reads]
+            self._windows.append(
+                Window(
+                    step.operator,
+                    step.operator.on(_ON),
+                    len(step.axes),
+                    tuple(slice(at, at + 2 * cells) for at in starts),
+                    slice(self.places[number], self.places[number] + 2 * cells),
+                )
+            )
+            stage += 1
+        elif step.node is None or isinstance(step.node, Predicate):
+            self._put(stage, *self._row(number, step, cells))
+        self._ready.append(stage)
+
+    def _row(self, number: int, step: Step, cells: int) -> tuple[list[int], tuple[float, float]]:
+        """The instruction of a step that the machine does."""
+        row, numbers = [0] * machine.WIDTH, (*step.numbers, 0.0, 0.0)
+        row[machine.DEST], row[machine.CELLS] = self.places[number], cells
+        row[machine.MASK] = bits(step.axes)
+        if step.node is not None:
+            row[machine.OP], row[machine.A] = machine.FACT, self.facts[number]
+            row[machine.AXIS] = int(len(step.order) == 2 and step.order[0] > step.order[1])
+        elif step.kind in ("exists", "forall"):
+            (read,) = step.reads
+            row[machine.OP], row[machine.A] = _KINDS[step.kind], self.places[read]
+            row[machine.MASK_A] = bits(self.program.steps[read].axes)
+            row[machine.AXIS], row[machine.APART] = step.order[0], bits(step.order[1:])
+        else:
+            for column, read in zip((machine.A, machine.B), step.reads, strict=False):
+                row[column] = self._wide(read, step.axes)
+            if step.operator is None:
+                row[machine.OP] = _KINDS[step.kind]
+            else:
+                operator = cast("Lasting | SoFar | Latching | Recalling", step.operator)
+                row[machine.OP], span, fills = _moment(operator)
+                row[machine.STATE], numbers = self._kept, (span, 0.0)
+                self._moments.append(Moments(operator, len(step.axes), self._kept, fills))
+                self._kept += cells * len(fills)
+        return row, (numbers[0], numbers[1])
+
+    def _wide(self, read: int, axes: frozenset[int]) -> int:
+        """Where a step's intervals stand for objects along some axes."""
+        own = self.program.steps[read].axes
+        if own == axes:
+            return self.places[read]
+        if (read, axes) not in self._wider:
+            cells = self.n ** len(axes)
+            row = [0] * machine.WIDTH
+            row[machine.OP], row[machine.A] = machine.SPREAD, self.places[read]
+            row[machine.DEST], row[machine.CELLS] = self._room(cells), cells
+            row[machine.MASK_A], row[machine.MASK] = bits(own), bits(axes)
+            self._put(self._ready[read], row, (0.0, 0.0))
+            self._wider[read, axes] = row[machine.DEST]
+        return self._wider[read, axes]
+
+    def _room(self, cells: int) -> int:
+        self.size += 2 * cells
+        return self.size - 2 * cells
+
+    def _stage(self, stage: int) -> _Stage:
+        while len(self._stages) <= stage:
+            self._stages.append(_Stage([], [], []))
+        return self._stages[stage]
+
+    def _put(self, stage: int, row: list[int], numbers: tuple[float, float]) -> None:
+        rows, pairs, _ = self._stage(stage)
+        rows.append(row)
+        pairs.append(numbers)
+
+
+def _moment(
+    operator: Lasting | SoFar | Latching | Recalling,
+) -> tuple[int, float, tuple[float, ...]]:
+    """How the machine does an operator, its span, and what its state is before the first sample."""
+    match operator:
+        case Lasting(kind=kind, high=high):
+            # Before the first sample it may have been otherwise than wanted.
+            op = machine.LASTS if kind == "always" else machine.HAPPENED
+            return op, float(high), (np.inf, -np.inf)
+        case SoFar(kind=kind):
+            ops = {"always": machine.ALWAYS, "once": machine.ONCE, "since": machine.SINCE}
+            return ops[kind], 0.0, TRUE if kind == "always" else FALSE
+        case Latching():
+            return machine.LATCH, 0.0, (0.0,)
+        case Recalling(age=age):
+            return machine.RECALL, float(age), (*UNKNOWN, float(LONG_AGO))

@@ -1,0 +1,199 @@
+"""How fast an object turns, from the orientations that its views tell.
+
+Over a window of time the object turns at one rate: R(t) = turned(w * (t - m)) R(m). Rate w and
+orientation R(m) are fitted together by least squares (Gauss-Newton on rotations, `spin_fit.py`). Where
+the orientations jump (to that of a symmetric object's twin), both sides have an R(m) of their own
+and share w, which is the same for twins.
+
+An object may be hit. Against the one rate stand two, one before and one after a change at a time that is
+fitted too; the orientation is continuous there, so that what was known before helps to measure what
+comes after. The change is believed when the two rates differ by more than their uncertainty allows;
+from then on what lies farther back is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from visup.agent import Spin
+from visup.rules.pose.rotations import Floats
+from visup.rules.pose.spin_fit import Fit, FitSettings, Turns, first_rate, long_pieces, thinned
+
+
+@dataclass(frozen=True, slots=True)
+class SpinSettings(FitSettings):
+    """How spin is measured; the rest as in `FitSettings`.
+
+    Attributes:
+        window_s: The longest stretch over which a rate is fitted.
+        recent_s: The stretch from which a first guess of the rate now is made.
+        changes_s: A change of rate is looked for about so many seconds ago.
+        change: A change is believed from this squared difference of rates on, in variances, ...
+        gain: ... when each parameter more saves the cost of so many residuals.
+        unchanged: It is believed no longer below this squared difference.
+        doubt: A rate is doubted when that of the last seconds differs by this, squared, in variances.
+        kept_s: So much of the time before a change is still heeded.
+        least: Orientations that a window needs.
+        known_deg_s: A rate is told when its standard deviation is below this ...
+        known_share: ... or below this share of the rate.
+    """
+
+    window_s: float = 40.0
+    recent_s: float = 4.0
+    changes_s: tuple[float, ...] = (3.0, 6.0, 10.0, 15.0, 22.0)
+    change: float = 8.0
+    unchanged: float = 2.0
+    gain: float = 4.0
+    doubt: float = 12.0
+    kept_s: float = 5.0
+    least: int = 8
+    known_deg_s: float = 1.0
+    known_share: float = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rate:
+    """A fitted rate.
+
+    Attributes:
+        vector: (3,) rotation vector per second, camera frame, radians.
+        covariance: (3, 3) of `vector`.
+        scatter: Share of its trace that is due to scatter, which makes `vector` longer than it is.
+        since: Seconds since when the object turns at this rate, as far as is known.
+        before: (3,) the rate before a change at `since`, or None when no change is known.
+    """
+
+    vector: Floats
+    covariance: Floats
+    scatter: float
+    since: float
+    before: Floats | None = None
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of a component of `vector`, the mean of the three."""
+        return float(np.sqrt(np.trace(self.covariance) / 3))
+
+
+def measured_rate(
+    turns: Turns, now: float, before: Rate | None, settings: SpinSettings
+) -> Rate | None:
+    """The rate at which an object turns now.
+
+    Args:
+        turns: Its orientations up to now.
+        now: Seconds.
+        before: The rate as measured last, or None.
+        settings: How it is measured.
+
+    Returns:
+        The rate, or None while there are too few orientations.
+    """
+    begin = now - settings.window_s
+    if before is not None:
+        begin = max(begin, before.since - settings.kept_s)
+    turns = turns.since(begin - 1e-6)
+    recent = _fitted(turns.since(now - settings.recent_s), None, settings)
+    recent = recent or _fitted(turns, None, settings)
+    if recent is None:
+        return None
+    known = _known(turns, before, settings) if before is not None else None
+    even = turns if known is None else turns.since(known.since)
+    steady = _fitted(even, recent.rates[0] if before is None else before.vector, settings)
+    if steady is None:
+        return _rate_of(known or recent, settings)
+    changed = _changed(steady, even, now, recent.rates[0], settings)
+    return _doubted(_rate_of(changed or known or steady, settings), recent, settings)
+
+
+def _doubted(rate: Rate, recent: Fit, settings: SpinSettings) -> Rate:
+    """The same rate, less certain when the last seconds alone tell another: it may just be changing."""
+    lately = _rate_of(recent, settings)
+    apart = lately.vector - rate.vector
+    both = lately.covariance + rate.covariance
+    if apart @ np.linalg.solve(both, apart) < settings.doubt:
+        return rate
+    return replace(rate, covariance=rate.covariance + np.outer(apart, apart) / 4)
+
+
+def _known(turns: Turns, before: Rate, settings: SpinSettings) -> Fit | None:
+    """The fit with the change that was found before, or None when there is none (any more)."""
+    if before.before is None or len(turns.times) < 2 * settings.least:
+        return None
+    if not turns.times[0] + 0.5 < before.since < turns.times[-1] - 0.5:
+        return None
+    pieces = long_pieces(turns, before.vector, settings)
+    if (pieces >= 0).sum() < 2 * settings.least:
+        return None
+    rates = np.stack([before.before, before.vector])
+    fit = Fit(*thinned(turns, pieces, settings), rates, before.since, settings)
+    return fit if fit.run(settings.steps) and fit.contrast() > settings.unchanged else None
+
+
+def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
+    """A rate in the words of the mind, or None when it is too uncertain to be told."""
+    length = float(np.linalg.norm(rate.vector))
+    axis = rate.vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
+    # The length of a scattered vector is too great.
+    excess = rate.scatter * float(np.trace(rate.covariance))
+    degrees = float(np.degrees(np.sqrt(max(0.0, length**2 - excess))))
+    along = float(axis @ rate.covariance @ axis)
+    sigma = float(np.degrees(np.sqrt(max(along, rate.sigma**2 if length**2 < excess else along))))
+    if sigma > max(settings.known_deg_s, settings.known_share * degrees):
+        return None
+    x, y, z = axis.tolist()
+    return Spin(degrees, sigma, (x, y, z))
+
+
+def _fitted(turns: Turns, start: Floats | None, settings: SpinSettings) -> Fit | None:
+    """One rate for all of the time, or None when too few orientations hang together."""
+    if len(turns.times) < settings.least:
+        return None
+    guess = start if start is not None else first_rate(turns, settings)
+    pieces = long_pieces(turns, guess, settings)
+    if (pieces >= 0).sum() < settings.least:
+        return None
+    fit = Fit(*thinned(turns, pieces, settings), np.stack([guess]), None, settings)
+    steps = settings.steps if start is not None else 2 * settings.steps + 1
+    return fit if fit.run(steps) else None
+
+
+def _changed(
+    steady: Fit, turns: Turns, now: float, after: Floats, settings: SpinSettings
+) -> Fit | None:
+    """The best fit of two rates with a change between them, or None when there is none to be believed."""
+    before = steady.rates[0]
+    pieces = long_pieces(turns, before, settings)
+    if (pieces >= 0).sum() < 2 * settings.least:
+        return None
+    turns, pieces = thinned(turns, pieces, settings)
+    times = [now - ago for ago in settings.changes_s]
+    inside = [t for t in times if turns.times[0] + 1.0 < t < turns.times[-1] - 1.0]
+    # What one step saves tells where to look: the promise of a step alone is often an empty one.
+    tried = [Fit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
+    tried = [fit for fit in tried if fit.run(1)]
+    if not tried or min(fit.cost for fit in tried) > steady.cost:
+        return None
+    change = min(tried, key=lambda fit: fit.cost).since
+    fit = Fit(turns, pieces, np.stack([before, after]), change, settings)
+    believed = fit.run(2 * settings.steps) and fit.contrast() > settings.change
+    return fit if believed and _gain(steady, fit) > settings.gain else None
+
+
+def _gain(steady: Fit, changed: Fit) -> float:
+    """How much better two rates fit: cost saved by each further parameter, in costs of a residual."""
+    return (steady.cost - changed.cost) / 4 / max(changed.cost / changed.residuals, 1e-12)
+
+
+def _rate_of(fit: Fit, settings: SpinSettings) -> Rate:
+    covariance, span = fit.covariance(-1), max(fit.span, 1e-6)
+    # However still the views stand, the object may have turned a part of the way to the next.
+    unseen = (np.radians(settings.view_deg) / span) ** 2
+    stuck = settings.view_share * float(np.linalg.norm(fit.rates[-1]))
+    unseen += min(stuck, np.radians(settings.view_most_deg) / span) ** 2
+    scatter = float(np.trace(covariance))
+    share = scatter / (scatter + 3 * unseen)
+    before = fit.rates[0] if fit.change is not None else None
+    return Rate(fit.rates[-1], covariance + np.eye(3) * unseen, share, fit.since, before)

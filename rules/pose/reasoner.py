@@ -1,0 +1,355 @@
+"""Which way objects face and how they turn: the interpretation trees of each object, and what comes of them.
+
+Every object has a tree for each model that was hypothesised for it lately (`interpretation.py`). The cheapest
+path of the most likely model tells the view, since when, and the orientations from which the spin is
+measured (`spin.py`). How much dearer the paths of other models are tells who the object cannot be:
+`pose_support`, which the votes heed in the next step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import exp
+from types import MappingProxyType
+
+import numpy as np
+
+from visup.agent import Hypothesis, Mind, ObjectBelief, Observation, Outcome, Pose, Presence
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.orientation import views
+from visup.rules.pose._interpretation_tree_jit import NONE
+from visup.rules.pose.angular_velocity import Rate, SpinSettings, measured_rate, spin_of
+from visup.rules.pose.interpretation_tree import (
+    Level,
+    Tree,
+    TreeSettings,
+    Turning,
+    grown,
+    lead,
+    levels_of,
+    look_weight,
+    planted,
+    rival_gap,
+)
+from visup.rules.pose.rotations import Floats
+from visup.rules.pose.spin_fit import Turns
+from visup.rules.presence.association import hypotheses_by_object
+from visup.rules.presence.lifecycle import visible_share
+
+POSES = "rules.pose"
+Look = tuple[tuple[str, int, float, float | None], ...]
+"""What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSettings:
+    """How poses are believed.
+
+    Attributes:
+        tree: Costs and bounds of the interpretation trees.
+        spin: How spin is measured.
+        every_s: Looks at one object are at least so far apart.
+        most_looks: Objects whose trees grow in one step at most; those that have waited longest come
+            first. The budget of the dearest part of thinking: it counts work, not time, so that what
+            is believed is the same on every machine.
+        refit_s: Spin is measured so often.
+        least_visible: Below this share in sight an object's hypotheses are not heeded.
+        most_names: Models of an object that have trees.
+        memory_s: Costs of models are forgotten to 37 % in this time.
+        free_cost: A model's cost above that of the cheapest which costs no support.
+        support_cost: So much more lets its support fall to 37 %.
+        settle_s: Orientations remembered for the spin are at least so far apart.
+        lead: How much a lead of the chosen hypotheses over quite other ones, in units of their
+            cost, adds to the logarithm of the odds that the pose is right. Errors of similarity
+            last as long as the view: looks do not add up.
+        loosest: Radians per second; how fast objects of unknown spin may turn.
+        surest: Radians per second; least uncertainty of a believed spin for the tree.
+        stale_s: Without a look for so long, confidence falls to 37 %.
+        spin_stale_s: Without a look for so long, the spin is unknown.
+    """
+
+    tree: TreeSettings = field(default_factory=TreeSettings)
+    spin: SpinSettings = field(default_factory=SpinSettings)
+    every_s: float = 0.2
+    most_looks: int = 4
+    refit_s: float = 1.0
+    least_visible: float = 0.5
+    most_names: int = 6
+    memory_s: float = 3.0
+    free_cost: float = 6.0
+    support_cost: float = 6.0
+    settle_s: float = 0.2
+    lead: float = 3.0
+    loosest: float = 0.35
+    surest: float = 0.09
+    stale_s: float = 10.0
+    spin_stale_s: float = 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """What is remembered of one object's views.
+
+    Attributes:
+        time: Seconds of the last look, or minus infinity.
+        said: What was said then; when the same is said again nobody looked anew.
+        trees: Model name -> its tree.
+        levels: Model name -> its level, for each of the last looks.
+        strain: Model name -> cost of its cheapest path, forgotten over time.
+        untold: The same of a model that was never hypothesised.
+        support: Model name -> how far its strain lets it be the object, 0 to 1.
+        unsaid: The same of a model that was never hypothesised.
+        name: The model whose orientations are in `settled`.
+        lead: By how much its chosen hypotheses cost less than quite other ones, over time.
+        settled: (seconds, orientation) along its cheapest path, of looks older than the trees'.
+        rate: How it turns, or None when it is not known.
+        rated: Seconds when the rate was measured.
+        pose: What is believed since the last look, or None when nothing is.
+    """
+
+    time: float = -np.inf
+    said: Look = ()
+    trees: Mapping[str, Tree] = field(default_factory=lambda: MappingProxyType({}))
+    levels: tuple[Mapping[str, Level], ...] = ()
+    strain: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    untold: float = 0.0
+    support: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    unsaid: float = 1.0
+    name: str = ""
+    lead: float = 0.0
+    settled: tuple[tuple[float, Floats], ...] = ()
+    rate: Rate | None = None
+    rated: float = -np.inf
+    pose: Pose | None = None
+
+
+NO_TRACK = Track()
+NO_TRACKS: Mapping[int, Track] = MappingProxyType({})
+
+
+def tracks(mind: Mind) -> Mapping[int, Track]:
+    """Object id -> what is remembered of its views."""
+    found: Mapping[int, Track] = mind.memory.get(POSES, NO_TRACKS)
+    return found
+
+
+def pose_support(mind: Mind, object_id: int, name: str) -> float:
+    """How well an object's views over time hang together if it is of a model.
+
+    Args:
+        mind: After the last step.
+        object_id: The object.
+        name: The model.
+
+    Returns:
+        0 to 1: 1 for the model whose cheapest path costs least and for those that cost little more;
+        1 as well when nothing is known of the object's views.
+    """
+    track = tracks(mind).get(object_id)
+    return 1.0 if track is None else track.support.get(name, track.unsaid)
+
+
+@dataclass(frozen=True, slots=True)
+class BelievePose:
+    """Thinker of the cogitate phase: which way each object faces and how it turns. Runs after the votes."""
+
+    settings: PoseSettings = PoseSettings()
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Take in one step's view hypotheses; see `Thinker`."""
+        said = hypotheses_by_object(mind, observation)
+        known, kept, beliefs = tracks(mind), {}, []
+        due = self._due(mind, said, known)
+        for object_id, belief in mind.objects.items():
+            track = known.get(object_id, NO_TRACK)
+            if object_id in due:
+                track = self._looked(track, said[object_id], belief.name, mind.time)
+            if track.trees:
+                kept[object_id] = track
+            pose = self._now(track, belief.name, mind.time)
+            if pose != belief.pose:
+                beliefs.append(replace(belief, pose=pose))
+        mind = mind.with_objects(*beliefs) if beliefs else mind
+        return Outcome(mind.remember(POSES, MappingProxyType(kept)))
+
+    def _due(
+        self,
+        mind: Mind,
+        said: Mapping[int, tuple[Hypothesis, ...]],
+        known: Mapping[int, Track],
+    ) -> frozenset[int]:
+        """Objects whose trees grow now: looked at anew, not too soon, and within the budget."""
+        s = self.settings
+        waiting = [
+            (track.time, object_id)
+            for object_id, hypotheses in said.items()
+            if (track := known.get(object_id, NO_TRACK)).said != _look(hypotheses)
+            and mind.time - track.time >= s.every_s - 1e-9
+            and (belief := mind.objects.get(object_id)) is not None
+            and self._in_sight(mind, belief)
+        ]
+        return frozenset(number for _, number in sorted(waiting)[: s.most_looks])
+
+    def _in_sight(self, mind: Mind, belief: ObjectBelief) -> bool:
+        seen = belief.presence is Presence.SEEN
+        return seen and visible_share(mind, belief.id) >= self.settings.least_visible
+
+    def _looked(
+        self, track: Track, hypotheses: Sequence[Hypothesis], name: str, now: float
+    ) -> Track:
+        """The track after a look."""
+        said = _look(hypotheses)
+        levels = levels_of(hypotheses, now, self.settings.tree)
+        track = self._settled(track, name)
+        waited = now - track.time
+        track = self._rated(self._grown(replace(track, said=said), levels, now), name, now)
+        track = self._led(track, name, waited)
+        return replace(track, pose=self._pose(track, name))
+
+    def _grown(self, track: Track, levels: dict[str, Level], now: float) -> Track:
+        """The trees with one more level, and what their models have cost."""
+        s = self.settings
+        turning = _turning(track.rate, s)
+        fade = exp(-min(now - track.time, 1e6) / s.memory_s)
+        untold = track.untold * fade + look_weight(now - track.time, s.tree) * s.tree.wrong
+        trees, strain = {}, {}
+        for name in track.trees.keys() | levels.keys():
+            before = track.trees.get(name) or planted(s.tree)
+            new = name not in track.trees
+            # A model that is hypothesised for the first time was wrong at all looks before.
+            before = replace(before, time=track.time) if new else before
+            tree = grown(before, levels.get(name), now, turning, s.tree)
+            past = track.untold if new else track.strain[name]
+            trees[name], strain[name] = tree, past * fade + tree.total - before.total
+        least = min(strain.values())
+        likeliest = sorted(trees, key=lambda n: (strain[n], n))[: s.most_names]
+        return replace(
+            track,
+            time=now,
+            trees=MappingProxyType({n: trees[n] for n in likeliest}),
+            levels=(*track.levels, MappingProxyType(levels))[-s.tree.lag :],
+            strain=MappingProxyType({n: strain[n] for n in likeliest}),
+            untold=untold,
+            support=MappingProxyType({n: self._support(strain[n] - least) for n in likeliest}),
+            unsaid=self._support(untold - least),
+        )
+
+    def _support(self, dearer: float) -> float:
+        return exp(-max(0.0, dearer - self.settings.free_cost) / self.settings.support_cost)
+
+    def _settled(self, track: Track, name: str) -> Track:
+        """The track with the look that the trees are about to forget; another name begins anew."""
+        s = self.settings
+        if name != track.name:
+            return replace(track, name=name, lead=0.0, settled=(), rate=None)
+        tree = track.trees.get(name)
+        if tree is None or len(track.levels) < s.tree.lag:
+            return track
+        seen = _orientation(track.levels[0].get(name), int(tree.path[tree.best, 0]))
+        if seen is None:
+            return track
+        then = track.levels[0][name].time
+        if track.settled and then - track.settled[-1][0] < s.settle_s - 1e-9:
+            return track
+        oldest = then - s.spin.window_s
+        settled = (*track.settled, (then, seen))
+        forgotten = settled[0][0] < oldest
+        return replace(track, settled=settled[1:] if forgotten else settled)
+
+    def _rated(self, track: Track, name: str, now: float) -> Track:
+        if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
+            return track
+        turns = _turns(track, name, self.settings.tree.lag)
+        return replace(
+            track, rate=measured_rate(turns, now, track.rate, self.settings.spin), rated=now
+        )
+
+    def _led(self, track: Track, name: str, waited: float) -> Track:
+        """The track with the lead of the chosen hypotheses renewed."""
+        level, tree = track.levels[-1].get(name), track.trees.get(name)
+        if level is None or tree is None:
+            return track
+        fade = exp(-min(waited, 1e6) / self.settings.memory_s)
+        now = lead(level, int(tree.path[tree.best, -1]), self.settings.tree)
+        return replace(track, lead=track.lead * fade + now * (1.0 - fade))
+
+    def _pose(self, track: Track, name: str) -> Pose | None:
+        """What the cheapest path of a model tells."""
+        tree = track.trees.get(name)
+        if tree is None or not tree.begun:
+            return None
+        k = tree.best
+        orientation = _last(track, name, tree)
+        if np.isnan(orientation).any():
+            return None
+        direction, rotation = views(orientation)
+        x, y, z = direction.tolist()
+        return Pose(
+            name,
+            int(tree.view[k]),
+            (x, y, z),
+            float(rotation) if tree.rolled[k] else None,
+            since=float(tree.since[k]),
+            confidence=self._confidence(track, tree),
+            spin=spin_of(track.rate, self.settings.spin) if track.rate else None,
+        )
+
+    def _now(self, track: Track, name: str, now: float) -> Pose | None:
+        """The pose believed at the last look, as far as it still holds."""
+        pose, age = track.pose, now - track.time
+        if pose is None or pose.name != name or age <= 0.0:
+            return pose if pose is None or pose.name == name else None
+        spin = pose.spin if age < self.settings.spin_stale_s else None
+        return replace(pose, confidence=pose.confidence * self._fading(age), spin=spin)
+
+    def _confidence(self, track: Track, tree: Tree) -> float:
+        """Against the next best orientation: by paths' costs, which are log-likelihoods, and the lead."""
+        age = track.time - float(tree.chosen[tree.best])
+        odds = min(rival_gap(tree, self.settings.tree), self.settings.lead * track.lead)
+        return self._fading(age) / (1.0 + exp(-odds))
+
+    def _fading(self, age: float) -> float:
+        return exp(-max(0.0, age) / self.settings.stale_s)
+
+
+def _look(hypotheses: Sequence[Hypothesis]) -> Look:
+    return tuple((h.name, h.view, h.similarity, h.rotation) for h in hypotheses)
+
+
+def _turning(rate: Rate | None, settings: PoseSettings) -> Turning:
+    if rate is None or rate.sigma > settings.loosest:
+        return Turning(sigma=settings.loosest)
+    x, y, z = rate.vector.tolist()
+    return Turning((x, y, z), max(rate.sigma, settings.surest))
+
+
+def _orientation(level: Level | None, number: int) -> Floats | None:
+    """What a level tells if a path chose this hypothesis of it."""
+    if level is None or number == NONE or not level.rolled[number]:
+        return None
+    seen = level.between[number]
+    return None if np.isnan(seen[0, 0]) else seen
+
+
+def _turns(track: Track, name: str, lag: int) -> Turns:
+    """Orientations along the cheapest path of a model."""
+    tree = track.trees[name]
+    path = tree.path[tree.best, lag - len(track.levels) :]
+    recent = [
+        (levels[name].time, seen)
+        for levels, number in zip(track.levels, path.tolist(), strict=True)
+        if (seen := _orientation(levels.get(name), number)) is not None
+    ]
+    every = [*track.settled, *recent]
+    times = np.array([t for t, _ in every])
+    return Turns(times, np.array([r for _, r in every]).reshape(-1, 3, 3))
+
+
+def _last(track: Track, name: str, tree: Tree) -> Floats:
+    """The orientation that the cheapest path tells of last."""
+    path = tree.path[tree.best].tolist()
+    for levels, number in zip(reversed(track.levels), reversed(path), strict=False):
+        if number != NONE:
+            return np.asarray(levels[name].between[number])
+    return np.asarray(tree.orientation[tree.best])

@@ -1,0 +1,185 @@
+"""One mind as rules see it: truths and quantities of all objects and pairs, as arrays.
+
+What was not observed is unknown, never false. Truths are codes: `YES`, `NO`, `MAYBE` of not known.
+Quantities are intervals: value +- `SIGMAS` standard deviations where the deviation is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Mind, ObjectBelief, Truth
+from visup.rules.predicates._snapshot_jit import pair_quantities
+from visup.rules.relations.kinematics import Measured
+from visup.rules.relations.reasoner import NAMES, measured
+from visup.rules.wording.sentences import short
+
+Codes = NDArray[np.int8]
+Floats = NDArray[np.float64]
+YES, MAYBE, NO = 1, 0, -1
+CODE = {Truth.TRUE: YES, Truth.UNKNOWN: MAYBE, Truth.FALSE: NO}
+
+ITSELF = frozenset({"equal", "outlines_equal"})
+SIGMAS = 1.0
+"""How many standard deviations a measured quantity's interval reaches to either side."""
+
+RELATION_NAMES = (*NAMES, "coupled")
+"""Relations between two objects that rules may name."""
+
+
+class Facts:
+    """One mind as rules see it; made once for each step.
+
+    Args:
+        mind: The mind after relations were judged.
+
+    Attributes:
+        mind: The mind.
+        beliefs: Objects that are believed present, by increasing id.
+        ids: Their ids.
+        row: Id -> place in `ids`, and so in all arrays.
+        measured: Quantities of all pairs.
+    """
+
+    def __init__(self, mind: Mind) -> None:
+        self.mind = mind
+        self.beliefs = mind.present()
+        self.ids = tuple(b.id for b in self.beliefs)
+        self.row = {object_id: i for i, object_id in enumerate(self.ids)}
+        self.measured: Measured = measured(mind)
+        self._names: dict[int, str] = {}
+        self._codes: dict[str, Codes] = {}
+        self._paired: tuple[Floats, Codes] | None = None
+
+    def short(self, object_id: int) -> str:
+        """An object in two words; see `sentences.short`."""
+        if object_id not in self._names:
+            self._names[object_id] = short(self.mind, object_id)
+        return self._names[object_id]
+
+    def each(self, look: Callable[[ObjectBelief], int]) -> Codes:
+        """(n,) codes from a look at each object."""
+        return np.array([look(b) for b in self.beliefs], dtype=np.int8)
+
+    def among(self, ids: Collection[int | None]) -> Codes:
+        """(n,) `YES` of some objects, `NO` of the others."""
+        codes = [YES if i in ids else NO for i in self.ids] if ids else [NO] * len(self.ids)
+        return np.array(codes, dtype=np.int8)
+
+    def pairs(self, code: int) -> Codes:
+        """(n, n) codes that are all the same."""
+        codes = np.empty((len(self.ids), len(self.ids)), dtype=np.int8)
+        codes.fill(code)
+        return codes
+
+    def unknown(self, objects: int) -> Floats:
+        """(2, n) or (2, n, n) intervals of what is known of no object, or of no pair of objects."""
+        whole = np.empty((2, *(len(self.ids),) * objects))
+        whole[0], whole[1] = -np.inf, np.inf
+        return whole
+
+    def related(self, name: str) -> Codes:
+        """(n, n) codes of a relation, a the row and b the column."""
+        if name not in self._codes:
+            self._codes[name] = self._coupled() if name == "coupled" else self.relations((name,))[0]
+        return self._codes[name]
+
+    def relations(self, names: tuple[str, ...]) -> Codes:
+        """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
+        tables = self.mind.truths_of(names, self.ids)
+        # An object is equal to itself, and nothing else.
+        n = len(self.ids)
+        tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)
+        return tables
+
+    def _coupled(self) -> Codes:
+        codes, row = self.pairs(NO), self.row
+        for a, b in (c.objects for c in self.mind.couplings):
+            if a in row and b in row:
+                codes[row[a], row[b]] = codes[row[b], row[a]] = YES
+        return codes
+
+    @cached_property
+    def _rows(self) -> NDArray[np.intp]:
+        """Where the objects stand in what was measured; -1 for those that were not."""
+        known = {object_id: i for i, object_id in enumerate(self.measured.ids)}
+        return np.array([known.get(i, -1) for i in self.ids], dtype=np.intp)
+
+    def one(self, quantity: str) -> Floats:
+        """(n,) one quantity of each object; NaN when unknown."""
+        table: Floats = getattr(self.measured, quantity)
+        if self.measured.ids == self.ids:
+            return table
+        values = np.full(len(self.ids), np.nan)
+        known = self._rows >= 0
+        values[known] = table[self._rows[known]]
+        return values
+
+    def pair(self, quantity: str) -> Floats:
+        """(n, n) one quantity of each pair; NaN when unknown."""
+        table: Floats = getattr(self.measured, quantity)
+        if self.measured.ids == self.ids:
+            return table
+        values = np.full((len(self.ids), len(self.ids)), np.nan)
+        known = self._rows >= 0
+        inner = np.ix_(self._rows[known], self._rows[known])
+        values[np.ix_(known, known)] = table[inner]
+        return values
+
+    def of_pairs(self, quantity: int) -> Floats:
+        """(2, n, n) intervals of one of the quantities of `pair_loops`."""
+        whole: Floats = self._pairs[0][quantity]
+        return whole
+
+    @property
+    def first_contact(self) -> Codes:
+        """(n, n) whether the second is what the first would meet first."""
+        return self._pairs[1]
+
+    @property
+    def _pairs(self) -> tuple[Floats, Codes]:
+        """All quantities of pairs, and what is met first."""
+        if self._paired is None:
+            n = len(self.ids)
+            out, first = np.empty((4, 2, n, n)), np.empty((n, n), np.int8)
+            # Of one layout, so that the loops are compiled once.
+            gap, rate, sigma, relative = (
+                np.ascontiguousarray(self.pair(name))
+                for name in ("gap", "rate", "rate_sigma", "relative_speed")
+            )
+            pair_quantities(gap, rate, sigma, relative, SIGMAS, out, first)
+            self._paired = out, first
+        return self._paired
+
+
+@lru_cache(maxsize=256)
+def _of_itself(names: tuple[str, ...]) -> Codes:
+    """(k, 1) whether relations hold of an object and itself."""
+    codes = np.array([YES if name in ITSELF else NO for name in names], dtype=np.int8)
+    return codes.reshape(-1, 1)
+
+
+def code(value: bool) -> int:
+    """`YES` or `NO`."""
+    return YES if value else NO
+
+
+def exactly(values: Floats) -> Floats:
+    """(2, n) intervals of known values; NaN becomes unknown."""
+    known = values.tolist()
+    return np.array(
+        ([v if v == v else -np.inf for v in known], [v if v == v else np.inf for v in known])
+    )
+
+
+def between(low: Floats, high: Floats) -> Floats:
+    """(2, ...) intervals; NaN becomes unknown."""
+    both = np.empty((2, *low.shape))
+    # Of NaN and a number, these take the number.
+    np.fmax(low, -np.inf, out=both[0])
+    np.fmin(high, np.inf, out=both[1])
+    return both

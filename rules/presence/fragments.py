@@ -1,0 +1,202 @@
+"""Which new regions may be no objects of their own but parts of a body that is already known.
+
+A camera that sees motion now and then cuts a body in two: a shadow falls along an arm, a face of a
+spinning satellite moves unlike the rest of it. What first shows itself at, or within the outline
+of, something larger is therefore doubted until it has been clearly apart from that body for a while.
+Motion alone does not end a doubt: a sliver along an edge seems to slide on it (the aperture
+problem), and its outline wanders. The price: of two bodies of unequal size that touch from the
+first sight on, the smaller one is not told before they part.
+
+What came over the image border was never a part of a body inside and is not doubted, even where it
+passes before one soon after; at the start of a video nothing has come over the border yet. Of two
+regions that touch when both are new, the larger one is the body; where they are much of a size,
+neither is a part of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from visup.agent import Mind, ObjectBelief, Presence, Region
+from visup.agent.model.fast_replace import replace
+from visup.rules.geometry.outlines import outline_gap, ready
+from visup.rules.geometry.regions import DIRECTIONS, box_overlap, grow, scale
+from visup.rules.presence.sightings import Track, border_sides, expected_box
+
+FRAGMENTS = "rules.fragments"
+
+
+@dataclass(frozen=True, slots=True)
+class FragmentSettings:
+    """When a region counts as a possible part of another one, and when no longer.
+
+    Attributes:
+        part: Share of the body's area up to which a region may be a part of it.
+        touch: Outline gap up to which a region touches a body, image diagonals.
+        apart: Outline gap beyond which it is clearly apart, image diagonals.
+        apart_size: The same as a share of the root of its area; the greater one counts.
+        within: Share of its outline inside a body's convex hull, or of its box inside the place of
+            the body, by which it is within the body.
+        apart_s: How long it must be apart.
+    """
+
+    part: float = 0.7
+    touch: float = 0.006
+    apart: float = 0.012
+    apart_size: float = 0.25
+    within: float = 0.5
+    apart_s: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Whether a region that is not confirmed yet may be a part of a body.
+
+    Attributes:
+        body: Id of that object, or None while there is none.
+        over: Whether it has shown to be an object of its own; that is not doubted again.
+        apart_since: Seconds since when it is clearly apart from the body, or None.
+    """
+
+    body: int | None = None
+    over: bool = False
+    apart_since: float | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the region may be a part of a body now."""
+        return self.body is not None and not self.over
+
+
+@dataclass(frozen=True, slots=True)
+class Doubting:
+    """Keeps the doubts about regions from step to step."""
+
+    settings: FragmentSettings = FragmentSettings()
+
+    def __call__(
+        self,
+        before: Mapping[int, Doubt],
+        mind: Mind,
+        of: Mapping[int, Track],
+        *,
+        starting: bool,
+    ) -> dict[int, Doubt]:
+        """Judge one step.
+
+        Args:
+            before: Doubts of the step before, by object id.
+            mind: The mind; its unconfirmed objects are judged.
+            of: Tracks by object id.
+            starting: Whether the video has only begun.
+
+        Returns:
+            A doubt for each unconfirmed object; those out of sight keep theirs.
+        """
+        bodies = [b for b in mind.objects.values() if b.presence is not Presence.LEFT]
+        doubts = {}
+        for new in mind.objects.values():
+            if new.confirmed:
+                continue
+            doubt = before.get(new.id)
+            if new.last_seen == mind.time:
+                larger = [b for b in bodies if self._may_contain(b, new, of)]
+                if doubt is None:
+                    doubt = self._first(new, larger, mind, starting=starting)
+                doubt = doubt if doubt.over else self._again(doubt, new, larger, mind, of)
+            if doubt is not None:
+                doubts[new.id] = doubt
+        return doubts
+
+    def _first(
+        self, new: ObjectBelief, bodies: Iterable[ObjectBelief], mind: Mind, *, starting: bool
+    ) -> Doubt:
+        """What came over the border is not doubted, unless a body at that side reaches to it."""
+        sides = border_sides(new.region, mind.frame_size)
+        if starting or not sides:
+            return Doubt()
+        there = [b for b in bodies if sides & border_sides(b.region, mind.frame_size)]
+        return Doubt(over=self._body_of(new.region, there, mind) is None)
+
+    def _again(
+        self,
+        doubt: Doubt,
+        new: ObjectBelief,
+        bodies: Iterable[ObjectBelief],
+        mind: Mind,
+        of: Mapping[int, Track],
+    ) -> Doubt:
+        body = self._body_of(new.region, bodies, mind)
+        body = body or mind.objects.get(-1 if doubt.body is None else doubt.body)
+        if body is None or body.presence is Presence.LEFT:
+            return Doubt()
+        if body.id != doubt.body:
+            doubt = Doubt(body.id)
+        apart = self._gap(new.region, body.region, mind) is None and not self._in_place(
+            new.region, of.get(body.id), mind
+        )
+        since = (mind.time if doubt.apart_since is None else doubt.apart_since) if apart else None
+        parted = since is not None and mind.time - since >= self.settings.apart_s - 1e-6
+        return replace(doubt, apart_since=since, over=parted)
+
+    def _in_place(self, region: Region, body: Track | None, mind: Mind) -> bool:
+        """Whether a region is mostly where a body should be, of which little is seen for now."""
+        if body is None:
+            return False
+        x, y, w, h = region.bbox
+        inside = box_overlap(expected_box(body, mind.time), (x, y, w, h))
+        return inside >= self.settings.within * w * h
+
+    def _may_contain(self, body: ObjectBelief, new: ObjectBelief, of: Mapping[int, Track]) -> bool:
+        """Whether a belief may be the body of a new one: another one in sight, and larger."""
+        if body.id == new.id or body.id not in of or body.last_seen < new.first_seen:
+            return False
+        # A body that has lost a part is judged by what it was.
+        whole = max(body.region.area, of[body.id].reference if body.confirmed else 0.0)
+        return new.region.area <= self.settings.part * whole
+
+    def _gap(self, region: Region, body: Region, mind: Mind) -> float | None:
+        """Outline gap, pixels, or None when the two are clearly apart."""
+        s = self.settings
+        far = max(s.apart * scale(mind.frame_size), s.apart_size * region.area**0.5)
+        return outline_gap(region, body, far)
+
+    def _body_of(
+        self, region: Region, bodies: Iterable[ObjectBelief], mind: Mind
+    ) -> ObjectBelief | None:
+        """The nearest body that the region touches, or within whose outline it is."""
+        near: list[tuple[float, int, ObjectBelief]] = []
+        for body in bodies:
+            gap = self._gap(region, body.region, mind)
+            if gap is None:
+                continue
+            touches = gap <= self.settings.touch * scale(mind.frame_size)
+            if touches or share_within(region, body.region) >= self.settings.within:
+                near.append((gap, body.id, body))
+        return min(near)[2] if near else None
+
+
+def share_within(region: Region, body: Region) -> float:
+    """Share of a region's outline that lies within the convex hull of another, 0 to 1.
+
+    The hull is taken as the polygon of its tangents in `DIRECTIONS`, at most 2 % too wide.
+    """
+    points = ready(region).points @ DIRECTIONS.T
+    limit = (ready(body).points @ DIRECTIONS.T).max(axis=0)
+    return float((points <= limit + 1.0).all(axis=1).mean())
+
+
+def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, Track]) -> bool:
+    """Whether a region stands where a known object should be that is hidden, in part at least."""
+    for old in mind.objects.values():
+        track = of.get(old.id)
+        if not old.confirmed or old.presence is Presence.LEFT or track is None:
+            continue
+        if old.presence is Presence.SEEN and track.visible > 0.7:
+            continue
+        place = grow(expected_box(track, mind.time), 6)
+        x, y, w, h = new.region.bbox
+        if box_overlap(place, (x, y, w, h)) > 0.6 * max(1, w * h):
+            return True
+    return False

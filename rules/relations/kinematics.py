@@ -1,0 +1,301 @@
+"""Quantities of all objects and pairs: gaps, trends, velocities, measured in one vectorised pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import sqrt
+
+import numpy as np
+
+from visup.agent import Mind, ObjectBelief
+from visup.rules.geometry._fit_jit import fitted
+from visup.rules.geometry.outlines import NEAR, outline_gap
+from visup.rules.geometry.pairs import carried, pairs
+from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, scale
+from visup.rules.relations._kinematics_jit import (
+    CONTACT,
+    GAP,
+    RATE,
+    RELATIVE,
+    SIGMA,
+    contact_time,
+    near_pairs,
+    tables,
+)
+from visup.rules.relations.samples import History
+from visup.rules.relations.thresholds import JudgeSettings
+
+
+@dataclass(frozen=True, slots=True)
+class RelationSettings:
+    """Thresholds of the relations.
+
+    Attributes:
+        window_s: Length of the window over which lines are fitted.
+        samples: Most samples kept in the window.
+        bins: Most means of neighbouring samples to which lines are fitted.
+        quick_window_s: Length of a shorter window in which a trend must be strong to count; by it
+            a turn is seen sooner.
+        quick_sigmas: How many standard deviations of its slope that is, and twice `rate_enter`.
+        parting_gap: Gap up to which the motion of two bodies tells that they part, image diagonals.
+        motion_window_s: Length of the window over which velocities are fitted.
+        rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
+        rate_exit: Trend below which they end, image diagonals per second.
+        sigmas: How many standard deviations of the slope a trend must exceed to enter.
+        pending_sigmas: The same while a trend waits to be believed.
+        trend_minimum_s: Least duration of a trend before it is believed.
+        hold_s: How long the last gap stands for bodies that flicker out of sight.
+        depth_rate: Relative depth change that counts, share of the depth per second.
+        touch_enter: Outline gap at which bodies touch, image diagonals.
+        touch_exit: Outline gap at which they no longer do.
+        touch_minimum_s: Least duration of a touch.
+        still_speed: Relative speed over the window below which two bodies are at rest to each
+            other, image diagonals per second.
+        still_half: The same in each half of the window, where the noise is greater.
+        misfit: How unevenly an outline may move and still have a velocity, image diagonals/s.
+        apart_depth: Share of depth by which touching outlines belong to bodies apart in depth.
+        image_only_confidence: Most that a relation judged without depth is believed.
+        apart_exit: Share of depth below which touching outlines are no longer apart in depth.
+        together_exit: By how much relative motion may exceed its limit before two that move
+            together no longer do.
+        moving_exit: Share of the speed that moving together asks for at which it still goes on.
+        judge: Thresholds of RCC-8, QTC, direction and distance class.
+    """
+
+    window_s: float = 1.5
+    samples: int = 64
+    bins: int = 16
+    quick_window_s: float = 0.7
+    quick_sigmas: float = 4.0
+    parting_gap: float = 0.02
+    motion_window_s: float = 1.25
+    rate_enter: float = 0.002
+    rate_exit: float = 0.001
+    sigmas: float = 3.0
+    pending_sigmas: float = 2.0
+    trend_minimum_s: float = 0.3
+    hold_s: float = 0.3
+    depth_rate: float = 0.02
+    touch_enter: float = 0.0035
+    touch_exit: float = 0.006
+    touch_minimum_s: float = 0.2
+    still_speed: float = 0.0025
+    still_half: float = 0.0045
+    misfit: float = 0.0075
+    apart_depth: float = 0.25
+    image_only_confidence: float = 0.8
+    apart_exit: float = 0.2
+    together_exit: float = 1.5
+    moving_exit: float = 0.7
+    judge: JudgeSettings = field(
+        default_factory=lambda: JudgeSettings(speed_enter=0.002, speed_exit=0.001)
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """Quantities of the last step; what rules compare. NaN is unknown.
+
+    Attributes:
+        ids: (M,) object ids, increasing.
+        tables: (5, M, M) `gap`, `rate`, `rate_sigma`, `relative_speed`, `time_to_contact`.
+        motion: (3, M, 2) velocities over the window of motion, in its first and in its second half,
+            pixels per second in the image.
+        speed: (M,) pixels per second in the image.
+        depth: (M,) in the objects' units.
+        spread: Standard deviation of a component of a velocity that noise of the outlines makes.
+        noise_px: Standard deviation of an outline, pixels.
+    """
+
+    ids: tuple[int, ...] = ()
+    tables: Floats = field(default_factory=lambda: np.zeros((5, 0, 0)))
+    motion: Floats = field(default_factory=lambda: np.zeros((3, 0, 2)))
+    speed: Floats = field(default_factory=lambda: np.zeros(0))
+    depth: Floats = field(default_factory=lambda: np.zeros(0))
+    spread: float = float("nan")
+    noise_px: float = 0.0
+
+    @property
+    def gap(self) -> Floats:
+        """(M, M) distance of the outlines, pixels."""
+        return self._table(GAP)
+
+    @property
+    def rate(self) -> Floats:
+        """(M, M) trend of the distance, pixels per second, negative when closing."""
+        return self._table(RATE)
+
+    @property
+    def rate_sigma(self) -> Floats:
+        """(M, M) its standard deviation."""
+        return self._table(SIGMA)
+
+    @property
+    def relative_speed(self) -> Floats:
+        """(M, M) pixels per second."""
+        return self._table(RELATIVE)
+
+    @property
+    def time_to_contact(self) -> Floats:
+        """(M, M) seconds until the outlines meet if they go on so.
+
+        0 where they meet, infinite where they do not close in.
+        """
+        return self._table(CONTACT)
+
+    def _table(self, number: int) -> Floats:
+        found: Floats = self.tables[number]
+        return found
+
+    @property
+    def velocity(self) -> Floats:
+        """(M, 2) pixels per second in the image."""
+        found: Floats = self.motion[0]
+        return found
+
+    @property
+    def velocity_sigma(self) -> Floats:
+        """(M,) standard deviation of a component of each velocity, pixels per second."""
+        return np.full(len(self.ids), self.spread)
+
+    def pair(self, quantity: str, a: int, b: int) -> float:
+        """One quantity of one pair ('gap', 'rate', 'time_to_contact', ...), NaN when unknown."""
+        if a not in self.ids or b not in self.ids:
+            return float("nan")
+        table: Floats = getattr(self, quantity)
+        return float(table[self.ids.index(a), self.ids.index(b)])
+
+    def one(self, quantity: str, a: int) -> float:
+        """One quantity of one object ('speed', 'depth'), NaN when unknown."""
+        if a not in self.ids:
+            return float("nan")
+        return float(getattr(self, quantity)[self.ids.index(a)])
+
+    def interval(self, quantity: str, a: int, b: int, sigmas: float = 2.0) -> tuple[float, float]:
+        """Where one quantity of one pair lies in view of its noise.
+
+        Args:
+            quantity: 'gap', 'rate', 'relative_speed' or 'time_to_contact'.
+            a: An object.
+            b: Another.
+            sigmas: How many standard deviations to either side.
+
+        Returns:
+            (low, high) in the quantity's unit; both NaN when unknown. A time to contact lies
+            between those of the highest and the lowest closing speed.
+        """
+        value = self.pair(quantity, a, b)
+        if quantity == "time_to_contact":
+            gap, rate = self.interval("gap", a, b, sigmas), self.interval("rate", a, b, sigmas)
+            if value == 0.0 or np.isnan(value):
+                return value, value
+            soon, late = sorted(map(contact_time, gap, rate))
+            return soon, late
+        wide = sigmas * self._sigma(quantity, a, b)
+        low = value - wide
+        return (low if quantity == "rate" else max(0.0, low)) if low == low else low, value + wide
+
+    def _sigma(self, quantity: str, a: int, b: int) -> float:
+        if quantity == "rate":
+            return self.pair("rate_sigma", a, b)
+        if quantity == "relative_speed":
+            both = a in self.ids and b in self.ids
+            return sqrt(2.0) * self.spread if both else float("nan")
+        return self.noise_px * sqrt(2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Measuring:
+    """Turns samples into quantities."""
+
+    settings: RelationSettings
+
+    def __call__(
+        self,
+        h: History,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        mind: Mind,
+        before: Measured,
+    ) -> Measured:
+        """Measure one step.
+
+        Args:
+            h: Samples up to now.
+            objects: The objects of the samples.
+            seen: (M, 8) how they were seen; see `sightings`.
+            mind: The mind.
+            before: What was measured in the step before.
+
+        Returns:
+            All quantities; NaN where unknown.
+        """
+        s, diagonal = self.settings, scale(mind.frame_size)
+        noise, strong = s.judge.noise_px, 2.0 * s.rate_enter * diagonal
+        gaps = self._gaps(objects, seen, h, mind, before)
+        windows = s.window_s, s.quick_window_s, s.motion_window_s
+        slope, sigma, motion, spread = fitted(
+            h.times,
+            h.support,
+            h.free,
+            h.separation,
+            DIRECTIONS,
+            (*windows, noise, strong, s.quick_sigmas, s.misfit * diagonal),
+            s.bins,
+            mind.time,
+        )
+        found, speed = tables(
+            gaps,
+            slope,
+            sigma,
+            motion[0],
+            h.support[-1] if len(h.times) else NOWHERE,
+            seen,
+            DIRECTIONS,
+            (s.parting_gap * diagonal, strong, s.quick_sigmas, 0.5 * s.window_s),
+        )
+        depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
+        return Measured(h.ids, found, motion, speed, depth, spread, noise)
+
+    def _gaps(
+        self,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        h: History,
+        mind: Mind,
+        before: Measured,
+    ) -> Floats:
+        """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
+        m, near = len(objects), NEAR * scale(mind.frame_size)
+        apart = h.separation[-1] if len(h.times) else np.full((m, m), np.nan)
+        last = before.gap if before.ids == h.ids else _moved(before.gap, before.ids, h.ids)
+        found, asked = near_pairs(seen, apart, last, near, self.settings.hold_s)
+        i, j = pairs(m)
+        for k in asked.tolist():
+            gap = outline_gap(objects[i[k]].region, objects[j[k]].region, near)
+            found[k] = found[k] if gap is None else gap
+        return found
+
+
+NOWHERE = np.empty((0, FAN))
+
+
+def _moved(table: Floats, old: tuple[int, ...], new: tuple[int, ...]) -> Floats:
+    """A table of all pairs of other objects; NaN for pairs with a new one."""
+    rows, _ = carried(old, new)
+    wide = np.pad(table, (0, 1), constant_values=np.nan)
+    return np.ascontiguousarray(wide[np.ix_(rows, rows)])
+
+
+def sightings(objects: tuple[ObjectBelief, ...], now: float) -> Floats:
+    """(M, 8) how bodies were seen; see `measure_loops.py`."""
+    rows = []
+    for b in objects:
+        r = b.region
+        told = b.last_seen == now and r.velocity_sigma > 0.0
+        x, y, sigma = (*r.velocity, r.velocity_sigma) if told else UNTOLD
+        rows.append((now - b.last_seen, x, y, sigma, *r.bbox))
+    return np.array(rows, dtype=float).reshape(-1, 8)
+
+
+UNTOLD = (float("nan"),) * 3

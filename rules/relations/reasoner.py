@@ -1,0 +1,367 @@
+"""What holds between objects: relations of all pairs, in one vectorised pass per step.
+
+The distance whose trend is judged is the signed distance of the outlines' convex hulls: it goes
+on smoothly through zero into penetration depth when one body reaches in front of another, and it
+does not depend on the centroid of a body that the image border cuts (paper, section 7.4, fits the
+trend of the tracking data by a line). Each relation has a threshold to enter and another to leave
+it, both relative to the noise of the fit, and a least duration. Names and numbers of pixels are
+for an image diagonal of 800 px (640 x 480) and scale with the diagonal.
+
+An image distance that shrinks does not mean that bodies come closer in space. Where the depth of
+both is known, its trend is judged too, and a relation that the two contradict is unknown; where it
+is not known the image alone is judged and the confidence is capped at `image_only_confidence`.
+What is said of depth itself (`nearing_in_depth`, ...) is unknown without depth.
+
+How to read them off a mind:
+
+- `related(mind, name, a, b) -> Truth`: any relation of two objects, those of `NAMES` among them;
+- `relation_of(mind, name, a, b) -> Relation | None`: the same with confidence, value, since;
+- `qtc(mind, a, b) -> str | None`: QTC-C such as '-0+0'; its first two signs are QTC-B;
+- `measured(mind).pair(quantity, a, b) -> float`: 'gap', 'rate', 'relative_speed', 'rate_sigma',
+  'time_to_contact'; NaN unknown; `measured(mind).interval(quantity, a, b) -> (low, high)`;
+- `measured(mind).one(quantity, a) -> float`: 'speed', 'depth';
+- `zones.inside(mind, object_id, zone_name) -> Truth`, and more in `zones.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import sqrt
+
+import numpy as np
+
+from visup.agent import (
+    Column,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Relation,
+    RelationTable,
+    Truth,
+)
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.relation_columns import Cells, Columns
+from visup.rules.geometry._fit_jit import trends
+from visup.rules.geometry.ema import share_of
+from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Latch, step, unknown_latch
+from visup.rules.geometry.pairs import carried, pairs
+from visup.rules.geometry.regions import RCC8, Floats, scale
+from visup.rules.presence.sightings import merged_pairs
+from visup.rules.relations._reasoner_jit import COUPLED, MERGED, outlines, places, told, wanted
+from visup.rules.relations._thresholds_jit import hold_sign, judged
+from visup.rules.relations.direction import CONVERSE as DIRECTION_CONVERSE
+from visup.rules.relations.direction import DIRECTION_NAMES
+from visup.rules.relations.distance import CLASS_NAMES
+from visup.rules.relations.kinematics import Measured, Measuring, RelationSettings, sightings
+from visup.rules.relations.qtc import text
+from visup.rules.relations.rcc8 import (
+    CONVERSE,
+    from_outline_signs,
+    from_signs,
+    outline_differences,
+)
+from visup.rules.relations.samples import History, covered, sample
+from visup.rules.relations.thresholds import AWAY, JUDGED, ORDER, SIDE, least_durations, limits
+from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
+
+RELATIONS = "rules.relations"
+DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
+TOWARDS_NAMES = ("moving_towards", "steady_to", "moving_away_from")
+SIDE_NAMES = ("moving_left_of", "", "moving_right_of")
+OUTLINE_NAMES = tuple(f"outlines_{name}" for name in RCC8)
+NAMES = tuple(
+    name
+    for names in (
+        TREND_NAMES,
+        ("touching", "moving_together"),
+        DEPTH_NAMES,
+        RCC8,
+        OUTLINE_NAMES,
+        TOWARDS_NAMES,
+        SIDE_NAMES,
+        DIRECTION_NAMES,
+        CLASS_NAMES,
+    )
+    for name in names
+    if name
+)
+"""Every relation of two objects that is judged here; `coupled` is judged by `coupling.py`."""
+
+TREND, TOUCH, TOGETHER, DEPTH = range(JUDGED, JUDGED + 4)
+OUTLINE = slice(JUDGED + 4, JUDGED + 7)
+ROWS = JUDGED + 7
+"""Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
+
+_SURE, _MOSTLY, _TREND, _GAP, _RATE, _SIGMA, _RELATIVE = range(7)
+COLUMNS = Columns(
+    (
+        Column(TREND_NAMES, (0, 0), _TREND, _RATE, _SIGMA),
+        Column(("", "touching"), (1, 1), _MOSTLY, _GAP),
+        Column(("", "moving_together"), (2, 2), _MOSTLY, _RELATIVE),
+        Column(RCC8, (3, 4), _SURE, listed="one"),
+        Column(("distance",), (5, 5), _SURE, _GAP),
+        Column(OUTLINE_NAMES, (6, 7), _SURE, listed="none"),
+        Column(DEPTH_NAMES, (8, 8), _MOSTLY, listed="none"),
+        Column(TOWARDS_NAMES, (9, 10), _MOSTLY, listed="none"),
+        Column(SIDE_NAMES, (11, 12), _MOSTLY, listed="none"),
+        Column(CLASS_NAMES, (13, 13), _SURE, _GAP, listed="none"),
+        Column(DIRECTION_NAMES, (14, 15), _SURE),
+    )
+)
+"""What the rows of `relation_loops.told` stand for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Smooth:
+    """Places of objects, smoothed a little; see `smooth.py`.
+
+    Attributes:
+        time: Seconds of the last step.
+        boxes: (M, 4) x, y, width, height, pixels.
+        gap: (P,) of the outlines, pixels.
+        outlines: (3, P) pixels; see `outline_differences`.
+    """
+
+    time: float
+    boxes: Floats
+    gap: Floats
+    outlines: Floats
+
+
+def _no_smooth() -> Smooth:
+    return Smooth(0.0, np.zeros((0, 4)), np.zeros(0), np.zeros((3, 0)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """What the relations remember from step to step.
+
+    Attributes:
+        history: Samples that lines are fitted to.
+        measured: Quantities of the last step.
+        latch: (ROWS, P) states of the pairs of the history's objects.
+        rcc8: (2, P) RCC-8 of boxes and of outlines, which follow from some of these states.
+        smooth: What states of place are judged by.
+    """
+
+    history: History = field(default_factory=History)
+    measured: Measured = field(default_factory=Measured)
+    latch: Latch = field(default_factory=lambda: unknown_latch((ROWS, 0), 0.0))
+    rcc8: Latch = field(default_factory=lambda: unknown_latch((2, 0), 0.0))
+    smooth: Smooth = field(default_factory=lambda: _no_smooth())
+
+
+NOTHING_KEPT = Kept()
+
+
+def measured(mind: Mind) -> Measured:
+    """The quantities of the last step, as `Relations` left them in the mind."""
+    kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
+    return kept.measured
+
+
+def relation_of(mind: Mind, name: str, a: int, b: int) -> Relation | None:
+    """A relation of two objects as the mind holds it, in this order, or None if it is not judged."""
+    return mind.relation(name, a, b)
+
+
+def related(mind: Mind, name: str, a: int, b: int) -> Truth:
+    """Whether a relation holds from a to b; unknown when it is not judged.
+
+    Args:
+        mind: The mind after this step's relations.
+        name: One of `NAMES`, `coupled`, or a plug-in's own.
+        a: An object.
+        b: Another; the order matters for RCC-8's proper parts, movements and directions.
+    """
+    found = mind.relation(name, a, b)
+    return Truth.UNKNOWN if found is None else found.truth
+
+
+def qtc(mind: Mind, a: int, b: int) -> str | None:
+    """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
+    kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
+    k, turned = RelationTable(kept.history.ids).pair(a, b)
+    if k < 0:
+        return None
+    order = slice(None, None, -1) if turned else slice(None)
+    state = kept.latch.state
+    return text(*(int(c) for rows in (AWAY, SIDE) for c in state[rows, k][order]))
+
+
+@dataclass(frozen=True, slots=True)
+class Relations:
+    """Thinker of the cogitate phase: judges all relations of all pairs of present objects."""
+
+    settings: RelationSettings = field(default_factory=RelationSettings)
+    _lasts: Floats = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_lasts", self._durations())
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Thinker`."""
+        s = self.settings
+        kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
+        objects = mind.present()
+        before = _of_these(kept, tuple(b.id for b in objects), mind.time)
+        history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
+        seen = sightings(objects, mind.time)
+        now = Measuring(s)(history, objects, seen, mind, kept.measured)
+        smooth = self._smooth(before.smooth, now, objects, seen, mind)
+        wants = self._wanted(before.latch, history, now, smooth, mind)
+        latch = step(before.latch, wants, mind.time, self._lasts)
+        rcc8 = before.rcc8
+        if latch is not before.latch:  # else these follow from what is as it was
+            state = latch.state
+            held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
+            rcc8 = step(rcc8, held, mind.time, 0.0)
+        kept = Kept(history, now, latch, rcc8, smooth)
+        table = RelationTable(now.ids, (self._cells(kept, mind),))
+        return Outcome(mind.remember(RELATIONS, kept, relations=table))
+
+    def _durations(self) -> Floats:
+        s = self.settings
+        lasts = np.full((ROWS, 1), s.touch_minimum_s)
+        lasts[:JUDGED] = least_durations(s.judge)
+        lasts[[TREND, TOGETHER, DEPTH]] = s.trend_minimum_s
+        return lasts
+
+    def _wanted(
+        self,
+        before: Latch,
+        h: History,
+        now: Measured,
+        smooth: Smooth,
+        mind: Mind,
+    ) -> Codes:
+        s, diagonal = self.settings, scale(mind.frame_size)
+        codes = np.empty(before.state.shape, dtype=np.int8)
+        bounds = limits(s.judge, diagonal)
+        judged(before.state, smooth.boxes, now.velocity, now.velocity_sigma, bounds, codes)
+        codes[DEPTH] = self._depth_trend(h)
+        wanted(
+            before.state[TREND:DEPTH],
+            before.pending[TREND:DEPTH],
+            now.tables,
+            now.motion,
+            now.speed,
+            now.depth,
+            smooth.gap,
+            _marks(h.ids, mind),
+            self._limits(diagonal),
+            codes[TREND : DEPTH + 1],
+        )
+        level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
+        codes[OUTLINE] = hold_sign(smooth.outlines, before.state[OUTLINE], *level)
+        return codes
+
+    def _limits(self, diagonal: float) -> Limits:
+        """Thresholds as `relation_loops.wanted` takes them."""
+        s = self.settings
+        return (
+            (s.rate_enter * diagonal, s.rate_exit * diagonal),
+            (s.sigmas, s.pending_sigmas),
+            (s.touch_enter * diagonal, s.touch_exit * diagonal, s.apart_exit, s.apart_depth),
+            (
+                s.still_speed * diagonal,
+                s.still_half * diagonal,
+                s.together_exit,
+                s.moving_exit,
+            ),
+        )
+
+    def _smooth(
+        self,
+        before: Smooth,
+        now: Measured,
+        objects: tuple[ObjectBelief, ...],
+        seen: Floats,
+        mind: Mind,
+    ) -> Smooth:
+        """Boxes as they are, or were until a moment ago; gaps; outlines that may meet."""
+        s, diagonal = self.settings, scale(mind.frame_size)
+        share, jump = share_of(mind.time - before.time), 6.0 * s.judge.noise_px
+        wide, near = jump * sqrt(2.0), 2.0 * s.judge.level_enter * diagonal
+        boxes, gap, asked = places(
+            before.boxes, before.gap, seen, now.tables, (share, jump, wide, s.hold_s, near)
+        )
+        apart = outline_differences([b.region for b in objects], asked.tolist())
+        level = outlines(before.outlines, gap, asked, apart, (share, wide, 0.05 * diagonal))
+        return Smooth(mind.time, boxes, gap, level)
+
+    def _depth_trend(self, h: History) -> Codes:
+        """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
+        i, j = pairs(len(h.ids))
+        codes = np.full(len(i), UNKNOWN, dtype=np.int8)
+        found_at = h.depth == h.depth  # NaN is not equal to itself
+        if not found_at.any() or not covered(h, self.settings.window_s):
+            return codes
+        known = found_at.mean(axis=0) >= 0.6
+        at = np.flatnonzero(known[i] & known[j])
+        if len(at) == 0:
+            return codes
+        first, second = h.depth[:, i[at]], h.depth[:, j[at]]
+        slope, sigma = trends(h.times, np.abs(first - second), self.settings.bins)
+        typical = 0.5 * np.nanmean(first + second, axis=0)
+        least = np.maximum(self.settings.depth_rate * typical, 3.0 * sigma)
+        found = np.full(len(at), KEEPING, dtype=np.int8)
+        found[slope < -least] = CONVERGING
+        found[slope > least] = DIVERGING
+        codes[at] = found
+        return codes
+
+    def _cells(self, kept: Kept, mind: Mind) -> Cells:
+        s, now = self.settings, kept.measured
+        floor = s.rate_enter * scale(mind.frame_size) / 3.0
+        found = told(
+            kept.latch.state,
+            kept.latch.since,
+            kept.rcc8.state,
+            kept.rcc8.since,
+            now.tables,
+            now.depth,
+            CONVERSE,
+            DIRECTION_CONVERSE,
+            (mind.time, s.image_only_confidence, floor),
+        )
+        return Cells(COLUMNS, *found)
+
+
+Limits = tuple[
+    tuple[float, float],
+    tuple[float, float],
+    tuple[float, float, float, float],
+    tuple[float, float, float, float],
+]
+
+
+def _of_these(kept: Kept, ids: tuple[int, ...], now: float) -> Kept:
+    """What was kept, of other objects."""
+    if kept.history.ids == ids:
+        return kept
+    rows, numbers = carried(kept.history.ids, ids)
+    smooth = Smooth(
+        kept.smooth.time,
+        np.append(kept.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
+        np.append(kept.smooth.gap, np.nan)[numbers],
+        np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1).take(numbers, axis=1),
+    )
+    latch, rcc8 = kept.latch.select(numbers, now), kept.rcc8.select(numbers, now)
+    return replace(kept, latch=latch, rcc8=rcc8, smooth=smooth)
+
+
+def _marks(ids: tuple[int, ...], mind: Mind) -> Codes:
+    """(P,) marks of pairs that are coupled, or merged in one region."""
+    table = RelationTable(ids)
+    marks = np.zeros(len(ids) * (len(ids) - 1) // 2, dtype=np.int8)
+    for mark, found in (
+        (COUPLED, [c.objects for c in mind.couplings]),
+        (MERGED, merged_pairs(mind)),
+    ):
+        for pair in found:
+            k, _ = table.pair(*pair)
+            if k >= 0:
+                marks[k] |= mark
+    return marks

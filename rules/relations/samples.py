@@ -1,0 +1,168 @@
+"""The last second or two of all objects, as arrays: what lines are fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Mind, ObjectBelief, Observation, Presence
+from visup.agent.model.fast_replace import replace
+from visup.rules.geometry.outlines import reach
+from visup.rules.geometry.regions import FAN, Floats, hull_separation
+from visup.rules.presence.sightings import merged_pairs, tracks
+
+ROOM = 64
+"""For how many further samples memory is made ready."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class History:
+    """The last samples of all objects that relations are judged of.
+
+    Those of one moment are rows of the same memory as those of the moments before and after, which
+    is written to only where no history reaches yet: many minds are kept for little more than one.
+
+    Attributes:
+        ids: (M,) object ids, increasing.
+        times: (T,) seconds, increasing, all within the window.
+        support: (T, M, 16) pixels; NaN where an object was not seen.
+        free: (T, M, 16) bool.
+        separation: (T, M, M) signed hull distances, pixels.
+        depth: (T, M) in the objects' units; NaN where unknown.
+        start: Row of their memory in which the arrays begin.
+    """
+
+    ids: tuple[int, ...] = ()
+    times: Floats = field(default_factory=lambda: np.zeros(0))
+    support: Floats = field(default_factory=lambda: np.zeros((0, 0, FAN)))
+    free: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0, FAN), dtype=bool))
+    separation: Floats = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    depth: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    start: int = 0
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """Times, and what was sampled at these."""
+        return self.times, self.support, self.free, self.separation, self.depth
+
+
+def sample(
+    history: History,
+    objects: tuple[ObjectBelief, ...],
+    mind: Mind,
+    observation: Observation,
+    window_s: float,
+    most: int,
+) -> History:
+    """A history with this step's sample, and without those that are too old.
+
+    Args:
+        history: The samples before.
+        objects: The objects that are present now, by id.
+        mind: The mind.
+        observation: Whether anybody looked for regions in this step.
+        window_s: How far back samples are kept, seconds.
+        most: Most samples in that time; a sample that comes sooner is left out.
+
+    Returns:
+        The samples of these objects; NaN for those that are not seen now.
+    """
+    ids = tuple(b.id for b in objects)
+    history = reindexed(history, ids)
+    old = int(history.times.searchsorted(mind.time - window_s - 1e-6, side="right"))
+    least = window_s / most
+    due = len(history.times) == 0 or mind.time - history.times[-1] >= least - 1e-6
+    if not (due and observation.observed("region")):
+        return without(history, old)
+    joint = {i for pair in merged_pairs(mind) for i in pair}
+    support = np.full((len(ids), FAN), np.nan)
+    free = np.zeros((len(ids), FAN), dtype=bool)
+    depth = np.full(len(ids), np.nan)
+    for i, b in enumerate(objects):
+        if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
+            reach(b.region, mind.frame_size, support[i], free[i])
+            depth[i] = np.nan if b.depth is None else b.depth
+    row = (mind.time, support, free, hull_separation(support), depth)
+    return extended(comparable(history, mind), row, old)
+
+
+def covered(history: History, window_s: float) -> bool:
+    """Whether enough of the window is filled for a fit: six samples over three fifths of it."""
+    times = history.times
+    return len(times) >= 6 and bool(times[-1] - times[0] >= 0.6 * window_s)
+
+
+def reindexed(history: History, ids: tuple[int, ...]) -> History:
+    """A history of other objects: those that are new have no samples, others keep theirs."""
+    if ids == history.ids:
+        return history
+    t, m = len(history.times), len(ids)
+    support, free = np.full((t, m, FAN), np.nan), np.zeros((t, m, FAN), dtype=bool)
+    separation, depth = np.full((t, m, m), np.nan), np.full((t, m), np.nan)
+    new = [i for i, x in enumerate(ids) if x in history.ids]
+    old = [history.ids.index(ids[i]) for i in new]
+    support[:, new], free[:, new] = history.support[:, old], history.free[:, old]
+    depth[:, new] = history.depth[:, old]
+    separation[np.ix_(range(t), new, new)] = history.separation[np.ix_(range(t), old, old)]
+    return History(ids, history.times, support, free, separation, depth)
+
+
+def comparable(history: History, mind: Mind) -> History:
+    """A history without the samples of objects whose regions have changed their nature since."""
+    of = tracks(mind).of
+    changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
+    if not len(history.times) or not (changed > history.times[0] + 1e-9).any():
+        return history
+    old = history.times[:, None] < changed[None, :] - 1e-9
+    # Samples that are rid of them already stay the arrays that they are.
+    if not (old[:, :, None] & (history.support == history.support)).any():
+        return history
+    either = old[:, :, None] | old[:, None, :]
+    return replace(
+        history,
+        support=np.where(old[:, :, None], np.nan, history.support),
+        separation=np.where(either, np.nan, history.separation),
+    )
+
+
+def without(history: History, old: int) -> History:
+    """A history without its `old` oldest samples."""
+    if not old:
+        return history
+    times, support, free, separation, depth = (a[old:] for a in history.arrays)
+    return History(history.ids, times, support, free, separation, depth, history.start + old)
+
+
+def extended(history: History, row: tuple[Any, ...], old: int = 0) -> History:
+    """A history with one more sample (time, support, free, separation, depth) and without old ones."""
+    count = len(history.times)
+    end = history.start + count
+    memory: list[Any] = [a.base for a in history.arrays]
+    # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
+    if any(m is None or len(m) <= end for m in memory) or memory[0][end] == memory[0][end]:
+        history = _with_room(without(history, old), max(ROOM, count))
+        count, old = count - old, 0
+        end = count
+        memory = [a.base for a in history.arrays]
+    for values, new in zip(memory, row, strict=True):
+        values[end] = new
+    start = history.start + old
+    times, support, free, separation, depth = [m[start : end + 1] for m in memory]
+    return History(history.ids, times, support, free, separation, depth, start)
+
+
+def _with_room(history: History, more: int) -> History:
+    """The same history in memory of its own, with room for more samples."""
+    count = len(history.times)
+
+    def roomy(values: NDArray[Any]) -> NDArray[Any]:
+        blank = False if values.dtype == np.bool_ else np.nan
+        wide = np.full((count + more, *values.shape[1:]), blank, dtype=values.dtype)
+        wide[:count] = values
+        return wide[:count]
+
+    times, support, free, separation, depth = map(roomy, history.arrays)
+    return History(history.ids, times, support, free, separation, depth)

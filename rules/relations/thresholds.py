@@ -1,0 +1,92 @@
+"""From quantities of pairs to qualitative states: thresholds above the noise, with hysteresis.
+
+Shared by the relations of an agent's objects (`relations.py`) and those of plain boxes
+(`boxes.py`). All states of all pairs stand in one array of codes, a row for each question, so that
+one latch holds them all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from visup.rules.geometry.hysteresis import Floats
+
+ORDER, DIRECTION, DISTANCE = slice(0, 8), 8, 9
+AWAY, SIDE = slice(10, 12), slice(12, 14)
+MOVEMENT = slice(10, 14)
+JUDGED = 14
+"""Rows of codes: order of edges (8), direction, distance class, QTC-B (2) and its sides (2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class JudgeSettings:
+    """Thresholds of what is judged here. Lengths are shares of the image diagonal but for the noise.
+
+    Attributes:
+        noise_px: Standard deviation of an edge of a box from frame to frame, pixels.
+        level_enter: Edges farther apart than this are no longer level.
+        level_exit: Edges nearer than this are level again.
+        place_enter: Centres nearer than this come to one place.
+        place_exit: Centres farther apart than this are at two places.
+        cone_slack_deg: How far beyond the edge of its cone a direction is kept, degrees.
+        class_slack: How far beyond the end of its class a distance keeps it, share of the limit.
+        speed_enter: Speed towards, away, to a side that must be exceeded, diagonals per second.
+        speed_exit: Speed below which it ends.
+        sigmas_enter: How many of its standard deviations it must exceed, too.
+        sigmas_exit: Below how many it ends, too.
+        state_minimum_s: Least duration of orders of edges, directions and distance classes.
+        motion_minimum_s: Least duration of movements.
+    """
+
+    noise_px: float = 0.5
+    level_enter: float = 0.0044
+    level_exit: float = 0.0006
+    place_enter: float = 0.004
+    place_exit: float = 0.01
+    cone_slack_deg: float = 5.0
+    class_slack: float = 0.1
+    speed_enter: float = 0.001
+    speed_exit: float = 0.0005
+    sigmas_enter: float = 5.0
+    sigmas_exit: float = 2.5
+    state_minimum_s: float = 0.2
+    motion_minimum_s: float = 0.3
+
+
+Limits = tuple[float, float, float, float, float, float, float, float, float, float, float]
+
+
+def limits(s: JudgeSettings, diagonal: float) -> Limits:
+    """Thresholds as `judge_loops.judged` takes them.
+
+    Args:
+        s: Settings.
+        diagonal: Of the image, pixels.
+
+    Returns:
+        Level edges, to leave and to be; one place, to come to and to leave; slack of a direction, radians;
+        noise; slack of a class; speeds to move and to rest, in pixels per second and in deviations.
+    """
+    return (
+        s.level_enter * diagonal,
+        s.level_exit * diagonal,
+        s.place_enter * diagonal,
+        s.place_exit * diagonal,
+        radians(s.cone_slack_deg),
+        s.noise_px,
+        s.class_slack,
+        s.speed_enter * diagonal,
+        s.speed_exit * diagonal,
+        s.sigmas_enter,
+        s.sigmas_exit,
+    )
+
+
+def least_durations(s: JudgeSettings) -> Floats:
+    """(JUDGED, 1) seconds that each row must last before it is believed."""
+    lasts = np.full((JUDGED, 1), s.state_minimum_s)
+    lasts[MOVEMENT] = s.motion_minimum_s
+    return lasts

@@ -1,0 +1,251 @@
+"""Zones: parts of the scene drawn by the user, and which objects are inside them.
+
+A zone is a polygon in the image, with or without a range of depth. Three questions are asked of
+each object and zone: is its centre inside, does any part of it reach into the zone, is all of it
+within. The polygon is judged with noise thresholds, hysteresis and a least duration; with a range
+of depth, an object that the image places inside but whose depth is unknown is not known to be
+inside, while one that the image places outside is outside whatever its depth.
+
+How to read them off a mind:
+
+- `inside(mind, object_id, zone_name) -> Truth`: the centre is inside;
+- `reaching(mind, object_id, zone_name) -> Truth`: some part is;
+- `wholly_inside(mind, object_id, zone_name) -> Truth`: all of it is;
+- `distance_outside(mind, object_id, zone_name) -> float`: pixels from the centre to the edge of the
+  polygon, negative inside it, NaN unknown.
+
+The mind's relations hold the same as `inside NAME`, `reaching NAME` and `wholly_inside NAME`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Mind, ObjectBelief, Observation, Outcome, Relation, Truth, Zone
+from visup.rules.geometry.ema import smoothed
+from visup.rules.geometry.hysteresis import (
+    ABOVE,
+    BELOW,
+    UNKNOWN,
+    Codes,
+    Latch,
+    step,
+    unknown_latch,
+)
+from visup.rules.geometry.regions import Floats, dense, outline, scale
+
+ZONES = "rules.zones"
+QUESTIONS = ("inside", "reaching", "wholly_inside")
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneSettings:
+    """Thresholds of zones.
+
+    Attributes:
+        enter: Half width of the band about a zone's edge in which nothing changes, image diagonals.
+        depth_sigmas: The same for depth, in standard deviations of the object's depth.
+        minimum_s: Least duration before a change is believed.
+        hold_s: How long the last sighting stands for a body that flickers out of sight.
+        points: Most points of an outline that are looked at.
+    """
+
+    enter: float = 0.0025
+    depth_sigmas: float = 2.0
+    minimum_s: float = 0.2
+    hold_s: float = 0.3
+    points: int = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """What is remembered.
+
+    Attributes:
+        ids: (M,) object ids.
+        names: (Z,) zones.
+        latch: (4, Z * M) states, zone by zone: the signs of how far centre, nearest and farthest
+            part are outside the polygon, and of how far the depth is outside its range.
+        outside: (Z, M) pixels of the centre, negative inside.
+        smooth: (4, Z * M) how far outside, smoothed; what states are judged by.
+        time: Seconds of the last step.
+    """
+
+    ids: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+    latch: Latch = field(default_factory=lambda: unknown_latch((4, 0), 0.0))
+    outside: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    smooth: Floats = field(default_factory=lambda: np.zeros((4, 0)))
+    time: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SeeZones:
+    """Thinker of the cogitate phase: which objects are inside which zones of the mind."""
+
+    settings: ZoneSettings = field(default_factory=ZoneSettings)
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Thinker`."""
+        if not mind.zones:
+            return Outcome(mind)
+        s, objects = self.settings, mind.present()
+        old: Kept = mind.memory.get(ZONES, Kept())
+        ids, names = tuple(b.id for b in objects), tuple(z.name for z in mind.zones)
+        latch, smooth = self._before(old, ids, names, mind.time)
+        apart = np.array([[self._apart(z, b, mind) for b in objects] for z in mind.zones])
+        apart = apart.reshape(len(names), len(ids), 4)
+        flat = apart.reshape(-1, 4).T
+        band = np.full(flat.shape, s.enter * scale(mind.frame_size))
+        spread = [s.depth_sigmas * (b.depth_sigma or 0.0) for b in objects]
+        band[3] = np.tile(spread, len(names))
+        jump = 2.0 * s.enter * scale(mind.frame_size)
+        # Depth was smoothed before, and is -inf where a zone has no range.
+        flat = np.append(
+            smoothed(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
+        )
+        wanted = edge_sign(flat, latch.state, band)
+        latch = step(latch, wanted, mind.time, s.minimum_s)
+        kept = Kept(ids, names, latch, apart[:, :, 0], flat, mind.time)
+        told = tuple(
+            _relation(kept, question, i, name)
+            for name in names
+            for i in ids
+            for question in QUESTIONS
+        )
+        return Outcome(mind.remember(ZONES, kept, relations=mind.relations + told))
+
+    def _before(
+        self, old: Kept, ids: tuple[int, ...], names: tuple[str, ...], now: float
+    ) -> tuple[Latch, Floats]:
+        if old.ids == ids and old.names == names:
+            return old.latch, old.smooth
+        known = ((z, i) for z in old.names for i in old.ids)
+        place = {which: k for k, which in enumerate(known)}
+        places = np.array([place.get((z, i), -1) for z in names for i in ids], dtype=np.intp)
+        smooth = np.append(old.smooth, np.full((4, 1), np.nan), axis=1)[:, places]
+        return old.latch.select(places, now), smooth
+
+    def _apart(self, zone: Zone, belief: ObjectBelief, mind: Mind) -> tuple[float, ...]:
+        """Outside the zone: centre, nearest part, farthest part, depth; NaN unknown."""
+        if mind.time - belief.last_seen > self.settings.hold_s:
+            return (np.nan,) * 4
+        region, polygon = belief.region, np.asarray(zone.polygon, dtype=float)
+        points = dense(outline(region), 8.0)
+        points = points[:: -(-len(points) // self.settings.points)]
+        distance = outside(np.vstack([[region.centroid], points]), polygon)
+        least = float(distance[1:].min())
+        if least > 0.0 and _covers(belief, polygon):
+            least = -least
+        return float(distance[0]), least, float(distance[1:].max()), _beyond(zone, belief)
+
+
+def edge_sign(apart: Floats, before: Codes, band: Floats) -> Codes:
+    """On which side of an edge quantities are, with hysteresis about the edge itself.
+
+    Args:
+        apart: Any shape; how far outside; NaN unknown.
+        before: Same shape, what was believed so far: `BELOW` inside, `ABOVE` outside.
+        band: Same shape; beyond how much a change is seen.
+
+    Returns:
+        `BELOW`, `ABOVE` or `UNKNOWN`.
+    """
+    edge = np.where(before == BELOW, band, np.where(before == ABOVE, -band, 0.0))
+    code = np.where(apart > edge, ABOVE, BELOW)
+    return np.where(np.isnan(apart), UNKNOWN, code).astype(np.int8)
+
+
+def outside(points: Floats, polygon: Floats) -> Floats:
+    """Distance of points to the edge of a polygon, negative inside it (even-odd rule).
+
+    Args:
+        points: (N, 2) pixels.
+        polygon: (K, 2) corners in order, pixels; it need not be convex.
+
+    Returns:
+        (N,) pixels.
+    """
+    start, side = polygon, np.roll(polygon, -1, axis=0) - polygon
+    to = points[:, None] - start[None]
+    along = (to * side).sum(axis=2) / np.maximum((side * side).sum(axis=1), 1e-12)
+    foot = to - np.clip(along, 0.0, 1.0)[..., None] * side
+    distance = np.sqrt((foot * foot).sum(axis=2)).min(axis=1)
+    signed: Floats = np.where(contains(points, polygon), -distance, distance)
+    return signed
+
+
+def contains(points: Floats, polygon: Floats) -> NDArray[np.bool_]:
+    """Whether points (N, 2) lie in a polygon (K, 2), by the even-odd rule."""
+    x, y = points[:, 0, None], points[:, 1, None]
+    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    crosses = (y0 > y) != (y1 > y)
+    rise = np.where(y1 == y0, 1.0, y1 - y0)
+    left: NDArray[np.bool_] = crosses & (x < x0 + (y - y0) * (x1 - x0) / rise)
+    return np.asarray(left.sum(axis=1) % 2 == 1)
+
+
+def inside(mind: Mind, object_id: int, zone: str) -> Truth:
+    """Whether an object's centre is inside a zone; unknown for what is not judged."""
+    return asked(mind, "inside", object_id, zone)
+
+
+def reaching(mind: Mind, object_id: int, zone: str) -> Truth:
+    """Whether some part of an object is inside a zone."""
+    return asked(mind, "reaching", object_id, zone)
+
+
+def wholly_inside(mind: Mind, object_id: int, zone: str) -> Truth:
+    """Whether all of an object is inside a zone."""
+    return asked(mind, "wholly_inside", object_id, zone)
+
+
+def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
+    """Pixels from an object's centre to the edge of a zone's polygon, negative inside; NaN unknown."""
+    kept: Kept = mind.memory.get(ZONES, Kept())
+    if zone not in kept.names or object_id not in kept.ids:
+        return float("nan")
+    return float(kept.outside[kept.names.index(zone), kept.ids.index(object_id)])
+
+
+def asked(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
+    """One of `QUESTIONS` about an object and a zone; unknown for what is not judged."""
+    kept: Kept = mind.memory.get(ZONES, Kept())
+    if zone not in kept.names or object_id not in kept.ids:
+        return Truth.UNKNOWN
+    return _relation(kept, question, object_id, zone).truth
+
+
+def _relation(kept: Kept, question: str, object_id: int, zone: str) -> Relation:
+    """In the image and in depth: what is outside in either is outside, whatever is unknown."""
+    k = kept.names.index(zone) * len(kept.ids) + kept.ids.index(object_id)
+    rows = [QUESTIONS.index(question), 3]
+    codes = [int(c) for c in kept.latch.state[rows, k]]
+    since = float(kept.latch.since[rows, k].max())
+    if ABOVE in codes:
+        # Outside since the first of the two says so.
+        told = [t for c, t in zip(codes, kept.latch.since[rows, k], strict=True) if c == ABOVE]
+        return Relation(f"{question} {zone}", (object_id,), Truth.FALSE, float(min(told)))
+    if UNKNOWN in codes:
+        return Relation(f"{question} {zone}", (object_id,), Truth.UNKNOWN, since, 0.0)
+    return Relation(f"{question} {zone}", (object_id,), Truth.TRUE, since)
+
+
+def _beyond(zone: Zone, belief: ObjectBelief) -> float:
+    """How far the depth is outside the zone's range; -inf where the zone has none."""
+    if zone.depth is None:
+        return -np.inf
+    if belief.depth is None:
+        return np.nan
+    return max(zone.depth[0] - belief.depth, belief.depth - zone.depth[1])
+
+
+def _covers(belief: ObjectBelief, polygon: Floats) -> bool:
+    """Whether a corner of the polygon lies in the object, so that it reaches in from all round."""
+    x, y, w, h = belief.region.bbox
+    at = np.rint(polygon).astype(int) - (x, y)
+    at = at[(at >= 0).all(axis=1) & (at[:, 0] < w) & (at[:, 1] < h)]
+    return bool(belief.region.mask[at[:, 1], at[:, 0]].any())

@@ -1,0 +1,275 @@
+"""Rules made ready to run, and what is read off them once: places, facts, texts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from visup.rules.formula.nodes import (
+    Comparison,
+    Formula,
+    Predicate,
+    Quantified,
+    Rule,
+    calls,
+    children,
+    mark,
+    named,
+)
+from visup.rules.formula.terms import Measure, Term
+from visup.rules.monitoring.compiler import Compiler, Place, Program, Scope
+from visup.rules.monitoring.linker import Layout
+from visup.rules.monitoring.states import States
+from visup.rules.monitoring.vm import CHOICE_BITS, Whole, bits
+from visup.rules.predicates.snapshot import RELATION_NAMES, Facts
+from visup.rules.predicates.vocabulary import RULES, Quantity, Word
+from visup.rules.relations.reasoner import NAMES
+
+Key = tuple[str, frozenset[int]]
+"""Name of a rule, and objects."""
+MOST_KEYS = 16
+"""Of so many sets of objects it is remembered what may be found of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A fact or quantity that rules look up.
+
+    Attributes:
+        step: The step that does.
+        name: Its word.
+        ask: What it is of all objects.
+        turned: Whether its objects stand along the axes in the other order.
+        axes: How many objects it is about.
+    """
+
+    step: int
+    name: str
+    ask: Callable[[Facts], Any]
+    turned: bool
+    axes: int
+
+
+def asked(node: Predicate | Measure) -> Callable[[Facts], Any]:
+    """What a fact or quantity looks at, with those of its arguments that are no objects."""
+    fact = isinstance(node, Predicate)
+    word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
+    others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
+    return partial(_look, word.look, others) if others else word.look
+
+
+def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
+    return look(facts, *others)
+
+
+class Keys:
+    """What stands for whatever rules may be true of, for some objects; found once for each.
+
+    Args:
+        prepared: The rules.
+        ids: The objects.
+    """
+
+    def __init__(self, prepared: Ruled, ids: tuple[int, ...]) -> None:
+        self._prepared, self._ids = prepared, ids
+        self._known: dict[int, Key] = {}
+        # What was found is nearly always what was found a step ago, in whichever mind.
+        self._latest: tuple[list[int], Mapping[Key, int]] = ([], {})
+
+    def of(self, hits: list[int]) -> Mapping[Key, int]:
+        """Each key of what `machine.choices` found, with the first choice that it stands for."""
+        latest, found = self._latest
+        if latest != hits:
+            found = self._of(hits)
+            self._latest = hits, found
+        return found
+
+    def _of(self, hits: list[int]) -> Mapping[Key, int]:
+        found: dict[Key, int] = {}
+        for hit in hits:
+            key = self._known.get(hit)
+            if key is None:
+                rule, chosen = self._prepared.choice(hit, self._ids)
+                key = self._known.setdefault(hit, (rule.name, frozenset(chosen)))
+            found.setdefault(key, hit)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Ruled:
+    """Rules made ready to run.
+
+    Attributes:
+        rules: The rules.
+        compiler: Knows where the value of every formula is found.
+        places: Of each rule: `when`, and `unless` if there is one.
+        lines: What `explain` remembers of the texts of evidence, by rule and names of objects.
+    """
+
+    rules: tuple[Rule, ...]
+    compiler: Compiler
+    places: tuple[tuple[Place, ...], ...]
+    _placed: dict[Scope, dict[int, Place]] = field(default_factory=dict, repr=False)
+    _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
+    _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
+    _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
+    _layouts: dict[int, Layout] = field(default_factory=dict, repr=False)
+    _verdicts: dict[int, tuple[Whole, int]] = field(default_factory=dict, repr=False)
+    lines: dict[tuple[str, tuple[str, ...]], tuple[Any, ...]] = field(
+        default_factory=dict, repr=False
+    )
+    _keys: dict[tuple[int, ...], Keys] = field(default_factory=dict, repr=False)
+
+    @property
+    def program(self) -> Program:
+        """All steps of all rules."""
+        return self.compiler.program
+
+    def place(self, node: Formula | Term, scope: Scope) -> Place:
+        """Where the value of a part of these rules is found."""
+        known = self._placed.setdefault(scope, {})
+        if id(node) not in known:
+            known[id(node)] = (
+                self.compiler.term(node, scope)
+                if isinstance(node, Term)
+                else self.compiler.formula(node, scope)
+            )
+        return known[id(node)]
+
+    def related(self, rule: Rule) -> tuple[Predicate, ...]:
+        """The relations between its objects that the `when` of one of these rules names."""
+        if id(rule) not in self._related:
+            self._related[id(rule)] = tuple(
+                call
+                for call in calls(rule.when)
+                if isinstance(call, Predicate) and call.name in RELATION_NAMES
+                if set(call.words) <= set(rule.variables)
+            )
+        return self._related[id(rule)]
+
+    def told(self, rule: Rule) -> tuple[Formula, ...]:
+        """The facts, comparisons and quantifiers that the `when` of one of these rules is made of.
+
+        Those under a quantifier are told by the quantifier.
+        """
+        if id(rule) not in self._told:
+            self._told[id(rule)] = tuple(_told(rule.when))
+        return self._told[id(rule)]
+
+    def text(self, node: Formula | Term, variables: tuple[str, ...]) -> str:
+        """The source of a part of these rules, with marks where its variables stand."""
+        known = self._texts.setdefault(variables, {})
+        if id(node) not in known:
+            known[id(node)] = str(named(node, {v: mark(v) for v in variables}))
+        return known[id(node)]
+
+    @cached_property
+    def relations(self) -> Mapping[str, int]:
+        """Relations that the rules name, with their places among each other."""
+        # Couplings are looked up by themselves: there are few, and a relation of it for every pair.
+        named = {n.name for _, n in self.program.looks() if n.name in NAMES}
+        return {name: k for k, name in enumerate(sorted(named))}
+
+    @cached_property
+    def facts(self) -> tuple[Look, ...]:
+        """What the rules look up that is true, false or unknown; without these relations."""
+        return tuple(self._looks(Predicate))
+
+    @cached_property
+    def quantities(self) -> tuple[Look, ...]:
+        """What the rules look up that is a number."""
+        return tuple(self._looks(Measure))
+
+    def _looks(self, kind: type) -> Iterator[Look]:
+        for number, node in self.program.looks():
+            if isinstance(node, kind) and node.name not in self.relations:
+                order = self.program.steps[number].order
+                turned = len(order) == 2 and order[0] > order[1]
+                yield Look(number, node.name, asked(node), turned, len(order))
+
+    def layout(self, n: int) -> Layout:
+        """The program laid out for a number of objects; relations stand before all other facts."""
+        if n not in self._layouts:
+            begin, places = len(self.relations) * n * n, {}
+            for look in self.facts:
+                places[look.step] = begin
+                begin += n**look.axes
+            for step, node in self.program.looks():
+                if node.name in self.relations:
+                    places[step] = self.relations[node.name] * n * n
+            self._layouts[n] = Layout(self.program, n, places, begin)
+        return self._layouts[n]
+
+    @cached_property
+    def rules_by_name(self) -> Mapping[str, Rule]:
+        """The rules by name."""
+        return {rule.name: rule for rule in self.rules}
+
+    def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
+        """The rule and the objects of something that `machine.choices` found of some objects."""
+        rule, rows = self.rules[hit >> CHOICE_BITS], hit & (1 << CHOICE_BITS) - 1
+        chosen = []
+        for _ in rule.variables:
+            rows, row = divmod(rows, len(ids))
+            chosen.append(ids[row])
+        return rule, tuple(chosen[::-1])
+
+    def keys(self, ids: tuple[int, ...]) -> Keys:
+        """What stands for whatever rules may be true of, for some objects."""
+        known = self._keys.get(ids)
+        if known is None:
+            if len(self._keys) >= MOST_KEYS:
+                self._keys.clear()
+            known = self._keys.setdefault(ids, Keys(self, ids))
+        return known
+
+    def fresh(self, n: int) -> States:
+        """What is remembered before the first sample."""
+        return self.layout(n).fresh
+
+    def verdicts(self, n: int) -> tuple[Whole, int]:
+        """Of each rule where its values stand for a number of objects, and how many may be found.
+
+        See `machine.choices`.
+        """
+        if n not in self._verdicts:
+            layout, rows = self.layout(n), []
+            for rule, places in zip(self.rules, self.places, strict=True):
+                at = [(layout.places[p.step], bits(p.axes)) for p in places]
+                when, unless = (*at, (-1, 0))[:2]
+                apart = sum(1 << i + j - 1 for i, j in _apart(rule))
+                rows.append((*when, *unless, len(rule.variables), apart))
+            most = sum(n ** len(rule.variables) for rule in self.rules)
+            self._verdicts[n] = np.array(rows, dtype=np.int64).reshape(-1, 6), most
+        return self._verdicts[n]
+
+
+def _told(formula: Formula) -> Iterator[Formula]:
+    if isinstance(formula, Predicate | Quantified | Comparison):
+        yield formula
+        return
+    for part in children(formula):
+        if not isinstance(part, Term):
+            yield from _told(part)
+
+
+def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
+    once = [i for i, v in enumerate(rule.variables) if v not in rule.may_repeat]
+    return combinations(once, 2)
+
+
+@lru_cache(maxsize=16)
+def ruled(rules: tuple[Rule, ...]) -> Ruled:
+    """Rules made ready to run; the same object for the same rules."""
+    compiler = Compiler()
+    return Ruled(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
+
+
+def scope_of(rule: Rule) -> Scope:
+    """The variables of a rule by axis."""
+    return tuple((v, v in rule.may_repeat) for v in rule.variables)

@@ -1,0 +1,250 @@
+"""Why a rule is true, false or unknown of some objects: the values of all that it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isinf
+
+import numpy as np
+
+from visup.agent import Truth
+from visup.agent.model.fast_replace import replace
+from visup.rules.formula.nodes import (
+    Comparison,
+    Node,
+    Predicate,
+    Quantified,
+    Rule,
+    children,
+    mark,
+)
+from visup.rules.formula.terms import Measure, Term
+from visup.rules.formula.units import TICKS, Number
+from visup.rules.monitoring.compiler import Place, Scope
+from visup.rules.monitoring.intervals import UNKNOWN, Interval
+from visup.rules.monitoring.monitor import verdict
+from visup.rules.predicates.vocabulary import RULES
+from visup.rules.safety.compiled_rules import Ruled, scope_of
+from visup.rules.safety.verdicts import Values
+from visup.rules.wording.sentences import short
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What a formula or quantity came to, and what it was made of.
+
+    Attributes:
+        text: Its source, with objects by name.
+        interval: Robustness of a formula, value of a quantity in its base unit.
+        verdict: Of a formula; None of a quantity.
+        parts: What it is made of.
+        late_s: How many seconds ago the moment is that is spoken of.
+        unit: Of a quantity.
+    """
+
+    text: str
+    interval: Interval
+    verdict: Truth | None
+    parts: tuple[Explanation, ...] = ()
+    late_s: float = 0.0
+    unit: str = ""
+
+    def lines(self, indent: int = 0) -> Iterator[str]:
+        """The tree as indented lines of text."""
+        yield "  " * indent + self.line()
+        for part in self.parts:
+            yield from part.lines(indent + 1)
+
+    def line(self) -> str:
+        """This node alone: `gap(the arm, the probe) < 20 px is true, by 3.5`."""
+        late = _late(self.late_s)
+        if self.verdict is None:
+            return f"{self.text} = {_amount(self.interval, self.unit)}{late}"
+        return f"{self.text} is {self.verdict.value}{_margin(self.interval)}{late}"
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+
+def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
+    """Why a rule is true, false or unknown of some objects.
+
+    Args:
+        rule: The rule.
+        ids: Objects, in the order of its variables.
+        values: The values of all formulas.
+
+    Returns:
+        The rule with `when` and `unless`; it is false where `unless` is true.
+    """
+    reader = _Reader(values, rule, ids)
+    parts = [reader.node(f) for f in rule.formulas]
+    suspended = len(parts) > 1 and parts[1].verdict is Truth.TRUE
+    low, high = parts[0].interval
+    interval = (-np.inf, min(high, -parts[1].interval[0])) if suspended else (low, high)
+    names = ", ".join(short(values.facts.mind, i) for i in ids)
+    titled = tuple(
+        replace(p, text=f"{word} {p.text}")
+        for word, p in zip(("when", "unless"), parts, strict=False)
+    )
+    found = Truth.FALSE if suspended else parts[0].verdict
+    return Explanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+
+
+MOST_LINES = 4096
+"""Of so many rules and names of objects the texts of their evidence are remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of evidence but for its values.
+
+    Attributes:
+        place: Of the fact or comparison.
+        text: Its source, with objects by name; of a comparison its sign.
+        sides: Of a comparison what is compared: text, place and unit; only a text of a number.
+    """
+
+    place: Place
+    text: str
+    sides: tuple[tuple[str, Place | None, str], ...] = ()
+
+    def told(self, values: Values, rows: tuple[int, ...]) -> str:
+        """The line for some objects.
+
+        It says of a comparison what its quantities are: `gap(the arm, the probe) = 3 px < 20 px is true`;
+        by how much is told by these.
+        """
+        interval, text = values.interval(self.place, rows), self.text
+        if not self.sides:
+            text = f"{text} is {verdict(interval).value}{_margin(interval)}"
+            return f"{text}{_late(self.place.delay / TICKS)}."
+        left, right = (
+            side
+            if at is None
+            else f"{side} = {_amount(values.interval(at, rows), unit)}{_late(at.delay / TICKS)}"
+            for side, at, unit in self.sides
+        )
+        return (
+            f"{left} {text} {right} is {verdict(interval).value}{_late(self.place.delay / TICKS)}."
+        )
+
+
+def evidence(rule: Rule, ids: tuple[int, ...], values: Values) -> tuple[str, ...]:
+    """One sentence for each fact and comparison of `when`: what it says of these objects."""
+    facts, prepared = values.facts, values.prepared
+    names = tuple([facts.short(i) for i in ids])
+    lines = prepared.lines.get((rule.name, names))
+    if lines is None:
+        if len(prepared.lines) >= MOST_LINES:
+            prepared.lines.clear()
+        lines = prepared.lines.setdefault((rule.name, names), _lines(rule, names, prepared))
+    rows = tuple([facts.row[i] for i in ids])
+    return tuple([line.told(values, rows) for line in lines])
+
+
+def _lines(rule: Rule, names: tuple[str, ...], prepared: Ruled) -> tuple[Line, ...]:
+    """The evidence of a rule, for objects of these names."""
+    scope, named = scope_of(rule), dict(zip(rule.variables, names, strict=True))
+
+    def side(term: Term) -> tuple[str, Place | None, str]:
+        if isinstance(term, Number):
+            return str(term), None, ""
+        return _text(term, named, prepared), prepared.place(term, scope), _unit(term)
+
+    return tuple(
+        Line(prepared.place(f, scope), f.operator, (side(f.left), side(f.right)))
+        if isinstance(f, Comparison)
+        else Line(prepared.place(f, scope), _text(f, named, prepared))
+        for f in prepared.told(rule)
+    )
+
+
+class _Reader:
+    """Reads the values of a rule's formulas for one choice of objects."""
+
+    def __init__(self, values: Values, rule: Rule, ids: tuple[int, ...]) -> None:
+        self.values = values
+        self.mind = values.facts.mind
+        self.scope: Scope = scope_of(rule)
+        self.rows = tuple(values.facts.row[i] for i in ids)
+        self.names = {v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)}
+
+    def node(self, node: Node) -> Explanation:
+        """What a node came to, with what it is made of."""
+        place, interval = self._value(node)
+        term = isinstance(node, Term)
+        whole = not isinstance(node, Predicate | Measure | Number)
+        return Explanation(
+            _text(node, self.names, self.values.prepared),
+            interval,
+            None if term else verdict(interval),
+            self._parts(node) if whole else (),
+            place.delay / TICKS,
+            _unit(node) if term else "",
+        )
+
+    def _value(self, node: Node) -> tuple[Place, Interval]:
+        """Where a node stands, and what it came to for these objects."""
+        place = self.values.prepared.place(node, self.scope)
+        return place, self.values.interval(place, self.rows)
+
+    def _parts(self, node: Node) -> tuple[Explanation, ...]:
+        if isinstance(node, Quantified):
+            return self._witness(node)
+        return tuple(self.node(p) for p in children(node) if not isinstance(p, Number))
+
+    def _witness(self, node: Quantified) -> tuple[Explanation, ...]:
+        """The part for the object that decides: the truest one of `exists`, the least of `forall`."""
+        outer = self.scope, self.rows, self.names
+        found = []
+        for object_id, row in self.values.facts.row.items():
+            apart = (r for r, (_, repeats) in zip(outer[1], outer[0], strict=True) if not repeats)
+            if not node.may_repeat and row in apart:
+                continue
+            self.scope = (*outer[0], (node.variable, node.may_repeat))
+            self.rows = (*outer[1], row)
+            self.names = {**outer[2], node.variable: short(self.mind, object_id)}
+            found.append(self.node(node.part))
+            self.scope, self.rows, self.names = outer
+        if not found:
+            return ()
+        pick = max if node.kind == "exists" else min
+        return (pick(found, key=lambda e: e.interval),)
+
+
+def _text(node: Node, names: Mapping[str, str], prepared: Ruled) -> str:
+    """The source of a node, with objects by name."""
+    text = prepared.text(node, tuple(names))
+    for variable, name in names.items():
+        text = text.replace(mark(variable), name)
+    return text
+
+
+def _late(seconds: float) -> str:
+    return f" ({seconds:g} s ago)" if seconds else ""
+
+
+def _unit(node: Node) -> str:
+    if not isinstance(node, Measure):
+        return ""
+    return RULES.quantities[node.name].unit
+
+
+def _margin(interval: Interval) -> str:
+    low, high = interval
+    if isinf(low) and isinf(high):
+        return ""
+    if low > 0 or high < 0:
+        return f", by {low if low > 0 else -high:.3g}"
+    return f", from {low:.3g} to {high:.3g}"
+
+
+def _amount(interval: Interval, unit: str) -> str:
+    if interval == UNKNOWN:
+        return "unknown"
+    scale = 100.0 if unit == "%" else 1.0
+    first, last = (f"{bound * scale:.3g}" for bound in interval)
+    number = first if first == last else f"{first} to {last}"
+    return f"{number} {unit}".rstrip()

@@ -1,0 +1,224 @@
+"""Expressions to watch: a formula or a quantity of the rule language, judged on minds from outside.
+
+>>> expression("gap(arm, satellite)").quantity
+True
+>>> expression("touching(1, 2) for 0.5 s").rule.variables
+('object_1', 'object_2')
+
+Names of one letter stand for any object; longer ones for whoever plays the actor of that name or is
+believed to be that model; a number is an object's id.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import isinf
+from typing import Any, cast
+
+from visup.agent import Mind, Truth
+from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.rules.formula.nodes import Comparison, Rule
+from visup.rules.formula.units import ticks
+from visup.rules.language.parser import parse_rules
+from visup.rules.monitoring.intervals import Interval
+from visup.rules.monitoring.monitor import verdict
+from visup.rules.monitoring.operators import SPACING
+from visup.rules.monitoring.states import States
+from visup.rules.predicates.snapshot import Facts
+from visup.rules.predicates.vocabulary import RULES
+from visup.rules.safety.compiled_rules import ruled, scope_of
+from visup.rules.safety.explain import Explanation, explained
+from visup.rules.safety.verdicts import Values, rerowed
+
+_CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)\)")
+_BOUND = re.compile(r"\b(?:exists|forall)\s+([A-Za-z_]\w*)")
+_BY_ID = re.compile(r"object_(\d+)")
+_SAY = 'say "."'
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What an expression came to for one choice of objects.
+
+    Attributes:
+        objects: Ids, in the order of the expression's names.
+        interval: Robustness of a formula; value of a quantity in its unit.
+        truth: Of a formula; None of a quantity.
+        unit: Of a quantity.
+    """
+
+    objects: tuple[int, ...]
+    interval: Interval
+    truth: Truth | None
+    unit: str = ""
+
+    def __str__(self) -> str:
+        if self.truth is not None:
+            return self.truth.value
+        low, high = self.interval
+        if isinf(low) or isinf(high):
+            return "unknown"
+        scale = 100.0 if self.unit == "%" else 1.0
+        first, last = f"{low * scale:.4g}", f"{high * scale:.4g}"
+        told = first if first == last else f"{first} to {last}"
+        return f"{told} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What an expression came to at one mind.
+
+    Attributes:
+        now: Microseconds of the mind.
+        ids: Its objects.
+        before: States of the operators before, for these objects.
+        after: States after.
+        readings: One for each choice of objects.
+    """
+
+    now: int
+    ids: tuple[int, ...]
+    before: States
+    after: States
+    readings: tuple[Reading, ...]
+
+    @property
+    def truths(self) -> Mapping[tuple[int, ...], Truth | Interval]:
+        """Choice of objects -> verdict of a formula, interval of a quantity."""
+        return {r.objects: r.interval if r.truth is None else r.truth for r in self.readings}
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """An expression made ready.
+
+    Attributes:
+        text: As it was written.
+        rule: Holds it as `when`; of a quantity, as its left side.
+        quantity: Whether it is a quantity.
+    """
+
+    text: str
+    rule: Rule
+    quantity: bool
+
+    def judge(self, mind: Mind, before: Judged | None = None) -> Judged:
+        """What it comes to in a mind.
+
+        Args:
+            mind: The mind after a step.
+            before: What it came to a step before; without it, windows begin here.
+        """
+        prepared, now, facts = ruled((self.rule,)), ticks(mind.time), Facts(mind)
+        if before is not None and not now > before.now:
+            before = None
+        states = prepared.fresh(len(facts.ids)) if before is None else before.after
+        if before is not None and now - before.now < SPACING:
+            return before
+        if before is not None and before.ids != facts.ids:
+            states = rerowed(prepared, states, now, before.ids, facts.ids)
+        values = Values(prepared, facts, now, states)
+        readings = tuple(self._reading(values, ids) for ids in self._choices(mind, facts.ids))
+        return Judged(now, facts.ids, states, values.after, readings)
+
+    def explain(self, mind: Mind, judged: Judged, ids: tuple[int, ...]) -> Explanation:
+        """Why it is what it is for some objects, in the mind in which it was judged."""
+        values = Values(ruled((self.rule,)), Facts(mind), judged.now, judged.before)
+        whole = explained(self.rule, ids, values).parts[0]
+        return whole.parts[0] if self.quantity else whole
+
+    def _reading(self, values: Values, ids: tuple[int, ...]) -> Reading:
+        if self.quantity:
+            node = cast("Comparison", self.rule.when).left
+            place, unit = values.prepared.place(node, scope_of(self.rule)), _unit(node)
+        else:
+            place, unit = values.prepared.places[0][0], ""
+        low, high = values.interval(place, tuple(values.facts.row[i] for i in ids))
+        truth = None if self.quantity else verdict((low, high))
+        return Reading(ids, (low, high), truth, unit)
+
+    def _choices(self, mind: Mind, present: Sequence[int]) -> Iterator[tuple[int, ...]]:
+        """Every choice of distinct objects that the names allow."""
+        meant = [named(mind, v, present) for v in self.rule.variables]
+        for ids in product(*meant):
+            if len(set(ids)) == len(ids):
+                yield ids
+
+
+def expression(text: str) -> Expression:
+    """Read a formula or a quantity.
+
+    Raises:
+        RuleError: It is neither, or names what there is not.
+        ManyErrors: It has several faults.
+    """
+    written, variables = _with_variables(text)
+    try:
+        return Expression(text, _rule(written, variables), False)
+    except (RuleError, ManyErrors) as fault:
+        try:
+            rule = _rule(f"({written}) >= ({written})", variables)
+        except (RuleError, ManyErrors):
+            raise fault from None
+        return Expression(text, rule, True)
+
+
+def named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, ...]:
+    """The objects that a name of an expression may stand for.
+
+    Args:
+        mind: The mind.
+        name: One letter, `object_N`, an actor or a model.
+        present: Ids of objects that are believed present.
+    """
+    if by_id := _BY_ID.fullmatch(name):
+        return tuple(i for i in present if i == int(by_id[1]))
+    if len(name) == 1:
+        return tuple(present)
+    playing = {
+        b.object_id for t in mind.tasks for b in t.bindings if b.actor == name and b.object_id
+    }
+    if playing:
+        return tuple(i for i in present if i in playing)
+    models = (*mind.actors.get(name, ()), name)
+    return tuple(i for i in present if mind.objects[i].name in models)
+
+
+def _rule(text: str, variables: tuple[str, ...]) -> Rule:
+    lines = f"rule watched({', '.join(variables)}): info when\n{text}\n{_SAY}"
+    try:
+        (rule,) = parse_rules(lines, "<expression>")
+    except RuleError as fault:
+        if isinstance(fault.where, Place) and fault.where.line > text.count("\n") + 2:
+            # It was the wrapping that did not fit: the user wrote too little.
+            raise RuleError(f"'{text}' ends too early", expected=fault.expected) from None
+        raise
+    return rule
+
+
+def _with_variables(text: str) -> tuple[str, tuple[str, ...]]:
+    """The text with ids written as names, and its free names in order."""
+    found: dict[str, None] = {}
+    bound = set(_BOUND.findall(text))
+
+    def rewritten(call: re.Match[str]) -> str:
+        word: Any = RULES.words.get(call[1]) or RULES.quantities.get(call[1])
+        names = [a.strip() for a in call[2].split(",")]
+        if word is None or len(names) != len(word.takes):
+            return call[0]
+        for n, takes in enumerate(word.takes):
+            if takes == "object":
+                names[n] = f"object_{names[n]}" if names[n].isdecimal() else names[n]
+                if names[n] not in bound and names[n].isidentifier():
+                    found[names[n]] = None
+        return f"{call[1]}({', '.join(names)})"
+
+    return _CALL.sub(rewritten, text), tuple(found)
+
+
+def _unit(node: Any) -> str:
+    quantity = RULES.quantities.get(getattr(node, "name", ""))
+    return quantity.unit if quantity else ""

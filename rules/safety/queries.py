@@ -1,0 +1,105 @@
+"""Questions to a mind about its rules: their values as they were when it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from itertools import product
+
+from visup.agent import Mind, Truth
+from visup.agent.model.errors import RuleError
+from visup.rules.formula.nodes import Rule
+from visup.rules.monitoring.monitor import verdict
+from visup.rules.predicates.snapshot import Facts
+from visup.rules.safety.compiled_rules import ruled
+from visup.rules.safety.explain import Explanation, explained
+from visup.rules.safety.reasoner import kept
+from visup.rules.safety.verdicts import Values
+
+
+def explain(mind: Mind, rule: str, *ids: int) -> Explanation:
+    """Why a rule is true, false or unknown of some objects in a mind.
+
+    Args:
+        mind: A mind, now or kept, that rules have judged.
+        rule: Name of the rule.
+        ids: Objects, in the order of its variables.
+
+    Returns:
+        The rule with `when` and `unless`; the rule is false where `unless` is true.
+
+    Raises:
+        RuleError: No such rule was judged, or the objects are not those of a choice for it.
+    """
+    values = values_of(mind)
+    return explained(_choice(values, rule, ids), ids, values)
+
+
+def values_of(mind: Mind) -> Values:
+    """The values of all formulas of all rules in a mind, computed again from what it remembers.
+
+    Raises:
+        RuleError: No rules have judged it.
+    """
+    memory = kept(mind)
+    if memory.now is None or memory.before is None:
+        raise RuleError("no rule has been judged in this mind", hint="let the agent make a step")
+    # Rules saw the tasks as they stood a step before.
+    facts = Facts(replace(mind, tasks=memory.tasks))
+    return Values(ruled(memory.rules), facts, memory.now, memory.before)
+
+
+def rule_named(values: Values, name: str) -> Rule:
+    """The rule of that name.
+
+    Raises:
+        RuleError: None was judged.
+    """
+    rules = {rule.name: rule for rule in values.prepared.rules}
+    if name not in rules:
+        close = get_close_matches(name, list(rules), 1, 0.6)
+        hint = f"did you mean '{close[0]}'?" if close else None
+        what = f"no rule '{name}' was judged"
+        raise RuleError(what, expected=f"one of {', '.join(rules)}", hint=hint)
+    return rules[name]
+
+
+def choices(values: Values, rule: Rule) -> Iterator[tuple[int, ...]]:
+    """Every choice of objects for a rule."""
+    for ids in product(values.facts.ids, repeat=len(rule.variables)):
+        once = [i for i, v in zip(ids, rule.variables, strict=True) if v not in rule.may_repeat]
+        if len(set(once)) == len(once):
+            yield ids
+
+
+def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
+    """What a rule says of every choice of objects; false where it is suspended.
+
+    Raises:
+        RuleError: No rules have judged the mind, or none of that name.
+    """
+    values = values_of(mind)
+    rule = rule_named(values, name)
+    places = values.prepared.places[values.prepared.rules.index(rule)]
+    found = {}
+    for ids in choices(values, rule):
+        rows = tuple(values.facts.row[i] for i in ids)
+        when, *unless = (verdict(values.interval(p, rows)) for p in places)
+        found[ids] = Truth.FALSE if Truth.TRUE in unless else when
+    return found
+
+
+def _choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:
+    """The rule of that name, when the objects are a choice for it."""
+    rule = rule_named(values, name)
+    if len(ids) != len(rule.variables):
+        what = f"'{name}' is about {len(rule.variables)} object(s), not {len(ids)}"
+        raise RuleError(what, expected=f"{name}({', '.join(rule.variables)})")
+    for object_id in ids:
+        if object_id not in values.facts.row:
+            known = ", ".join(map(str, values.facts.ids)) or "none"
+            raise RuleError(f"there is no object {object_id} in view", expected=f"one of {known}")
+    if ids not in set(choices(values, rule)):
+        raise RuleError(f"'{name}' is about distinct objects", expected="each object once")
+    return rule

@@ -1,0 +1,98 @@
+"""Rules at work: every choice of objects for which a rule is true gives a concern."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from visup.agent import Mind, Observation, Outcome, TaskBelief
+from visup.rules.formula.nodes import Rule
+from visup.rules.formula.units import ticks
+from visup.rules.monitoring.operators import SPACING
+from visup.rules.monitoring.states import States
+from visup.rules.predicates.snapshot import Facts
+from visup.rules.safety.alarm_condition import Held, stand
+from visup.rules.safety.compiled_rules import Key, Ruled, ruled
+from visup.rules.safety.verdicts import Values, rerowed
+
+SAFETY = "rules.safety"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """What rules remember. States of operators share all but their newest cells with older ones.
+
+    Attributes:
+        rules: The rules.
+        now: Microseconds of the last sample, or None before the first.
+        time: The same, seconds.
+        ids: Its objects.
+        before: States of the operators before it, for these objects.
+        after: States after it.
+        tasks: What tasks had come to when rules looked; they are matched later in a step.
+        held: Concerns that stand, those whose sentences are oldest first.
+        cooling: Until when, in seconds, objects raise no concern again.
+    """
+
+    rules: tuple[Rule, ...] = ()
+    now: int | None = None
+    time: float = 0.0
+    ids: tuple[int, ...] = ()
+    before: States | None = None
+    after: States | None = None
+    tasks: tuple[TaskBelief, ...] = ()
+    held: MappingProxyType[Key, Held] = field(default_factory=lambda: MappingProxyType({}))
+    cooling: Mapping[Key, float] = field(default_factory=lambda: MappingProxyType({}))
+
+
+@dataclass(frozen=True, slots=True)
+class RuleThinker:
+    """Thinker of the cogitate phase, after relations and couplings.
+
+    It sees the tasks as they stood after the step before, since tasks are matched later.
+    """
+
+    rules: tuple[Rule, ...]
+    _prepared: Ruled = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # Rules are long trees: to look up by them what was prepared costs as much as a rule.
+        object.__setattr__(self, "_prepared", ruled(self.rules))
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Thinker`."""
+        old, now = kept(mind), ticks(mind.time)
+        # To compare the trees costs more than all that is done with them.
+        same = old.rules is self.rules or old.rules == self.rules
+        if not same or (old.now is not None and now < old.now):
+            old = Kept(self.rules)
+        if old.now is not None and now - old.now < SPACING:
+            return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
+        prepared, facts = self._prepared, Facts(mind)
+        before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
+        if old.after is not None and old.ids != facts.ids:
+            before = rerowed(prepared, old.after, now, old.ids, facts.ids)
+        values = Values(prepared, facts, now, before)
+        held, cooling = stand(values, old.held, old.cooling, old.time)
+        mind = mind.remember(
+            SAFETY,
+            Kept(
+                self.rules,
+                now,
+                mind.time,
+                facts.ids,
+                before,
+                values.after,
+                mind.tasks,
+                held,
+                cooling,
+            ),
+        )
+        return Outcome(mind, concerns=tuple([h.concern for h in held.values()]))
+
+
+def kept(mind: Mind) -> Kept:
+    """What rules remember in a mind."""
+    found: Kept = mind.memory.get(SAFETY, Kept())
+    return found

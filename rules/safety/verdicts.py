@@ -1,0 +1,108 @@
+"""Rules over a mind: all of them, for all choices of objects, in one run of one program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from visup.rules.formula.nodes import Rule
+from visup.rules.monitoring.compiler import Place
+from visup.rules.monitoring.intervals import Interval
+from visup.rules.monitoring.linker import Layout
+from visup.rules.monitoring.states import States
+from visup.rules.monitoring.vm import Codes, Floats, Whole, choices
+from visup.rules.predicates.inputs_missing import blind
+from visup.rules.predicates.snapshot import MAYBE, Facts
+from visup.rules.safety.compiled_rules import Key, Ruled
+
+
+class Values:
+    """The values of all formulas at one step.
+
+    Args:
+        prepared: The rules.
+        facts: The mind.
+        now: Microseconds.
+        before: States of the operators before, for the objects of `facts`.
+
+    Attributes:
+        after: States after.
+    """
+
+    def __init__(self, prepared: Ruled, facts: Facts, now: int, before: States) -> None:
+        self.prepared: Ruled = prepared
+        self.facts: Facts = facts
+        self._layout: Layout = prepared.layout(len(facts.ids))
+        self._arena: Floats = np.empty(self._layout.size)
+        if prepared.quantities:
+            np.concatenate(self._measured(), out=self._arena[: self._layout.looked])
+        self.after: States = self._layout.step(before, now, self._codes(), self._arena)
+
+    def _codes(self) -> Codes:
+        """All facts: the relations, then the others."""
+        facts, layout, prepared = self.facts, self._layout, self.prepared
+        looked = [look.ask(facts).ravel() for look in prepared.facts]
+        related = facts.relations(tuple(prepared.relations)).ravel()
+        codes: Codes = np.concatenate([related, *looked])
+        if facts.mind.unknown:
+            for step, node in prepared.program.looks():
+                if step in layout.facts and blind(facts.mind, node.name):
+                    at = layout.facts[step]
+                    codes[at : at + layout.n ** len(layout.axes[step])] = MAYBE
+        return codes
+
+    def _measured(self) -> list[Floats]:
+        """The intervals of all quantities, in their order."""
+        facts = self.facts
+        told = [look.ask(facts) for look in self.prepared.quantities]
+        if facts.mind.unknown:
+            told = [
+                facts.unknown(look.axes) if blind(facts.mind, look.name) else value
+                for look, value in zip(self.prepared.quantities, told, strict=True)
+            ]
+        return [
+            (value.swapaxes(1, 2) if look.turned else value).ravel()
+            for look, value in zip(self.prepared.quantities, told, strict=True)
+        ]
+
+    def interval(self, place: Place, rows: tuple[int, ...]) -> Interval:
+        """The interval of a formula for one choice of objects, by the rows of these."""
+        return self._layout.interval(place.step, rows, self._arena)
+
+    def true(self) -> Iterator[tuple[Rule, tuple[int, ...]]]:
+        """Every rule with every choice of objects for which it is true and not suspended."""
+        return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
+
+    def true_of(self) -> Mapping[Key, int]:
+        """For each rule and set of objects of which it is true the first choice, as `found` tells it."""
+        return self.prepared.keys(self.facts.ids).of(self.found())
+
+    def found(self) -> list[int]:
+        """What is true as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
+        rules, most = self.prepared.verdicts(self._layout.n)
+        found: Whole = np.empty(most, dtype=np.int64)
+        count = choices(rules, self._layout.n, self._arena, found)
+        told: list[int] = found[:count].tolist()
+        return told
+
+
+def rerowed(
+    prepared: Ruled, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
+) -> States:
+    """The states of the operators for other objects.
+
+    Args:
+        prepared: The rules.
+        states: States for the old objects.
+        now: Microseconds of the sample at which they change.
+        old: Their ids.
+        new: Ids of the new ones; of those that are not among the old nothing is known yet.
+
+    Returns:
+        The states for the new objects.
+    """
+    place = {object_id: i for i, object_id in enumerate(old)}
+    rows = np.array([place.get(i, -1) for i in new], dtype=np.intp)
+    known, wanted = prepared.layout(len(old)), prepared.layout(len(new))
+    return known.memory.rerowed(states, wanted.memory, rows, now)

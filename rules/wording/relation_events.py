@@ -1,0 +1,87 @@
+"""Changes of relations told, sparingly: one sentence when two objects begin to come closer or part."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from visup.agent import Event, Mind, Observation, Outcome, Relation
+from visup.rules.wording.sentences import sentence
+
+NARRATIVE = "rules.narrative"
+TEMPLATES = {
+    "converging": "{0} and {1} {are} converging.",
+    "diverging": "{0} and {1} {are} moving apart.",
+    "keeping_distance": "{0} and {1} {are} keeping their distance.",
+}
+Told = tuple[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class NarrativeSettings:
+    """How sparingly relations are told.
+
+    Attributes:
+        lasting_s: How long a relation must hold before it is told.
+        quiet_s: Least time between two sentences about the same pair.
+        least_confidence: Relations believed less are not told.
+    """
+
+    lasting_s: float = 0.6
+    quiet_s: float = 2.0
+    least_confidence: float = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class TellRelations:
+    """Thinker of the cogitate phase: 'relation' events for trends that are new and last.
+
+    A pair that keeps its distance is told of only when it converged or diverged before; coupled
+    pairs are left alone.
+    """
+
+    settings: NarrativeSettings = field(default_factory=NarrativeSettings)
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Thinker`."""
+        told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
+        events = []
+        for objects, name in mind.held(*TEMPLATES):
+            if not self._new(name, told.get(objects), mind):
+                continue
+            relation = mind.relation(name, *objects)
+            if relation is None or not self._worth_telling(relation, mind):
+                continue
+            told[relation.objects] = (relation.name, mind.time)
+            events.append(_event(relation, mind, observation))
+        return Outcome(mind.remember(NARRATIVE, MappingProxyType(told)), tuple(events))
+
+    def _memory(self, mind: Mind) -> Mapping[tuple[int, ...], Told]:
+        old: Mapping[tuple[int, ...], Told] = mind.memory.get(NARRATIVE, MappingProxyType({}))
+        return {pair: t for pair, t in old.items() if all(i in mind.objects for i in pair)}
+
+    def _new(self, name: str, last: Told | None, mind: Mind) -> bool:
+        """Whether it is not what was told of these objects last, or too soon after that."""
+        if last is None:
+            return name != "keeping_distance"
+        return last[0] != name and mind.time - last[1] >= self.settings.quiet_s
+
+    def _worth_telling(self, relation: Relation, mind: Mind) -> bool:
+        s = self.settings
+        if relation.confidence < s.least_confidence or mind.time - relation.since < s.lasting_s:
+            return False
+        return not (len(relation.objects) == 2 and mind.coupled(*relation.objects))
+
+
+def _event(relation: Relation, mind: Mind, observation: Observation) -> Event:
+    data = {"relation": relation.name, "value": relation.value, "sigma": relation.sigma}
+    return Event(
+        "relation",
+        observation.time,
+        observation.frame_index,
+        sentence(mind, TEMPLATES[relation.name], *relation.objects, confidence=relation.confidence),
+        relation.objects,
+        relation.confidence,
+        data=MappingProxyType(data),
+    )

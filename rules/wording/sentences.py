@@ -1,0 +1,166 @@
+"""Sentences for people: 'An object, believed to be the satellite, appears to be ...' (paper, 1)."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+from visup.agent.model.mind import UNKNOWN_OBJECT, Mind
+
+ORDINALS = ("an", "a second", "a third", "a fourth", "a fifth", "a sixth", "a seventh", "an eighth")
+SURE, LIKELY = 0.95, 0.5
+"""Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
+
+# As it is, and its infinitive. What stands in braces in a template is told as its confidence allows.
+_SINGULAR = {
+    "is": "be",
+    "enters": "enter",
+    "leaves": "leave",
+    "comes": "come",
+    "begins": "begin",
+    "reappears": "reappear",
+}
+_PLURAL = {"are": "be"}
+VERBS = frozenset(_SINGULAR) | frozenset(_PLURAL)
+_MENTION = re.compile(r"\{(\w+)\}")
+_DOUBLED = re.compile(r",(?=\s*[,.;:!?])")
+
+
+def believed_name(mind: Mind, object_id: int) -> str | None:
+    """What an object is called: its actor in a task, else an actor bound to its model, else the model.
+
+    Args:
+        mind: The mind.
+        object_id: Any object id.
+
+    Returns:
+        A name, or None when the object is not identified.
+    """
+    for task in mind.tasks:
+        for binding in task.bindings:
+            if binding.object_id == object_id:
+                return binding.actor
+    belief = mind.objects.get(object_id)
+    if belief is None or belief.name == UNKNOWN_OBJECT:
+        return None
+    return called(mind, belief.name)
+
+
+def called(mind: Mind, model: str) -> str:
+    """What an object of a model is called: the actor that is bound to the model, else the model."""
+    return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
+
+
+def describe(mind: Mind, object_id: int, nth: int = 0) -> str:
+    """An object in words, as a person would first mention it.
+
+    Args:
+        mind: The mind.
+        object_id: Any object id.
+        nth: How many other objects the sentence mentioned before it.
+
+    Returns:
+        Such as 'an object, believed to be the satellite,' without the last comma.
+    """
+    name = believed_name(mind, object_id)
+    ordinal = ORDINALS[min(nth, len(ORDINALS) - 1)]
+    if name is not None:
+        return f"{ordinal} object, believed to be the {spaced(name)}"
+    return "an unidentified object" if nth == 0 else f"{ordinal}, unidentified object"
+
+
+def short(mind: Mind, object_id: int) -> str:
+    """An object in two words, for lists and evidence: 'the satellite' or 'object 3'."""
+    name = believed_name(mind, object_id)
+    return f"the {spaced(name)}" if name is not None else f"object {object_id}"
+
+
+def seems(confidence: float) -> str:
+    """The verb that a confidence earns: 'is', 'appears to be' or 'may be'."""
+    return graded("is", confidence)
+
+
+def graded(verb: str, confidence: float) -> str:
+    """A verb as strong as a confidence allows.
+
+    Args:
+        verb: One of `VERBS`.
+        confidence: 0 to 1.
+
+    Example:
+        >>> [graded("leaves", c) for c in (1.0, 0.8, 0.3)]
+        ['leaves', 'appears to leave', 'may leave']
+        >>> graded("are", 0.8)
+        'appear to be'
+    """
+    infinitive = _SINGULAR.get(verb) or _PLURAL[verb]
+    if confidence >= SURE:
+        return verb
+    appears = "appears" if verb in _SINGULAR else "appear"
+    return f"{appears} to {infinitive}" if confidence >= LIKELY else f"may {infinitive}"
+
+
+def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> str:
+    """A sentence about objects.
+
+    Args:
+        mind: The mind.
+        template: Text with `{0}`, `{1}`, ... for the objects in the order of `ids`, and a verb of
+            `VERBS`, such as `{is}`, for what its confidence grades. An object's first mention
+            describes it, later ones say 'it' when it is the only one, else 'the first object',
+            'the second object'.
+        ids: The objects.
+        confidence: 0 to 1; how strong the verb is.
+
+    Returns:
+        The sentence, with a capital and the commas that the descriptions need.
+    """
+    mentioned: list[int] = []
+
+    def fill(match: re.Match[str]) -> str:
+        word = match.group(1)
+        if word in VERBS:
+            return graded(word, confidence)
+        if not word.isdecimal() or int(word) >= len(ids):
+            return match.group(0)
+        return _mention(mind, ids[int(word)], mentioned)
+
+    return tidy(_MENTION.sub(fill, template))
+
+
+@lru_cache(maxsize=256)
+def with_names(template: str, names: tuple[str, ...]) -> str:
+    """The same template with its named objects numbered: '{a}' becomes '{0}' for names ('a', ...)."""
+
+    def number(match: re.Match[str]) -> str:
+        word = match.group(1)
+        return f"{{{names.index(word)}}}" if word in names else match.group(0)
+
+    return _MENTION.sub(number, template)
+
+
+def mentions(template: str) -> tuple[str, ...]:
+    """Words in braces of a template, in order."""
+    return tuple(_MENTION.findall(template))
+
+
+def tidy(text: str) -> str:
+    """Close the commas round 'believed to be', and begin with a capital."""
+    text = _DOUBLED.sub("", text)
+    return text[:1].upper() + text[1:]
+
+
+def spaced(name: str) -> str:
+    """A name as people write it: underscores become blanks."""
+    return name.replace("_", " ")
+
+
+def _mention(mind: Mind, object_id: int, mentioned: list[int]) -> str:
+    if object_id in mentioned:
+        return "it" if len(mentioned) == 1 else f"the {_ORDER[mentioned.index(object_id)]} object"
+    mentioned.append(object_id)
+    words = describe(mind, object_id, len(mentioned) - 1)
+    return f"{words}," if "believed" in words else words
+
+
+_ORDER = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")

@@ -1,0 +1,231 @@
+"""What each action means: when it holds, begins, progresses, is over, and what is its contrary.
+
+The actions of tasks stand in one table, `ACTIONS`; the words in it are names of relations in the
+mind. `known_actions` adds the words and quantities of rules (`vocabulary.py`) and what installed
+packages offer under the entry point group `visup.actions`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
+
+from visup.agent.model.errors import TaskError
+
+GROUP = "visup.actions"
+ALL_PERCEPTS = frozenset({"region", "hypothesis", "depth", "health"})
+"""Kinds of percept that visup's own behaviours give."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """The meaning of an action, in terms of relations between its actors.
+
+    Attributes:
+        name: The action, as in a task file.
+        holds: The action holds while one of these relations is true.
+        arity: How many actors it takes.
+        lasts: Whether it goes on until something else is seen to begin (`converging`), rather
+            than being over once it has held long enough (`coupled`).
+        hold_s: Seconds for which it must have held to count as done, unless `for` says otherwise.
+        entry: It is seen to begin when one of these is true; `holds` when empty.
+        while_not: A touch does not make it begin while one of these is still true: what draws
+            nearer has not met yet, however little lies between in the image.
+        progress: Further relations that bring it nearer although it does not hold yet.
+        contrary: Relations that say that it fails.
+        expects: Further relations that are no reason for worry while it is asked for.
+        text: "are `converging`": what is said of the actors when it holds.
+        takes: 'object' or 'zone' for each actor; all objects when empty.
+        measures: What a quantity measures ('length', 'time', ...); empty for a relation.
+        needs: Kinds of percept without which it is never observed.
+        about: One clause for people who choose among actions.
+    """
+
+    name: str
+    holds: tuple[str, ...]
+    arity: int = 2
+    lasts: bool = False
+    hold_s: float = 1.0
+    entry: tuple[str, ...] = ()
+    while_not: tuple[str, ...] = ()
+    progress: tuple[str, ...] = ()
+    contrary: tuple[str, ...] = ()
+    expects: tuple[str, ...] = ()
+    text: str = ""
+    takes: tuple[str, ...] = ()
+    measures: str = ""
+    needs: frozenset[str] = frozenset({"region"})
+    about: str = ""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What each of its actors is: 'object' or 'zone'."""
+        return self.takes or ("object",) * self.arity
+
+    @property
+    def begins(self) -> tuple[str, ...]:
+        """Relations one of which shows that the action has begun."""
+        return self.entry or self.holds
+
+    @property
+    def helps(self) -> tuple[str, ...]:
+        """Relations one of which shows that it holds or comes nearer."""
+        return (*self.holds, *self.progress)
+
+
+_TABLE = (
+    Meaning(
+        "converging",
+        holds=("converging",),
+        lasts=True,
+        contrary=("diverging",),
+        text="converging",
+        about="they draw nearer",
+    ),
+    Meaning(
+        "diverging",
+        holds=("diverging",),
+        lasts=True,
+        contrary=("converging",),
+        text="diverging",
+        about="they draw apart",
+    ),
+    Meaning(
+        "keeping_distance",
+        holds=("keeping_distance", "moving_together", "coupled"),
+        lasts=True,
+        contrary=("converging", "diverging"),
+        text="keeping their distance",
+        about="their distance stays, or they move as one",
+    ),
+    Meaning(
+        "moving_together",
+        holds=("moving_together", "coupled"),
+        lasts=True,
+        contrary=("converging", "diverging"),
+        text="moving together",
+        about="they move as one",
+    ),
+    Meaning(
+        "touching",
+        holds=("touching", "coupled"),
+        hold_s=0.2,
+        progress=("converging",),
+        contrary=("diverging",),
+        expects=("converging",),
+        text="touching",
+        about="they touch",
+    ),
+    Meaning(
+        "coupled",
+        holds=("coupled",),
+        entry=("coupled", "touching"),
+        while_not=("converging",),
+        progress=("touching", "moving_together", "converging"),
+        contrary=("diverging", "decoupled"),
+        expects=("converging", "touching", "moving_together"),
+        text="coupled",
+        about="they are rigidly connected",
+    ),
+    Meaning(
+        "decoupled",
+        holds=("decoupled",),
+        hold_s=0.5,
+        entry=("decoupled", "diverging"),
+        progress=("diverging",),
+        expects=("diverging", "touching"),
+        text="decoupled",
+        about="they are known not to be connected",
+    ),
+    Meaning(
+        "apart",
+        holds=("apart",),
+        hold_s=0.5,
+        expects=("diverging",),
+        text="apart",
+        about="they are known not to touch",
+    ),
+    Meaning(
+        "present",
+        holds=("present",),
+        arity=1,
+        hold_s=0.5,
+        text="present",
+        about="it is in the scene, seen or hidden",
+    ),
+    Meaning(
+        "gone", holds=("gone",), arity=1, hold_s=0.5, text="gone", about="it has left the scene"
+    ),
+    Meaning(
+        "inside",
+        holds=("inside",),
+        arity=2,
+        hold_s=0.5,
+        text="inside",
+        takes=("object", "zone"),
+        about="its centre is in the zone",
+    ),
+    Meaning(
+        "outside",
+        holds=("outside",),
+        arity=2,
+        hold_s=0.5,
+        text="outside",
+        takes=("object", "zone"),
+        about="nothing of its outline is in the zone",
+    ),
+)
+
+ACTIONS: Mapping[str, Meaning] = MappingProxyType({m.name: m for m in _TABLE})
+"""The actions that visup supervises with a meaning of their own."""
+
+
+@lru_cache(maxsize=1)
+def known_actions() -> Mapping[str, Meaning]:
+    """All that a task may ask for, by name: `ACTIONS`, the words of rules, those of plug-ins.
+
+    Raises:
+        TaskError: A plug-in's action cannot be loaded, or its name is taken.
+    """
+    from visup.tasks.actions.vocabulary import words  # rules bring NumPy with them
+
+    known: Mapping[str, Meaning] = {**{m.name: m for m in words()}, **ACTIONS}
+    for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
+        known = with_actions(known, [_loaded(point)])
+    return MappingProxyType(known)
+
+
+def with_actions(known: Mapping[str, Meaning], more: Iterable[Meaning]) -> dict[str, Meaning]:
+    """Some actions and more of them.
+
+    Raises:
+        TaskError: The name of one is taken.
+    """
+    joined = dict(known)
+    for meaning in more:
+        if meaning.name in joined:
+            raise TaskError(f"there is an action called `{meaning.name}` already")
+        joined[meaning.name] = meaning
+    return joined
+
+
+def _loaded(point: EntryPoint) -> Meaning:
+    try:
+        made = point.load()
+    except Exception as fault:
+        said = f"{type(fault).__name__}: {fault}"
+        raise TaskError(
+            f"action `{point.name}` cannot be loaded: {said}", where=point.value
+        ) from fault
+    if not isinstance(made, Meaning):
+        expected = f"a `Meaning` (entry point group `{GROUP}`)"
+        raise TaskError(f"`{point.name}` is no action", where=point.value, expected=expected)
+    return made
+
+
+def contradict(a: Meaning, b: Meaning) -> bool:
+    """Whether two actions between the same actors can never hold at the same time."""
+    return bool(set(a.holds) <= set(b.contrary) or set(b.holds) <= set(a.contrary))

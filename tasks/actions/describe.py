@@ -1,0 +1,30 @@
+"""Actions in words, for lists and editors."""
+
+from __future__ import annotations
+
+from visup.tasks.actions.actions import Meaning
+from visup.tasks.grammar.units import UNITS
+
+NAMES = {"object": ("a", "b", "c"), "zone": ("zone", "zone", "zone")}
+
+
+def written(meaning: Meaning) -> str:
+    """How an action is written, with letters for its actors: `gap(a, b) < 5 px`."""
+    actors = ", ".join(NAMES.get(k, NAMES["object"])[i] for i, k in enumerate(meaning.kinds))
+    unit = next((u for u, (d, by) in UNITS.items() if (d, by) == (meaning.measures, 1.0)), "%")
+    compared = f" < 5 {unit}" if meaning.measures else ""
+    return f"{meaning.name}({actors}){compared}"
+
+
+def described(meaning: Meaning) -> str:
+    """An action in some lines of Markdown: how it is written, when it holds, ends and fails."""
+    lines = [f"`{written(meaning)}`", meaning.about or meaning.text]
+    if meaning.measures:
+        lines.append(f"A quantity; it measures: {meaning.measures.replace('_', ' ')}.")
+        return "\n\n".join(lines)
+    over = f"it has held for {meaning.hold_s:g} s"
+    lines.append(f"Over when {'what comes next begins' if meaning.lasts else over}.")
+    if meaning.contrary:
+        contrary = " or ".join(c.replace("_", " ") for c in meaning.contrary)
+        lines.append(f"Fails when they are {contrary}.")
+    return "\n\n".join(lines)

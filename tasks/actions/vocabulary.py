@@ -1,0 +1,204 @@
+"""The words of rules as actions: the one seam between the task language and the rule language.
+
+Every relation and fact of `rules/` that speaks of objects and zones can be asked for by a stage,
+and every quantity can be compared. A fact of a task file that is not a plain relation of the mind
+(a word of rules, a comparison, a zone) gets a key, and a look that says whether it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from visup.agent import Truth
+from visup.rules.formula.units import ANGLE, LENGTH, SHARE, SPEED, TIME, TURNING, Dimension
+from visup.rules.predicates.inputs_missing import blind
+from visup.rules.predicates.snapshot import MAYBE, NO, YES, Facts
+from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
+from visup.rules.relations.zones import asked, contains
+from visup.tasks.actions.actions import ACTIONS, Meaning
+from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
+from visup.tasks.grammar.nodes import Action, Actors, Task, walk
+from visup.tasks.grammar.statement import WORDS as RESERVED
+from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.units import value
+
+OF_TASKS = frozenset({"unexpected", "expected", "actor"})
+"""Words of rules that speak of tasks themselves: a task that asked for them would ask for itself."""
+
+DEPTHS = frozenset({"region", "hypothesis", "depth"})
+
+MEASURES: Mapping[Dimension, str] = {
+    TIME: "time",
+    LENGTH: "length",
+    SPEED: "speed",
+    SHARE: "share",
+    ANGLE: "angle",
+    TURNING: "angular_speed",
+}
+"""Dimension of a quantity of rules -> what tasks call it; see `units.py`."""
+
+TRUTHS = {YES: Truth.TRUE, MAYBE: Truth.UNKNOWN, NO: Truth.FALSE}
+
+Look = Callable[[Facts, tuple[int, ...]], Truth]
+"""Whether something holds between objects, by id, in a mind as rules see it."""
+
+
+def words() -> Iterator[Meaning]:
+    """Every word and quantity of rules that a task may ask for."""
+    for name, word in WORDS.items():
+        if _fits(name, word.takes):
+            text = name.replace("_", " ")
+            yield Meaning(
+                name,
+                holds=(name,),
+                arity=len(word.takes),
+                hold_s=0.5,
+                text=text,
+                takes=word.takes,
+                about=word.meaning,
+            )
+    for name, quantity in QUANTITIES.items():
+        if _fits(name, quantity.takes):
+            yield Meaning(
+                name,
+                holds=(),
+                arity=len(quantity.takes),
+                hold_s=0.5,
+                takes=quantity.takes,
+                measures=MEASURES[quantity.dimension],
+                needs=DEPTHS if "depth" in name else frozenset({"region"}),
+                about=quantity.meaning,
+            )
+
+
+def _fits(name: str, takes: tuple[str, ...]) -> bool:
+    known = name not in OF_TASKS and name not in RESERVED
+    return known and bool(takes) and takes[0] == "object" and set(takes) <= {"object", "zone"}
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """What the facts of one task mean.
+
+    Attributes:
+        meanings: Actions by name, and comparisons and actions on zones by key.
+        looks: Key or word -> whether it holds; plain relations of the mind are not among them.
+    """
+
+    meanings: Mapping[str, Meaning]
+    looks: Mapping[str, Look]
+
+
+def vocabulary(task: Task, actions: Mapping[str, Meaning]) -> Vocabulary:
+    """What the facts of a task mean.
+
+    Args:
+        task: A task without mistakes.
+        actions: All actions.
+    """
+    zones = {z.name for z in task.zones}
+    meanings, looks = dict(actions), {n: _word(n) for n in WORDS if n not in ACTIONS}
+    for fact in _facts(task):
+        name, key = action_of(fact).name, keyed(task, fact)[0]
+        if key == name or name not in actions:
+            continue
+        text = actions[name].text
+        if isinstance(fact, Comparison):
+            amount = task.amount(fact.amount)
+            looks[key] = _comparison(name, fact.sign, value(amount))
+            text = f"at a {name.replace('_', ' ')} {SIGNS[fact.sign]} {amount}"
+        else:
+            zone = next(str(a) for a in fact.actors if str(a) in zones)
+            looks[key] = _zone_look(task, name, zone)
+            text = f"{text} {zone}"
+        takes = tuple(k for k in actions[name].kinds if k == "object")
+        meanings[key] = replace(
+            actions[name], name=key, holds=(key,), arity=len(takes), takes=takes, text=text
+        )
+    return Vocabulary(MappingProxyType(meanings), MappingProxyType(looks))
+
+
+def _facts(task: Task) -> Iterator[Fact]:
+    for stage in task.stages:
+        if isinstance(stage.body, Actors):
+            yield Action(stage.name, stage.body.names)
+            continue
+        for course in walk(stage.body):
+            if isinstance(course, Action | Comparison):
+                yield course
+            for sign in getattr(course, "signs", ()):
+                yield from facts_of(sign.condition)
+    for invariant in task.invariants:
+        yield from facts_of(invariant.condition)
+
+
+def _word(name: str) -> Look:
+    def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
+        rows = _rows(facts, ids)
+        if rows is None or blind(facts.mind, name):
+            return Truth.UNKNOWN
+        return TRUTHS[int(WORDS[name].look(facts)[rows])]
+
+    return look
+
+
+def _rows(facts: Facts, ids: tuple[int, ...]) -> tuple[int, ...] | None:
+    """Where objects stand among the facts, or None when one of them is not there."""
+    return tuple(facts.row[i] for i in ids) if facts.row.keys() >= set(ids) else None
+
+
+SIGNS = {"<": "below", "<=": "of at most", ">": "above", ">=": "of at least"}
+_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+}
+
+
+def _comparison(name: str, sign: str, bound: float) -> Look:
+    """A quantity against a bound: true or false when all of its interval says so."""
+
+    def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
+        rows = _rows(facts, ids)
+        if rows is None or blind(facts.mind, name):
+            return Truth.UNKNOWN
+        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
+        return Truth.UNKNOWN if len(told) > 1 else _truth(told.pop())
+
+    return look
+
+
+def _zone_look(task: Task, name: str, zone: str) -> Look:
+    """A zone drawn in the task is looked at as it is; one of the settings as rules judge it."""
+    corners = next(z.corners for z in task.zones if z.name == zone)
+    polygon = np.asarray(corners, dtype=float)
+    question = "reaching" if name == "outside" else name
+
+    def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
+        rows = _rows(facts, ids)
+        if rows is None:
+            return Truth.UNKNOWN
+        if corners:
+            region = facts.beliefs[rows[0]].region
+            centre = np.array([region.centroid])
+            points = centre if name == "inside" else np.asarray(region.contour, dtype=float)
+            within = contains(points, polygon)
+            told = _truth(bool(within.all() if name == "wholly_inside" else within.any()))
+        else:
+            told = asked(facts.mind, question, ids[0], zone)
+        return OPPOSITE[told] if name == "outside" else told
+
+    return look
+
+
+OPPOSITE = {Truth.TRUE: Truth.FALSE, Truth.FALSE: Truth.TRUE, Truth.UNKNOWN: Truth.UNKNOWN}
+
+
+def _truth(holds: bool) -> Truth:
+    return Truth.TRUE if holds else Truth.FALSE

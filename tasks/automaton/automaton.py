@@ -1,0 +1,156 @@
+"""The states of a course, numbered, each worked out when it is first come to.
+
+A task may have more states than anyone wants to see (any order), or no end of them (recursion),
+so nothing is compiled before it is needed. States that are the same (`course.form`) are one node.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import TypeVar
+
+from visup.tasks.automaton.derivatives import (
+    Leaf,
+    Move,
+    State,
+    Step,
+    begin,
+    enter,
+    form,
+    leaves,
+    moves,
+    nested,
+    with_leaves,
+)
+from visup.tasks.grammar.nodes import Task
+
+V = TypeVar("V")
+W = TypeVar("W")
+END = -1
+"""In place of a node: the course is over."""
+WAYS_A_NODE = 10
+DEEPEST = 60  # courses around a step; each takes some of the depth that Python allows
+NEW = -1
+"""In place of a step that is carried over: it begins by the way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way to go on from a node.
+
+    Attributes:
+        target: The node it leads to, or `END`.
+        left: Positions of the steps that are over by it.
+        carried: For each step of the target its position in the node, or `NEW`.
+        share: Its share among the ways that leave the same steps.
+    """
+
+    target: int
+    left: tuple[int, ...]
+    carried: tuple[int, ...]
+    share: float
+
+
+class Automaton:
+    """The states of a task and the ways between them.
+
+    Args:
+        task: The task.
+    """
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self._states: list[State[int]] = []
+        self._steps: list[tuple[Step, ...]] = []
+        self._numbers: dict[object, int] = {}
+        self._ways: dict[int, tuple[Way, ...]] = {}
+        entered = list(enter(task, begin(task), NEW, 0.0))
+        self.start = tuple((self._number(s), 1.0 / len(entered)) for s in entered)
+        """Nodes in which the task may begin, each with its share; `END` where it may be left out."""
+
+    def __len__(self) -> int:
+        return len(self._states)
+
+    def steps(self, node: int) -> tuple[Step, ...]:
+        """The steps under way, in the order of the text; none at the end."""
+        return () if node == END else self._steps[node]
+
+    def ways(self, node: int) -> tuple[Way, ...]:
+        """All ways to go on; none at the end."""
+        if node == END:
+            return ()
+        if node not in self._ways:
+            self._ways[node] = self._worked_out(node)
+        return self._ways[node]
+
+    def node(self, state: State[W]) -> int:
+        """The number of a state, whatever is kept about its steps."""
+        return self._number(kept(state, [Leaf(x.step, NEW) for x in leaves(state)]))
+
+    def state(self, node: int) -> State[int]:
+        """The state of a node; about each step its position is kept."""
+        return self._states[node]
+
+    def explored(self, most: int) -> list[int]:
+        """The first nodes, breadth first from the start.
+
+        It ends early where ways grow without bound, as they do with stages that come back to
+        themselves inside others: so many ways as ten for each node are looked at, and what is
+        nested too deep is not gone on from.
+        """
+        found = {n: None for n, _ in self.start if n != END}
+        seen = 0
+        for done, node in enumerate(_growing(found)):
+            if seen > WAYS_A_NODE * most:
+                return list(found)[:done]  # the ways of the others are better not worked out
+            if nested(self._states[node]) > DEEPEST:
+                continue
+            seen += len(self.ways(node))
+            for way in self.ways(node):
+                if way.target != END and len(found) < most:
+                    found.setdefault(way.target)
+        return list(found)
+
+    def _number(self, state: State[int] | None) -> int:
+        if state is None:
+            return END
+        key = form(state)
+        if key not in self._numbers:
+            self._numbers[key] = len(self._states)
+            self._states.append(_numbered(state))
+            self._steps.append(tuple(x.step for x in leaves(state)))
+        return self._numbers[key]
+
+    def _worked_out(self, node: int) -> tuple[Way, ...]:
+        found = [self._way(m) for m in moves(self._task, self._states[node], NEW, 0.0)]
+        alike = Counter(w.left for w in found)
+        return tuple(replace(w, share=1.0 / alike[w.left]) for w in found)
+
+    def _way(self, move: Move[int]) -> Way:
+        carried = () if move.state is None else tuple(x.watch for x in leaves(move.state))
+        return Way(self._number(move.state), tuple(x.watch for x in move.left), carried, 1.0)
+
+
+def kept(state: State[W], new: list[Leaf[V]]) -> State[V]:
+    """A state with other things kept about its steps."""
+    # The tree is rebuilt from its leaves, so that nothing of the old kind remains in it.
+    return with_leaves(state, iter(new))  # type: ignore[arg-type]
+
+
+def _numbered(state: State[int]) -> State[int]:
+    """A state each of whose steps keeps its own position."""
+    places = count()
+    return with_leaves(state, (replace(x, watch=next(places)) for x in leaves(state)))
+
+
+def _growing(found: dict[int, None]) -> Iterator[int]:
+    """The keys of a dictionary that grows while one goes through them."""
+    done = 0
+    while done < len(found):
+        keys: Iterable[int] = list(found)[done:]
+        for key in keys:
+            done += 1
+            yield key

@@ -1,0 +1,84 @@
+"""What lies behind a task by the best way to where it is, and what of it is taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from visup.tasks.automaton.derivatives import Step
+
+MOST_BEHIND = 32  # at least so many steps are remembered, and less than twice as many
+
+
+@dataclass(frozen=True, slots=True)
+class Trail:
+    """A step that lies behind, with those before it: the best way to a place.
+
+    Attributes:
+        step: The step.
+        left: When it was left, seconds.
+        before: What lies further back; None where that is forgotten too.
+        length: How many steps lie behind, with those forgotten.
+    """
+
+    step: Step
+    left: float
+    before: Trail | None
+    length: int
+
+
+@dataclass(frozen=True, slots=True)
+class Revision:
+    """A step that was told to be over and is now believed not to have been.
+
+    Attributes:
+        step: The step.
+        told: When it was believed to have ended, seconds.
+        revised: When that was taken back, seconds.
+    """
+
+    step: Step
+    told: float
+    revised: float
+
+    def __str__(self) -> str:
+        return (
+            f"`{self.step.stage}`, told done at {self.told:.1f} s, "
+            f"is now believed not to have happened"
+        )
+
+
+def longer(trail: Trail | None, left: tuple[Step, ...], now: float) -> Trail | None:
+    """A trail with some steps more that were left now; what lies too far back is forgotten."""
+    for step in left:
+        trail = Trail(step, now, trail, trail.length + 1 if trail else 1)
+    if trail is not None and trail.length % MOST_BEHIND == 0:
+        return _cut(trail, MOST_BEHIND)
+    return trail
+
+
+def _cut(trail: Trail, most: int) -> Trail:
+    before = None if trail.before is None or most <= 1 else _cut(trail.before, most - 1)
+    return replace(trail, before=before)
+
+
+def revised(old: Trail | None, new: Trail | None, now: float) -> Iterator[Revision]:
+    """Steps that lay behind by the best way before, and do not by the best way now, the last first."""
+    while old is not None and old is not new:
+        while new is not None and new.length > old.length:
+            new = new.before
+        if new is not None and new.length == old.length:
+            if _same(old, new):
+                return
+            new = new.before
+        yield Revision(old.step, old.left, now)
+        old = old.before
+
+
+def _same(one: Trail | None, other: Trail | None) -> bool:
+    """Whether two trails of one length pass through the same steps, as far as they are remembered."""
+    while one is not None and other is not None and one is not other:
+        if one.step != other.step:
+            return False
+        one, other = one.before, other.before
+    return True

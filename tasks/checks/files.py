@@ -1,0 +1,81 @@
+"""Where task files are: paths, and the tasks that ship with visup, by name."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib.resources import files
+from os.path import normpath
+from pathlib import Path
+
+from visup.agent.model.errors import TaskError
+
+
+def read_text(path_or_name: str | Path) -> str:
+    """The text of a task file, or of the shipped task of that name.
+
+    Raises:
+        TaskError: When there is no such file or task, or it is not text.
+    """
+    path = Path(path_or_name)
+    if str(path_or_name) in shipped_tasks() and not path.exists():
+        resource = files("visup.tasks.shipped").joinpath(f"{path_or_name}.task")
+        return resource.read_text(encoding="utf-8")
+    try:
+        if path.exists() and not path.is_file():  # a pipe would be waited for
+            raise TaskError(
+                "cannot be read: it is no file", where=str(path), expected="a task file"
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise _no_such(str(path_or_name)) from None
+    except UnicodeDecodeError as e:
+        what = f"it is not text: byte {e.start} is not UTF-8"
+        raise TaskError(what, where=str(path), expected="a task file in UTF-8") from e
+    except (OSError, ValueError) as e:
+        said = getattr(e, "strerror", None) or e
+        what = f"cannot be read: {said}"
+        raise TaskError(what, where=str(path), expected="a task file") from e
+
+
+def read_beside(path: str, including: str) -> tuple[str, str]:
+    """An included file: its name for messages, and its text.
+
+    Args:
+        path: As `include` says it: a path from the folder of the including file, or the name of a shipped
+            task.
+        including: The file that includes it.
+
+    Raises:
+        TaskError: When there is no such file or task, or it is not text.
+    """
+    beside = Path(normpath(Path(including).parent / path))  # so that a file has one name
+    name = str(beside) if not path or beside.exists() or path not in shipped_tasks() else path
+    return name, read_text(name)
+
+
+def shipped_tasks() -> tuple[str, ...]:
+    """Names of the tasks that ship with visup, in alphabetical order."""
+    entries = files("visup.tasks.shipped").iterdir()
+    return tuple(sorted(e.name[: -len(".task")] for e in entries if e.name.endswith(".task")))
+
+
+def textmate_grammar() -> str:
+    """The TextMate grammar of task files, as JSON text."""
+    return files("visup.tasks.tools").joinpath("tasks.tmLanguage.json").read_text(encoding="utf-8")
+
+
+def _no_such(name: str) -> TaskError:
+    shipped = shipped_tasks()
+    beside = Path(name).parent
+    known = (
+        [*shipped, *(p.name for p in sorted(beside.glob("*.task")))] if beside.is_dir() else shipped
+    )
+    close = get_close_matches(Path(name).name, known, n=1, cutoff=0.75) or get_close_matches(
+        Path(name).stem, shipped, n=1
+    )
+    hint = None
+    if close:
+        what = "the shipped task" if close[0] in shipped else "the file"
+        hint = f"did you mean {what} `{close[0]}`?"
+    expected = f"a file, or a shipped task: {', '.join(shipped)}"
+    return TaskError("there is no such task file", where=name, expected=expected, hint=hint)

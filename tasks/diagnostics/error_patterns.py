@@ -1,0 +1,254 @@
+"""Mistakes that people make in a statement, each recognised by how it looks.
+
+The first recogniser that finds its mistake names it, so the surest ones stand first. Those of a
+statement as a whole stand here, those inside a course in `slips.py`.
+"""
+
+from __future__ import annotations
+
+import re
+
+from visup.tasks.diagnostics.diagnostic import Source, TaskFault
+from visup.tasks.diagnostics.error_patterns_more import (
+    action_in_angles,
+    any_order,
+    brackets,
+    clause,
+    commas,
+    empty_part,
+    full_stop,
+    joining_word,
+    mixed_names,
+    no_actors,
+    no_brackets,
+    open_angle,
+    operators,
+    repeat_in_front,
+    signs,
+    times,
+)
+from visup.tasks.grammar.statement import NAME, WORDS, Chunk, Mistake, Recogniser
+
+
+def name_mistake(chunk: Chunk, source: Source) -> TaskFault | None:
+    """The fault of a statement when it is one that people make, or None."""
+    for recognise in RECOGNISERS:
+        m = recognise(chunk.text)
+        if m is not None:
+            place = source.place(*chunk.position(m.start), m.length)
+            return TaskFault(m.code, m.what, place, expected=m.expected, hint=m.hint)
+    return None
+
+
+def _foreign_comment(text: str) -> Mistake | None:
+    m = re.search(r"//|/\*|(?<!\S)--|(?m:^\s*[%;])", text)
+    if m is None:
+        return None
+    mark = m[0].strip()
+    start = m.end() - len(mark)
+    return Mistake("E121", start, len(mark), f"`{mark}` does not begin a comment", "`#`")
+
+
+def _not_in_language(text: str) -> Mistake | None:
+    m = re.match(r"\s*(import|param|stage)\b(?=[ ]+[\w<\"'./])", text)
+    if m is not None:
+        what = f"`{m[1]}` is not part of the language of task files"
+        meant = {"import": '`include "common.task"`', "stage": "`<approach> ::= ...`"}
+        expected = meant.get(m[1], "`parameter patience is 90 s`")
+        return Mistake("E127", m.start(1), len(m[1]), what, expected)
+    m = re.search(r"(?<=[\s)>])(?:until|unless|after|before|while|if)\b(?!\s*[,)])", text)
+    if m is not None:
+        what = f"`{m[0]}` is not part of the language of task files"
+        hint = "in turn is `<a> <b>`, at the same time `<a> & <b>`; a stage `ends when ...`"
+        return Mistake("E127", m.start(), len(m[0]), what, hint=hint)
+    return None
+
+
+def _heading(text: str) -> Mistake | None:
+    m = re.match(r"\s*((task|actor|stage|zone|parameter)s?)\s*:(?!:=)", text, re.I)
+    if m is None:
+        return None
+    meant = {
+        "task": "`task <dock> ::= ...`",
+        "stage": "`<approach> ::= ...`",
+        "zone": "`zone berth is (100, 50) (300, 50) (300, 200)`",
+        "parameter": "`parameter patience is 90 s`",
+    }
+    expected = meant.get(m[2].lower(), "`actor satellite is spartan or hubble`")
+    what = f"`{m[1]}:` does not begin a statement"
+    return Mistake("E127", m.start(1), m.end() - m.start(1), what, expected)
+
+
+def _definer(text: str) -> Mistake | None:
+    m = re.match(rf"\s*<[ ]*{NAME}[ ]*>\s*(?!::=(?!=))(::==+|:=|==|=>|=|::(?!=)|:|->|→)", text)
+    if m is None:
+        return None
+    what = f"`{m[1]}` stands where `::=` should"
+    return Mistake("E102", m.start(1), len(m[1]), what, "`::=` after the name of a stage")
+
+
+def _bare_head(text: str) -> Mistake | None:
+    m = re.match(rf"\s*({NAME})\s*(?:::=|:=|=)", text)
+    if m is None or m[1] in WORDS:
+        return None
+    what = f"the name of stage `{m[1]}` stands without angle brackets"
+    return Mistake("E103", m.start(1), len(m[1]), what, f"`<{m[1]}> ::= ...`")
+
+
+def _open_head(text: str) -> Mistake | None:
+    m = re.match(rf"\s*(<[ ]*({NAME}))\s*(?:::=|:=|=)", text)
+    if m is not None:
+        return Mistake(
+            "E107", m.start(1), len(m[1]), f"`<{m[2]}` is not closed", f"`<{m[2]}> ::= ...`"
+        )
+    m = re.match(rf"\s*({NAME})[ ]*>", text)
+    if m is not None:
+        what = f"`{m[1]}>` is not opened"
+        return Mistake("E107", m.start(1), len(m[1]) + 1, what, f"`<{m[1]}>`")
+    return None
+
+
+def _not_a_name(text: str) -> Mistake | None:
+    for m in re.finditer(r"<([^<>()|&\n]*)>", text):
+        inner = m[1].strip()
+        if re.fullmatch(NAME, inner):
+            continue
+        said = f"`{inner}` is not a name" if inner else "a name is missing between `<` and `>`"
+        hint = None
+        made = re.sub(r"\W+", "_", inner).strip("_")
+        if re.fullmatch(NAME, made):
+            hint = f"letters, digits and `_` make a name, such as `<{made}>`"
+        expected = "a name that begins with a letter"
+        return Mistake("E108", m.start(), len(m[0]), said, expected, hint)
+    return None
+
+
+def _empty_stage(text: str) -> Mistake | None:
+    m = re.fullmatch(rf"\s*(<[ ]*({NAME})[ ]*>)\s*::=\s*", text)
+    if m is None:
+        return None
+    return Mistake(
+        "E109",
+        m.start(1),
+        len(m[1]),
+        f"stage `<{m[2]}>` asks for nothing",
+        "actions or stages after `::=`",
+    )
+
+
+def _word_as_name(text: str) -> Mistake | None:
+    words = "|".join(WORDS)
+    m = re.search(rf"\((?:[^()]*,)?\s*({words})\s*[,)]|\b({words})\s*\(", text)
+    if m is None:
+        return None
+    word = m[1] or m[2]
+    start = m.start(1) if m[1] else m.start(2)
+    return Mistake("E123", start, len(word), f"`{word}` is a word of the language", "another name")
+
+
+def _actor(text: str) -> Mistake | None:
+    m = re.match(rf"\s*(?:optional\s+)?actor\b\s*({NAME})?\s*(\S*)", text)
+    if m is None:
+        return None
+    expected = "`actor satellite is spartan or hubble`"
+    if m[1] is None or m[1] in WORDS:
+        start = m.end() - len(m[0].lstrip())
+        return Mistake("E124", start, 5, "the name of the actor is missing", expected)
+    size = re.search(r"\bsize\b(?!\s*\d+(?:\.\d+)?\s*[^\W\d])", text)
+    if size is not None:
+        what = "`size` is not followed by a number and a unit"
+        return Mistake("E124", size.start(), 4, what, "such as `size 1.6 m`")
+    if m[2] == "is":
+        hint = "several models are parted by `or`" if re.search(r"[,|/]|\band\b", text) else None
+        spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
+        if hint is None and spaced is not None:
+            hint = f"the name of a model has no blanks, such as `{spaced[1]}_{spaced[2]}`"
+        what = f"actor `{m[1]}` is declared with something that is not a model"
+        if not text[m.end() :].strip(" "):
+            what = f"actor `{m[1]}` is declared without a model"
+        return Mistake("E124", m.start(1), len(m[1]), what, expected, hint)
+    what = f"`is` is missing after actor `{m[1]}`"
+    return Mistake("E124", m.start(1), len(m[1]), what, expected)
+
+
+def _include(text: str) -> Mistake | None:
+    m = re.match(r"\s*(include)\b", text)
+    if m is None:
+        return None
+    what = "`include` is not followed by a file name in double quotes"
+    return Mistake("E130", m.start(1), 7, what, '`include "common.task"`')
+
+
+def _zone(text: str) -> Mistake | None:
+    m = re.match(rf"\s*(zone)\b\s*({NAME})?\s*(is\b)?", text)
+    if m is None:
+        return None
+    what = "the name of the zone is missing"
+    if m[2]:
+        corners = len(re.findall(r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)", text))
+        what = f"zone `{m[2]}` is drawn with something that is no corner"
+        what = f"zone `{m[2]}` has fewer than three corners" if corners < 3 else what
+        what = what if m[3] else f"`is` is missing after zone `{m[2]}`"
+    start = m.start(2) if m[2] else m.start(1)
+    expected = f"`zone {m[2] or 'berth'} is (100, 50) (300, 50) (300, 200)`, in pixels"
+    return Mistake("E131", start, len(m[2] or m[1]), what, expected)
+
+
+def _parameter(text: str) -> Mistake | None:
+    m = re.match(rf"\s*(parameter)\b\s*({NAME})?\s*(is\b)?", text)
+    if m is None:
+        return None
+    what = "the name of the parameter is missing"
+    if m[2]:
+        what = f"parameter `{m[2]}` is not given a number and a unit"
+        what = what if m[3] else f"`is` is missing after parameter `{m[2]}`"
+    start = m.start(2) if m[2] else m.start(1)
+    expected = f"`parameter {m[2] or 'patience'} is 90 s`"
+    return Mistake("E132", start, len(m[2] or m[1]), what, expected)
+
+
+def _invariant(text: str) -> Mistake | None:
+    m = re.match(r"\s*(never|always)\b", text)
+    if m is None:
+        return None
+    place = re.search(r"\b(?:in|while|at)\s+(?=<)", text)
+    if place is not None:
+        what = f"`{place[0].strip()}` stands where `during` should"
+        return Mistake("E125", place.start(), len(place[0].strip()), what, "`during <approach>`")
+    what = f"`{m[1]}` is not followed by a condition"
+    expected = f"`{m[1]} touching(arm, radiator)`, perhaps with `during <stage>`"
+    return Mistake("E125", m.start(1), len(m[1]), what, expected)
+
+
+RECOGNISERS: tuple[Recogniser, ...] = (
+    _foreign_comment,
+    _heading,
+    _include,
+    _zone,
+    _parameter,
+    signs,
+    _not_in_language,
+    _definer,
+    _bare_head,
+    _open_head,
+    _actor,
+    _not_a_name,
+    _empty_stage,
+    open_angle,
+    brackets,
+    action_in_angles,
+    times,
+    any_order,
+    _invariant,
+    operators,
+    no_brackets,
+    no_actors,
+    empty_part,
+    _word_as_name,
+    clause,
+    commas,
+    joining_word,
+    full_stop,
+    repeat_in_front,
+    mixed_names,
+)

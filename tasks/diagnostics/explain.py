@@ -1,0 +1,69 @@
+"""What a code means, with a wrong and a right example: `visup task explain CODE`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+
+from visup.agent.model.errors import TaskError
+from visup.tasks.diagnostics.diagnostic import CODES, did_you_mean
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A code in words.
+
+    Attributes:
+        code: `E102`.
+        title: What it stands for, one clause.
+        why: Some sentences.
+        wrong: A file with this mistake; empty when none can be shown.
+        right: The same file without it; empty when none can be shown.
+    """
+
+    code: str
+    title: str
+    why: str
+    wrong: str
+    right: str
+
+    def __str__(self) -> str:
+        said = [f"{self.code}: {self.title}", "", self.why]
+        for word, text in (("wrong", self.wrong), ("right", self.right)):
+            if text:
+                said += ["", f"{word}:", *(f"    {line}" for line in text.split("\n"))]
+        return "\n".join(said)
+
+
+def explain(code: str) -> Explanation:
+    """The explanation of a code, in upper or lower case.
+
+    Raises:
+        TaskError: There is no such code.
+    """
+    found = _all().get(code.strip("[]").upper())
+    if found is None:
+        expected = (
+            f"`{next(iter(CODES))}` to `{list(CODES)[-1]}`, as messages show them in brackets"
+        )
+        hint = did_you_mean(code.upper(), CODES)
+        raise TaskError(f"there is no code `{code}`", expected=expected, hint=hint)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _all() -> dict[str, Explanation]:
+    text = files("visup.tasks.diagnostics").joinpath("explanations.txt").read_text(encoding="utf-8")
+    made = (_read(block.split("\n")) for block in text.strip().split("\n\n"))
+    return {e.code: e for e in made}
+
+
+def _read(lines: list[str]) -> Explanation:
+    code, *rest = lines
+
+    def marked(mark: str) -> str:
+        return "\n".join(line[2:] for line in rest if line.startswith(mark))
+
+    why = " ".join(line for line in rest if not line.startswith(("- ", "+ ")))
+    return Explanation(code, CODES[code], why, marked("- "), marked("+ "))

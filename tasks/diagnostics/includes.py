@@ -1,0 +1,92 @@
+"""`include`: the statements of other files, as if they stood in the file that includes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from visup.agent.model.errors import TaskError
+from visup.tasks.diagnostics.diagnostic import Source
+from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.diagnostics.recovery import Parsed, parse
+from visup.tasks.grammar.nodes import Include, Task
+from visup.tasks.grammar.parser import moved
+
+Read = Callable[[str, str], tuple[str, str]]
+"""(path, the file that includes it) -> (name of the file, its text); raises TaskError."""
+
+
+def join_included(parsed: Parsed, source: Source, read: Read) -> Parsed:
+    """A file with the statements of the files that it includes behind its own.
+
+    Args:
+        parsed: The file.
+        source: For places; gets to know the included files.
+        read: How files are read.
+
+    Returns:
+        The file without includes; each file is taken once, however often it is included. The tasks of
+        an included file are stages here.
+    """
+    if not parsed.task.includes:
+        return parsed
+    return _Joiner(source, read).join(parsed, (source.file,))
+
+
+DEEPEST = 30  # files that include one another in a row
+
+
+@dataclass
+class _Joiner:
+    source: Source
+    read: Read
+    taken: set[str] = field(default_factory=set)
+
+    def join(self, parsed: Parsed, chain: tuple[str, ...]) -> Parsed:
+        whole = replace(parsed, task=replace(parsed.task, includes=()))
+        for include in parsed.task.includes:
+            whole = _joined(whole, self.included(include, chain))
+        return whole
+
+    def included(self, include: Include, chain: tuple[str, ...]) -> Parsed:
+        try:
+            file, text = self.read(include.path, chain[-1])
+        except TaskError as e:
+            what = f"`{include.path}` cannot be included: {e.what}"
+            return self.fault("E221", what, include, e.expected, e.hint)
+        if file in chain or len(chain) > DEEPEST:
+            circle = " includes ".join(
+                f"`{f}`" for f in (*chain[chain.index(file) if file in chain else 0 :], file)
+            )
+            hint = "move what both need to a third file"
+            return self.fault("E222", f"files include each other: {circle}", include, None, hint)
+        if file in self.taken:
+            return Parsed(Task(()))
+        self.taken.add(file)
+        source = self.source.included[file] = Source(text, file)
+        code, odd = clean(text, source)
+        parsed = parse(code, source)
+        task = moved(parsed.task, file)
+        stages = tuple(replace(s, is_task=False) for s in task.stages)
+        told = replace(parsed, task=replace(task, stages=stages), faults=(*odd, *parsed.faults))
+        return self.join(told, (*chain, file))
+
+    def fault(
+        self, code: str, what: str, include: Include, expected: str | None, hint: str | None
+    ) -> Parsed:
+        return Parsed(Task(()), (self.source.fault(code, what, include.span, expected, hint),))
+
+
+def _joined(one: Parsed, other: Parsed) -> Parsed:
+    a, b = one.task, other.task
+    task = replace(
+        a,
+        stages=(*a.stages, *b.stages),
+        actors=(*a.actors, *b.actors),
+        invariants=(*a.invariants, *b.invariants),
+        zones=(*a.zones, *b.zones),
+        parameters=(*a.parameters, *b.parameters),
+    )
+    return Parsed(
+        task, (*one.faults, *other.faults), one.defined | other.defined, one.used | other.used
+    )

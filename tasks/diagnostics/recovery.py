@@ -1,0 +1,235 @@
+"""Mistakes of syntax: splitting at statements, and naming what went wrong in each."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
+
+from visup.tasks.diagnostics.diagnostic import Source, TaskFault, did_you_mean
+from visup.tasks.diagnostics.error_patterns import name_mistake
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.parser import collect, read, read_statements
+from visup.tasks.grammar.statement import WORDS, Chunk, without_texts
+
+NAME = r"[^\W\d]\w*"
+HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
+OPENS = re.compile(  # a line that begins a statement, well written or not
+    rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
+    r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage)\b(?![ ]*\())"
+)
+MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
+DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
+UNFINISHED = re.compile(
+    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional))\s*$"
+)
+DEEPEST = 60
+LONGEST = 4000  # characters of a statement that mistakes are looked for in
+
+
+@dataclass(frozen=True, slots=True)
+class Parsed:
+    """What could be read of a text.
+
+    Attributes:
+        task: All statements that are well written.
+        faults: What is wrong with the others.
+        defined: Stages that the others seem to define.
+        used: Stages that the others mention.
+    """
+
+    task: Task
+    faults: tuple[TaskFault, ...] = ()
+    defined: frozenset[str] = frozenset()
+    used: frozenset[str] = frozenset()
+
+    @property
+    def lacking(self) -> bool:
+        """Whether a file that it includes could not be read, so that names may be missing."""
+        return any(f.code in ("E130", "E221", "E222") for f in self.faults)
+
+
+def parse(text: str, source: Source) -> Parsed:
+    """Read a cleaned text; where it is not in the grammar, statement by statement.
+
+    Args:
+        text: See `clean`.
+        source: For places.
+
+    Returns:
+        The tree of all well written statements, one fault for each other one.
+    """
+    deep = _too_deep(without_texts(text), source)
+    if deep:
+        return Parsed(Task(()), (deep,))
+    try:
+        return Parsed(read(text, source.file))
+    except UnexpectedInput:
+        return _parse_in_parts(text, source)
+
+
+def _parse_in_parts(text: str, source: Source) -> Parsed:
+    statements: list[object] = []
+    faults: list[TaskFault] = []
+    defined: set[str] = set()
+    used: set[str] = set()
+    for chunk in split(text):
+        try:
+            statements += read_statements(_in_place(chunk))
+        except UnexpectedInput as e:
+            faults.append(name_mistake(_near(chunk, e), source) or _unexpected(e, chunk, source))
+            first = DECLARES.match(chunk.text)
+            defined |= {first[1]} if first else set()
+            used |= set(re.findall(NAME, chunk.text))
+    if not faults:  # each part reads well, but not all of them together
+        faults = [_whole(text, source)]
+    task = collect(statements, source.file)
+    return Parsed(task, tuple(faults), frozenset(defined), frozenset(used))
+
+
+def _in_place(chunk: Chunk) -> str:
+    """The statement with so much blank before it that its places are those in its file."""
+    return "\n" * (chunk.line - 1) + " " * (chunk.column - 1) + chunk.raw
+
+
+def _near(chunk: Chunk, error: UnexpectedInput) -> Chunk:
+    """A statement, cut around the error when it is so long that looking at all of it takes long."""
+    if len(chunk.text) <= LONGEST:
+        return chunk
+    starts = [0, *(m.end() for m in re.finditer("\n", chunk.text))]
+    row = min(max(0, error.line - chunk.line), len(starts) - 1)
+    column = error.column - (chunk.column if row == 0 else 1)
+    at = min(len(chunk.text), max(0, starts[row] + column))
+    start, end = max(0, at - LONGEST // 2), at + LONGEST // 4
+    line, column = chunk.position(start)
+    return Chunk(chunk.text[start:end], line, column)
+
+
+def split(text: str) -> Iterator[Chunk]:
+    """A cleaned text, cut where statements begin, as far as that can be told.
+
+    Statements begin at `<name> ::=` anywhere, at lines that look like the beginning of one,
+    and at unindented lines that begin with a name that is not defined elsewhere.
+    """
+    code = without_texts(text)
+    heads = {m[0].split(">")[0].strip("< ") for m in HEAD.finditer(code)}
+    starts = {m.start() for m in MARKED_HEAD.finditer(code)}
+    lines = [0]
+    before = ""
+    for line in code.split("\n"):
+        if _begins(line, before, heads):
+            starts.add(lines[-1] + len(line) - len(line.lstrip(" ")))
+        before = line if line.strip() else before
+        lines.append(lines[-1] + len(line) + 1)
+    cuts = sorted({0, *starts, len(text)})
+    for a, b in pairwise(cuts):
+        if code[a:b].strip() or text[a:b].strip():
+            row = bisect_right(lines, a)
+            raw = text[a:b].rstrip()
+            yield Chunk(code[a : a + len(raw)], row, a - lines[row - 1] + 1, raw)
+
+
+def _begins(line: str, before: str, heads: set[str]) -> bool:
+    if UNFINISHED.search(before.rstrip()):
+        return bool(HEAD.match(line.lstrip(" ")))
+    if OPENS.match(line):
+        return True
+    first = re.match(rf"(?:<[ ]*({NAME})|{NAME})", line)
+    return bool(first) and first[1] not in heads if first else False
+
+
+def _too_deep(text: str, source: Source) -> TaskFault | None:
+    depth = 0
+    for match in re.finditer(r"[()]", text):
+        depth = depth + 1 if match[0] == "(" else max(0, depth - 1)
+        if depth > DEEPEST:
+            line = text.count("\n", 0, match.start()) + 1
+            column = match.start() - text.rfind("\n", 0, match.start())
+            what = f"brackets are nested more than {DEEPEST} deep"
+            return TaskFault("E128", what, source.place(line, column), hint="name a stage instead")
+    return None
+
+
+def _whole(text: str, source: Source) -> TaskFault:
+    try:
+        read(text)
+    except UnexpectedInput as e:
+        return _unexpected(e, Chunk(text, 1, 1, text), source)
+    return TaskFault("E101", "text that is not part of the language", source.place(1, 1))
+
+
+SAID = {
+    "HEAD": "a rule such as `<approach> ::= ...`",
+    "STAGE": "a stage such as `<approach>`",
+    "NAME": "a name",
+    "MODEL": "the name of a model",
+    "NUMBER": "a number",
+    "REPEAT": "`?`, `*` or `+`",
+    "WHEN": "`never` or `always`",
+    "LPAR": "`(`",
+    "RPAR": "`)`",
+    "COMMA": "`,`",
+    "VBAR": "`|`",
+    "AMPERSAND": "`&`",
+    "ACTOR": "`actor`",
+    "UNIT": "a unit",
+    "COUNT": "a whole number",
+    "TEXT": "a text in double quotes",
+    "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
+    "COMPARE": "`<` or `>`",
+    "_TIMES": "`times`",
+    "AT": "`at least` or `at most`",
+    "ANY": "`any order`",
+    "OPTIONAL": "`optional actor`",
+    "TASK": "`task`",
+    "$END": "the end of the file",
+}
+KEYWORDS = (
+    *WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
+    "ends", "progresses", "fails", "when", "and", "not",
+)  # fmt: skip
+
+
+def _unexpected(error: UnexpectedInput, chunk: Chunk, source: Source) -> TaskFault:
+    """The fault when no particular mistake was recognised: what stands there, what could."""
+    if isinstance(error, UnexpectedToken):
+        token, allowed = error.token, error.accepts or error.expected
+        found = str(token).strip()
+    else:
+        allowed = error.allowed if isinstance(error, UnexpectedCharacters) else set()
+        found = _word_at(chunk, error.line, error.column)
+    ended = isinstance(error, UnexpectedToken) and error.token.type == "$END"
+    line, column = (*chunk.end,) if ended or error.line < 1 else (error.line, error.column)
+    what = "the statement ends too early" if ended else f"unexpected `{found}`"
+    return TaskFault(
+        "E101",
+        what,
+        source.place(line, column, max(1, len(found))),
+        expected=_said(allowed or set()),
+        hint=did_you_mean(found, KEYWORDS) if _slipped(found) else None,
+    )
+
+
+def _slipped(found: str) -> bool:
+    """Whether a word may be a slip of the pen for a word of the language."""
+    return found.isidentifier() and found not in KEYWORDS
+
+
+def _said(terminals: set[str]) -> str | None:
+    words = {SAID.get(t, f"`{t.lower()}`") for t in terminals}
+    if not words:
+        return None
+    ordered = sorted(words)
+    return ordered[0] if len(ordered) == 1 else f"{', '.join(ordered[:-1])} or {ordered[-1]}"
+
+
+def _word_at(chunk: Chunk, line: int, column: int) -> str:
+    rows = chunk.raw.split("\n")
+    row = rows[min(max(0, line - chunk.line), len(rows) - 1)]
+    start = column - 1 - (chunk.column - 1 if line == chunk.line else 0)
+    match = re.match(r"\w+|\S", row[max(0, start) :])
+    return match[0] if match else row[start : start + 1]

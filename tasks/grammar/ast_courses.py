@@ -1,0 +1,235 @@
+"""Courses: what stages ask for, as frozen nodes that print themselves back as source.
+
+Read before: `conditions.py` (actions and conditions). Read next: `tree.py` (the file as a whole).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+from visup.tasks.grammar.conditions import NOWHERE, Action, Amount, Comparison, Condition, Span
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """`for 5 s`: what it stands behind must hold so long without a break."""
+
+    duration: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"for {self.duration}"
+
+
+@dataclass(frozen=True, slots=True)
+class Deadline:
+    """`within 60 s`: what it stands behind must be over so long after it began."""
+
+    duration: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"within {self.duration}"
+
+
+Clause: TypeAlias = Hold | Deadline
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """`fails when diverging(a, b) for 2 s`: by what an action begins, ends, progresses or fails.
+
+    Attributes:
+        kind: Which of the four.
+        condition: What must be seen.
+        lasting: How long it must be seen without a break, or None.
+    """
+
+    kind: Literal["begins", "ends", "progresses", "fails"]
+    condition: Condition
+    lasting: Hold | None = None
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        lasting = f" {self.lasting}" if self.lasting else ""
+        return f"{self.kind} when {self.condition}{lasting}"
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """`<approach>`: the stage of that name, here."""
+
+    stage: str
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"<{self.stage}>"
+
+
+@dataclass(frozen=True, slots=True)
+class Repeated:
+    """`a?` (may be left out), `a*` (any number of times), `a+` (at least once)."""
+
+    item: Course
+    mark: Literal["?", "*", "+"]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{_within(self.item, ATOM)}{self.mark}"
+
+
+@dataclass(frozen=True, slots=True)
+class Counted:
+    """`a at least 2 times at most 5 times`.
+
+    Attributes:
+        least: How often at least; 1 when the file does not say, 0 to say that it may be left out.
+        most: How often at most, or None.
+    """
+
+    item: Course
+    least: int = 1
+    most: int | None = None
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{_within(self.item, CLAUSED, Counted)} {self.times}"
+
+    @property
+    def times(self) -> str:
+        """How often, as it is written."""
+        said = []
+        if self.least != 1 or self.most is None:
+            said.append(f"at least {self.least} {_times(self.least)}")
+        if self.most is not None:
+            said.append(f"at most {self.most} {_times(self.most)}")
+        return " ".join(said)
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """`a for 5 s within 60 s`: a course with clauses."""
+
+    item: Course
+    clauses: tuple[Clause, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return " ".join([_within(self.item, CLAUSED, Timed), *map(str, self.clauses)])
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """`a begins when b fails when c`: a course with signs of its own."""
+
+    item: Course
+    signs: tuple[Sign, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return " ".join([_within(self.item, CLAUSED), *map(str, self.signs)])
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """`a & b`: at the same time."""
+
+    parts: tuple[Course, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return " & ".join(_within(p, JUDGED) for p in self.parts)
+
+
+@dataclass(frozen=True, slots=True)
+class AnyOrder:
+    """`any order (a, b, c)`: each of them once, one after the other."""
+
+    items: tuple[Course, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"any order ({', '.join(map(str, self.items))})"
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """`a b`: one after the other."""
+
+    items: tuple[Course, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return " ".join(_within(i, TOGETHER) for i in self.items)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """`a | b`: one of them."""
+
+    options: tuple[Course, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return " | ".join(_within(o, SEQUENCE) for o in self.options)
+
+
+Course: TypeAlias = (
+    Choice
+    | Sequence
+    | Together
+    | AnyOrder
+    | Judged
+    | Timed
+    | Counted
+    | Repeated
+    | Action
+    | Comparison
+    | Reference
+)
+"""What a stage asks for."""
+
+CHOICE, SEQUENCE, TOGETHER, JUDGED, CLAUSED, REPEATED, ATOM = range(7)
+BINDS: dict[type, int] = {
+    Choice: CHOICE,
+    Sequence: SEQUENCE,
+    Together: TOGETHER,
+    Judged: JUDGED,
+    Timed: CLAUSED,
+    Counted: CLAUSED,
+    Repeated: REPEATED,
+}
+
+
+def children(course: Course) -> tuple[Course, ...]:
+    """The courses directly inside one."""
+    match course:
+        case Choice(options=inner) | Together(parts=inner):
+            return inner
+        case Sequence(items=inner) | AnyOrder(items=inner):
+            return inner
+        case Timed(item=item) | Repeated(item=item) | Counted(item=item) | Judged(item=item):
+            return (item,)
+    return ()
+
+
+def walk(course: Course) -> Iterator[Course]:
+    """A course and all courses inside it, outermost first, in the order of the text."""
+    todo = [course]
+    while todo:
+        course = todo.pop()
+        yield course
+        todo += reversed(children(course))
+
+
+def _within(course: Course, least: int, unlike: type | None = None) -> str:
+    """A course as text, in brackets when it binds looser than its place asks for."""
+    text = str(course)
+    loose = BINDS.get(type(course), ATOM) < least
+    return f"({text})" if loose or (unlike and isinstance(course, unlike)) else text
+
+
+def _times(n: int) -> str:
+    return "time" if n == 1 else "times"

@@ -1,0 +1,249 @@
+"""The tree of a task file: frozen nodes that print themselves back as source.
+
+`str(node)` is text of the task language and reads back as the same node; where a node stands in
+its file (`span`) takes no part in equality. Spacing, comments and needless brackets are not kept.
+
+Read before: `conditions.py` and `courses.py`. Read next: `read.py` (text to tree),
+`check.py` (what a tree must also satisfy).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from visup.tasks.grammar.ast_courses import (
+    AnyOrder,
+    Choice,
+    Clause,
+    Counted,
+    Course,
+    Deadline,
+    Hold,
+    Judged,
+    Reference,
+    Repeated,
+    Sequence,
+    Sign,
+    Timed,
+    Together,
+    children,
+    walk,
+)
+from visup.tasks.grammar.conditions import (
+    NOWHERE,
+    Action,
+    Amount,
+    Comparison,
+    Condition,
+    Name,
+    Span,
+    number_text,
+)
+
+__all__ = [
+    "NOWHERE",
+    "Action",
+    "Actor",
+    "Actors",
+    "Amount",
+    "AnyOrder",
+    "Choice",
+    "Clause",
+    "Comparison",
+    "Condition",
+    "Counted",
+    "Course",
+    "Deadline",
+    "Hold",
+    "Include",
+    "Invariant",
+    "Judged",
+    "Name",
+    "Parameter",
+    "Reference",
+    "Repeated",
+    "Sequence",
+    "Sign",
+    "Span",
+    "Stage",
+    "Task",
+    "Timed",
+    "Together",
+    "ZoneDeclaration",
+    "children",
+    "walk",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Actors:
+    """The right side of the paper's strict form, `<converging> ::= arm satellite`."""
+
+    names: tuple[Name, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return " ".join(map(str, self.names))
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A rule: a name and what it stands for.
+
+    Attributes:
+        name: The name between the angle brackets.
+        body: Its course, or `Actors` when the rule is an action in the strict form.
+        text: What the narrative says when it begins; empty when the file says nothing.
+        is_task: Whether it is marked with `task`.
+        span: Where its head stands.
+    """
+
+    name: str
+    body: Course | Actors
+    text: str = ""
+    is_task: bool = False
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        mark, text = "task " if self.is_task else "", f'"{self.text}" ' if self.text else ""
+        return f"{mark}<{self.name}> ::= {text}{self.body}"
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """`actor satellite is spartan201_approx or hubble size 1.6 m`.
+
+    Attributes:
+        name: Its name in the file.
+        models: The models that it may be; empty when only its size is said, or that it is optional.
+        size: Its largest extent, or None.
+        optional: Whether what is asked of it may be left out.
+    """
+
+    name: str
+    models: tuple[str, ...] = ()
+    size: Amount | None = None
+    optional: bool = False
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        said = [*(["optional"] if self.optional else []), "actor", self.name]
+        said += [f"is {' or '.join(self.models)}"] if self.models else []
+        return " ".join([*said, *([f"size {self.size}"] if self.size else [])])
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneDeclaration:
+    """`zone berth is (100, 50) (300, 50) (300, 200)`: corners in pixels; none for one drawn elsewhere."""
+
+    name: str
+    corners: tuple[tuple[float, float], ...] = ()
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        corners = " ".join(f"({number_text(x)}, {number_text(y)})" for x, y in self.corners)
+        return f"zone {self.name}{' is ' + corners if corners else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """`parameter patience is 90 s`."""
+
+    name: str
+    amount: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"parameter {self.name} is {self.amount}"
+
+
+@dataclass(frozen=True, slots=True)
+class Include:
+    """`include "common.task"`: the statements of another file, as if they stood here."""
+
+    path: str
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f'include "{self.path}"'
+
+
+@dataclass(frozen=True, slots=True)
+class Invariant:
+    """`never touching(arm, radiator)`, `always ... for 2 s during <approach>`."""
+
+    when: Literal["never", "always"]
+    condition: Condition
+    lasting: Hold | None = None
+    during: tuple[Reference, ...] = ()
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        lasting = f" {self.lasting}" if self.lasting else ""
+        during = f" during {' or '.join(map(str, self.during))}" if self.during else ""
+        return f"{self.when} {self.condition}{lasting}{during}"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task file.
+
+    Attributes:
+        stages: Its rules in the order of the file.
+        actors: Declarations of actors.
+        invariants: What must never or always hold.
+        zones: Parts of the image that it names.
+        parameters: Amounts that it names.
+        includes: Files that it includes; their statements stand among the others.
+        file: Name of the file, for messages.
+        root: The rule that is the task when the file has several; empty for its first one.
+    """
+
+    stages: tuple[Stage, ...]
+    actors: tuple[Actor, ...] = ()
+    invariants: tuple[Invariant, ...] = ()
+    zones: tuple[ZoneDeclaration, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    includes: tuple[Include, ...] = ()
+    file: str = field(default="<text>", compare=False)
+    root: str = ""
+
+    @property
+    def declared(self) -> tuple[Actor | ZoneDeclaration | Parameter, ...]:
+        """Declarations of actors, zones and parameters."""
+        return (*self.actors, *self.zones, *self.parameters)
+
+    @property
+    def roots(self) -> tuple[str, ...]:
+        """The tasks of the file: the rules marked with `task`, else the first one."""
+        marked = tuple(dict.fromkeys(s.name for s in self.stages if s.is_task))
+        return marked or tuple(s.name for s in self.stages[:1])
+
+    @property
+    def name(self) -> str:
+        """Name of the task."""
+        return self.root or next(iter(self.roots), "")
+
+    def stage(self, name: str) -> Stage | None:
+        """The first rule of that name, or None."""
+        return next((s for s in self.stages if s.name == name), None)
+
+    def actor(self, name: str) -> Actor:
+        """What is declared of an actor."""
+        return next((a for a in self.actors if a.name == name), Actor(name))
+
+    def models(self, actor: str) -> tuple[str, ...]:
+        """Models that an actor may be: as declared, else the one of the actor's own name."""
+        return self.actor(actor).models or (actor,)
+
+    def amount(self, amount: Amount) -> Amount:
+        """What an amount stands for: itself, or what its parameter is."""
+        if not amount.parameter:
+            return amount
+        found = (p.amount for p in self.parameters if p.name == amount.parameter)
+        return next(found, amount)
+
+    def __str__(self) -> str:
+        said = (*self.includes, *self.parameters, *self.actors, *self.zones)
+        return "\n".join(map(str, (*said, *self.stages, *self.invariants)))

@@ -1,0 +1,290 @@
+"""From text to tree, by the grammar in `tasks.lark`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Several
+from dataclasses import replace
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any, Literal, Protocol, TypeVar, cast
+
+from lark import Lark, Token, Transformer
+
+from visup.tasks.grammar.conditions import Both, Condition, Denied, Either, Fact
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actor,
+    Actors,
+    Amount,
+    AnyOrder,
+    Choice,
+    Clause,
+    Comparison,
+    Counted,
+    Course,
+    Deadline,
+    Hold,
+    Include,
+    Invariant,
+    Judged,
+    Name,
+    Parameter,
+    Reference,
+    Repeated,
+    Sequence,
+    Sign,
+    Span,
+    Stage,
+    Task,
+    Timed,
+    Together,
+    ZoneDeclaration,
+)
+
+N = TypeVar("N")
+
+
+class _Placed(Protocol):
+    """A node that knows where it stands."""
+
+    @property
+    def span(self) -> Span: ...
+
+
+def read(text: str, file: str = "<text>") -> Task:
+    """The tree of a text, by syntax alone.
+
+    Args:
+        text: A whole task file, or some of its statements.
+        file: Its name, for messages.
+
+    Returns:
+        The tree; whether its names make sense is not looked at (see `check`).
+
+    Raises:
+        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+    """
+    return collect(read_statements(text), file)
+
+
+def read_statements(text: str) -> list[object]:
+    """The statements of a text in their order.
+
+    Raises:
+        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+    """
+    # The parser makes the tree as it goes, which its types do not say.
+    return cast("list[object]", _parser().parse(text))
+
+
+def tokens(text: str) -> list[Token]:
+    """The words of a text that is in the language, in their order.
+
+    Raises:
+        lark.exceptions.UnexpectedInput: Where the text leaves the grammar.
+    """
+    reader = _parser().parse_interactive(text)
+    found = list(reader.iter_parse())
+    reader.feed_eof(found[-1] if found else None)  # type: ignore[no-untyped-call]
+    return found
+
+
+def collect(statements: Several[object], file: str) -> Task:
+    """The tree that some statements make."""
+
+    def of(kind: type[N]) -> tuple[N, ...]:
+        return tuple(s for s in statements if isinstance(s, kind))
+
+    return Task(
+        stages=of(Stage),
+        actors=of(Actor),
+        invariants=of(Invariant),
+        zones=of(ZoneDeclaration),
+        parameters=of(Parameter),
+        includes=of(Include),
+        file=file,
+    )
+
+
+def grammar() -> str:
+    """The text of `tasks.lark`."""
+    return files("visup.tasks.grammar").joinpath("tasks.lark").read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1)
+def _parser() -> Lark:
+    return Lark(
+        grammar(),
+        parser="lalr",
+        lexer="contextual",
+        maybe_placeholders=False,
+        transformer=_ToTree(),  # at once: a tree of Lark's own in between costs half of the time
+    )
+
+
+class _ToTree(Transformer[Token, Any]):
+    """One method for each rule of the grammar."""
+
+    def start(self, items: list[Any]) -> list[Any]:
+        return items
+
+    def stage(self, items: list[Any]) -> Stage:
+        marked = items[0].type == "TASK"
+        head, *rest = items[1:] if marked else items
+        text = _unquoted(rest[0]) if isinstance(rest[0], Token) else ""
+        return Stage(_bare(head), rest[-1], text, marked, _of(head))
+
+    def actors(self, items: list[Token]) -> Actors:
+        return Actors(_names(items), _over(_of(items[0]), _of(items[-1])))
+
+    def actor(self, items: list[Any]) -> Actor:
+        optional = items[0].type == "OPTIONAL"
+        name, *rest = items[1:] if optional else items
+        models = next((i for i in rest if isinstance(i, tuple)), ())
+        size = next((i for i in rest if isinstance(i, Amount)), None)
+        return Actor(str(name), models, size, optional, _of(name))
+
+    def models(self, items: list[Token]) -> tuple[str, ...]:
+        return tuple(map(str, items))
+
+    def size(self, items: list[Amount]) -> Amount:
+        return items[0]
+
+    def zone(self, items: list[Any]) -> ZoneDeclaration:
+        return ZoneDeclaration(str(items[0]), tuple(items[1:]), _of(items[0]))
+
+    def corner(self, items: list[Token]) -> tuple[float, float]:
+        return float(items[0]), float(items[1])
+
+    def parameter(self, items: list[Any]) -> Parameter:
+        return Parameter(str(items[0]), items[1], _of(items[0]))
+
+    def include(self, items: list[Token]) -> Include:
+        return Include(_unquoted(items[0]), _of(items[0]))
+
+    def invariant(self, items: list[Any]) -> Invariant:
+        when = cast('Literal["never", "always"]', str(items[0]))
+        lasting = next((i for i in items if isinstance(i, Hold)), None)
+        during = next((i for i in items if isinstance(i, tuple)), ())
+        span = _over(_of(items[0]), during[-1].span if during else items[-1].span)
+        return Invariant(when, items[1], lasting, during, span)
+
+    def during(self, items: list[Reference]) -> tuple[Reference, ...]:
+        return tuple(items)
+
+    def choice(self, items: list[Course]) -> Choice:
+        return Choice(tuple(items), _all(items))
+
+    def sequence(self, items: list[Course]) -> Sequence:
+        return Sequence(tuple(items), _all(items))
+
+    def together(self, items: list[Course]) -> Together:
+        return Together(tuple(items), _all(items))
+
+    def any_order(self, items: list[Any]) -> AnyOrder:
+        first, *courses, last = items
+        return AnyOrder(tuple(courses), _over(_of(first), _of(last)))
+
+    def judged(self, items: list[Any]) -> Judged:
+        return Judged(items[0], tuple(items[1:]), _all(items))
+
+    def timed(self, items: list[Any]) -> Timed:
+        return Timed(items[0], cast("tuple[Clause, ...]", tuple(items[1:])), _all(items))
+
+    def counted(self, items: list[Any]) -> Counted:
+        bounds = {word: number for word, number, _ in items[1:]}
+        span = _over(items[0].span, items[-1][2])
+        return Counted(items[0], bounds.get("least", 1), bounds.get("most"), span)
+
+    def at_least(self, items: list[Token]) -> tuple[str, int, Span]:
+        return "least", int(items[1]), _of(items[1])
+
+    def at_most(self, items: list[Token]) -> tuple[str, int, Span]:
+        return "most", int(items[1]), _of(items[1])
+
+    def repeated(self, items: list[Any]) -> Repeated:
+        mark = cast('Literal["?", "*", "+"]', str(items[1]))
+        return Repeated(items[0], mark, _over(items[0].span, _of(items[1])))
+
+    def hold(self, items: list[Any]) -> Hold:
+        return Hold(items[1], _over(_of(items[0]), items[1].span))
+
+    def deadline(self, items: list[Any]) -> Deadline:
+        return Deadline(items[1], _over(_of(items[0]), items[1].span))
+
+    def sign(self, items: list[Any]) -> Sign:
+        kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
+        lasting = items[2] if len(items) > 2 else None
+        return Sign(kind, items[1], lasting, _over(_of(items[0]), items[-1].span))
+
+    def amount(self, items: list[Token]) -> Amount:
+        span = _over(_of(items[0]), _of(items[-1]))
+        if len(items) == 1:
+            return Amount(0.0, "", str(items[0]), span)
+        return Amount(float(items[0]), str(items[1]), "", span)
+
+    def action(self, items: list[Token]) -> Action:
+        name, *actors, last = items
+        return Action(str(name), _names(actors), _over(_of(name), _of(last)))
+
+    def comparison(self, items: list[Any]) -> Comparison:
+        sign = cast('Literal["<", "<=", ">", ">="]', str(items[1]))
+        return Comparison(items[0], sign, items[2], _over(items[0].span, items[2].span))
+
+    def reference(self, items: list[Token]) -> Reference:
+        return Reference(_bare(items[0]), _of(items[0]))
+
+    def either(self, items: list[Condition]) -> Either:
+        return Either(tuple(items), _all(items))
+
+    def both(self, items: list[Condition]) -> Both:
+        return Both(tuple(items), _all(items))
+
+    def denied(self, items: list[Any]) -> Denied:
+        item = cast("Fact", items[1])
+        return Denied(item, _over(_of(items[0]), item.span))
+
+
+def _names(tokens: list[Token]) -> tuple[Name, ...]:
+    return tuple([Name(str(t), _of(t)) for t in tokens])
+
+
+def _unquoted(token: Token) -> str:
+    return str(token)[1:-1]
+
+
+def _bare(token: Token) -> str:
+    """The name between the angle brackets of a head or a reference."""
+    return str(token)[1 : str(token).index(">")].strip(" ")
+
+
+def _of(token: Token) -> Span:
+    """Where a token stands; of a head only the part in angle brackets."""
+    line, column = token.line or 0, token.column or 0
+    width = str(token).index(">") + 1 if token.type == "HEAD" else len(token)
+    return Span(line, column, line, column + width)
+
+
+def _over(first: Span, last: Span) -> Span:
+    """From the beginning of one place to the end of another."""
+    return Span(first.line, first.column, last.end_line, last.end_column)
+
+
+def _all(items: Several[_Placed]) -> Span:
+    return _over(items[0].span, items[-1].span)
+
+
+def moved(task: Task, file: str) -> Task:
+    """The same tree with every place said to be in an included file."""
+    return cast("Task", _moved(task, file))
+
+
+def _moved(node: object, file: str) -> object:
+    if isinstance(node, Span):
+        return replace(node, file=file)
+    if isinstance(node, tuple):
+        return tuple(_moved(n, file) for n in node)
+    fields = getattr(node, "__dataclass_fields__", None)
+    if fields is None:
+        return node
+    return replace(node, **{f: _moved(getattr(node, f), file) for f in fields})  # type: ignore[type-var]

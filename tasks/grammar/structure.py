@@ -1,0 +1,148 @@
+"""Which stages a task has and who acts in them, read off its tree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import wraps
+from typing import TypeVar
+
+from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
+from visup.tasks.grammar.nodes import Action, Actors, Course, Judged, Reference, Stage, Task, walk
+from visup.tasks.grammar.units import value
+
+T = TypeVar("T")
+MOST_TASKS = 64  # of so many tasks what was read off is remembered
+
+
+def once(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
+    """A function of a task that is worked out once for each, as long as it is the same object.
+
+    Supervision asks at each step; comparing whole trees would take as long as reading them.
+    """
+    known: dict[int, tuple[Task, T]] = {}
+
+    @wraps(read_off)
+    def remembered(task: Task) -> T:
+        found = known.get(id(task))
+        if found is None or found[0] is not task:
+            if len(known) >= MOST_TASKS:
+                known.clear()
+            found = known[id(task)] = (task, read_off(task))
+        return found[1]
+
+    return remembered
+
+
+def tasks_of(file: Task) -> tuple[Task, ...]:
+    """The tasks of a file, one by one, each with the invariants that can concern it."""
+    found = []
+    for name in file.roots:
+        root = file.stage(name)
+        reached = {s.name for s in _reached(file, root)} if root else set()
+        kept = (i for i in file.invariants if not i.during or {r.stage for r in i.during} & reached)
+        found.append(replace(file, root=name, invariants=tuple(kept)))
+    return tuple(found)
+
+
+@once
+def stage_names(task: Task) -> tuple[str, ...]:
+    """The stages that ask for actions themselves, in the order in which the task comes to them."""
+    root = task.stage(task.name)
+    reached = _reached(task, root) if root else []
+    names = dict.fromkeys(s.name for s in reached if _asks(task, s))
+    return tuple(names)
+
+
+def stages_inside(task: Task, name: str) -> frozenset[str]:
+    """The names of all stages that a stage comes to, itself with them."""
+    stage = task.stage(name)
+    return frozenset(s.name for s in _reached(task, stage)) if stage else frozenset()
+
+
+def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
+    """The actors of the actions that one stage asks for itself, in the order of the text."""
+    rule = task.stage(stage)
+    if rule is None or isinstance(rule.body, Actors):
+        return ()
+    return tuple(dict.fromkeys(a for n in walk(rule.body) for a in _names(task, n)))
+
+
+@once
+def task_actors(task: Task) -> tuple[str, ...]:
+    """All actors of a task, in the order in which its stages ask for them."""
+    staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
+    watched = [a for i in task.invariants for f in facts_of(i.condition) for a in keyed(task, f)[1]]
+    return tuple(dict.fromkeys((*staged, *watched)))
+
+
+def undrawn(task: Task) -> tuple[str, ...]:
+    """The zones that a task names without corners: someone else must have drawn them."""
+    return tuple(z.name for z in task.zones if not z.corners)
+
+
+def sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) -> dict[str, float]:
+    """The real sizes that some tasks declare, by model.
+
+    Args:
+        tasks: Tasks without mistakes; where two disagree the first goes before.
+        bound: Actor -> models, as the user bound them; it goes before the declarations.
+
+    Returns:
+        Model name -> largest extent, metres.
+    """
+    found: dict[str, float] = {}
+    for task in tasks:
+        for actor in task.actors:
+            if actor.size is not None:
+                for model in bound.get(actor.name, task.models(actor.name)):
+                    found.setdefault(model, value(task.amount(actor.size)))
+    return found
+
+
+def keyed(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
+    """The key of a fact of a task, and the actors of whom it speaks.
+
+    A plain action is its own key; in that of a comparison stand its sign and amount, in that of an
+    action on a zone the zone.
+    """
+    action, zones = action_of(fact), {z.name for z in task.zones}
+    actors = tuple(str(a) for a in action.actors if str(a) not in zones)
+    key = " ".join([action.name, *(str(a) for a in action.actors if str(a) in zones)])
+    if isinstance(fact, Comparison):
+        key = f"{key} {fact.sign} {task.amount(fact.amount)}"
+    return key, actors
+
+
+def _names(task: Task, node: Course) -> tuple[str, ...]:
+    match node:
+        case Action() | Comparison():
+            return keyed(task, node)[1]
+        case Judged(signs=signs):
+            facts = (f for s in signs for f in facts_of(s.condition))
+            return tuple(a for f in facts for a in keyed(task, f)[1])
+        case Reference(stage=name):
+            rule = task.stage(name)
+            if rule is not None and isinstance(rule.body, Actors):
+                return keyed(task, Action(rule.name, rule.body.names))[1]
+    return ()
+
+
+def _asks(task: Task, stage: Stage) -> bool:
+    return not isinstance(stage.body, Actors) and any(_names(task, n) for n in walk(stage.body))
+
+
+def _reached(task: Task, stage: Stage) -> list[Stage]:
+    """A stage and all that it refers to, depth first, each once."""
+    known = {s.name: s for s in reversed(task.stages)}
+    found: dict[str, Stage] = {}
+    todo = [stage]
+    while todo:
+        stage = todo.pop()
+        if stage.name in found:
+            continue
+        found[stage.name] = stage
+        if not isinstance(stage.body, Actors):
+            named = [n.stage for n in walk(stage.body) if isinstance(n, Reference)]
+            todo += [known[n] for n in reversed(named) if n in known]
+    return list(found.values())

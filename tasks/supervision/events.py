@@ -1,0 +1,203 @@
+"""What supervision tells: events where a belief about a task changes, concerns while it is bad."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from visup.agent import (
+    Concern,
+    Event,
+    Mind,
+    Severity,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Verdict,
+)
+from visup.agent.model.fast_replace import replace
+from visup.rules.wording.sentences import describe
+from visup.tasks.automaton.backpointers import Revision
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.structure import stages_inside
+from visup.tasks.supervision.inference import Activity
+from visup.tasks.supervision.sentences import stage_sentence, verdict_sentence
+from visup.tasks.verification.verify import BAD
+
+KINDS = {
+    Status.PROGRESSING: "stage_progressing",
+    Status.STALLED: "stage_stalled",
+    Status.FAILING: "stage_failing",
+    Status.FAILED: "stage_failed",
+    Status.DONE: "stage_done",
+    Status.UNKNOWN: "stage_unknown",
+}
+
+
+def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) -> Iterator[Event]:
+    """Events of what changed between two beliefs about a task.
+
+    Args:
+        before: The belief of the last step.
+        now: The belief of this step.
+        mind: The mind, for the time; it may still hold the old belief.
+        task: The task, for the texts of its stages.
+
+    Yields:
+        Events of stages in the order of the task, then a change of the verdict.
+    """
+    was = {s.stage: s.status for s in before.stages}
+    changed = [s for s in now.stages if was.get(s.stage, Status.PENDING) is not s.status]
+    if not changed and now.verdict is before.verdict:
+        return
+    mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
+    first = all(s.status is Status.PENDING for s in before.stages)
+    for stage in changed:
+        for kind in _kinds(was.get(stage.stage, Status.PENDING), stage.status):
+            event = _stage_event(kind, stage, now, mind)
+            if first and kind == "stage_started" and event.objects:
+                event = replace(event, text=_introduction(stage, now, mind))
+            if kind == "stage_started":
+                event = replace(event, text=event.text + _own_words(stage.stage, before, task))
+            yield event
+    if now.verdict is not before.verdict and _worth_telling(before.verdict, now.verdict):
+        yield _verdict_event(now, mind)
+
+
+def activity_events(
+    before: Activity, now: Activity, belief: TaskBelief, mind: Mind
+) -> Iterator[Event]:
+    """Events of a task that is inferred to be going on, or not to be after all."""
+    if before.audible == now.audible:
+        return
+    kind = "task_active" if now.audible else "task_inactive"
+    said = "appears to be going on" if now.audible else "is not what is going on, as it now appears"
+    chance = f"{now.chance:.0%}".replace("%", " %")
+    yield Event(
+        kind,
+        mind.time,
+        mind.frame_index,
+        f"Task `{belief.task}` {said} ({chance}).",
+        _objects(belief),
+        now.chance if now.audible else 1.0 - now.chance,
+        data={"task": belief.task},
+    )
+
+
+def played(belief: TaskBelief, actors: Sequence[str]) -> tuple[int, ...]:
+    """Ids of the objects that play some actors; those not found are left out."""
+    who = {b.actor: b.object_id for b in belief.bindings}
+    ids = (who.get(a) for a in actors)
+    return tuple(i for i in ids if i is not None)
+
+
+def revision_events(
+    before: TaskBelief, now: TaskBelief, revisions: Sequence[Revision], mind: Mind
+) -> Iterator[Event]:
+    """Events of stages that were told done, and are believed not to have happened after all."""
+    done, still = _done(before), _done(now)
+    earliest = {r.step.stage: r for r in revisions}  # they come with the last step first
+    for stage, revision in earliest.items():
+        if stage in done and stage not in still:
+            data = {"task": now.task, "stage": stage, "told": revision.told}
+            text = f"Stage {revision}."
+            yield Event(
+                "stage_revised",
+                mind.time,
+                mind.frame_index,
+                text,
+                _objects(now),
+                now.confidence,
+                data=data,
+            )
+
+
+def _done(belief: TaskBelief) -> set[str]:
+    return {s.stage for s in belief.stages if s.status is Status.DONE}
+
+
+def stage_concerns(belief: TaskBelief) -> Iterator[Concern]:
+    """A concern for each stage that is failing or has failed.
+
+    A task that was interrupted is not expected to go on, so its stages are no concern any more.
+    """
+    if belief.verdict is Verdict.INTERRUPTED:
+        return
+    for stage in belief.stages:
+        if stage.status in BAD:
+            cause = stage_sentence("stage_failing", stage.stage, belief.task, stage.evidence)
+            yield Concern(
+                "stage_failing",
+                _objects(belief),
+                Severity.WARNING,
+                cause,
+                (f"{_capital(stage.evidence)}.",),
+                key=f"{belief.task}/{stage.stage}",
+            )
+
+
+def _kinds(was: Status, now: Status) -> Iterator[str]:
+    if was is now:
+        return
+    begins = was in (Status.PENDING, Status.DONE) and now not in (Status.PENDING, Status.UNKNOWN)
+    if begins and (was is Status.PENDING or now is not Status.DONE):
+        yield "stage_started"
+    if now in KINDS and not (was is Status.UNKNOWN and now is Status.PENDING):
+        yield KINDS[now]
+
+
+def _worth_telling(was: Verdict, now: Verdict) -> bool:
+    """A task that begins to be seen is told by its stages; every other change by itself."""
+    return not (was is Verdict.UNKNOWN and now is Verdict.IN_PROGRESS)
+
+
+def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) -> Event:
+    bad = kind in ("stage_failing", "stage_failed") and belief.verdict is not Verdict.INTERRUPTED
+    return Event(
+        kind,
+        mind.time,
+        mind.frame_index,
+        stage_sentence(kind, stage.stage, belief.task, stage.evidence),
+        _objects(belief),
+        stage.confidence,
+        Severity.WARNING if bad else Severity.INFO,
+        {"task": belief.task, "stage": stage.stage, "status": str(stage.status)},
+    )
+
+
+def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
+    """The sentence with which a task begins: it says who is believed to take part."""
+    who = ", and ".join(describe(mind, i, n) for n, i in enumerate(_objects(belief)))
+    return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
+
+
+def _own_words(name: str, before: TaskBelief, task: Task) -> str:
+    """What the task file itself says of a stage that begins, and of those that begin with it."""
+    begun = {s.stage for s in before.stages if s.status is not Status.PENDING}
+    groups = [s for s in task.stages if s.text and s.name != name]
+    inside = ((g, stages_inside(task, g.name)) for g in groups)
+    texts = [g.text for g, names in inside if name in names and not names & begun]
+    own = task.stage(name)
+    texts += [own.text] if own and own.text else []
+    return "".join(f" {_capital(t).rstrip('.')}." for t in texts)
+
+
+def _verdict_event(belief: TaskBelief, mind: Mind) -> Event:
+    good = belief.verdict in (Verdict.SUCCEEDED, Verdict.IN_PROGRESS)
+    return Event(
+        "verdict",
+        mind.time,
+        mind.frame_index,
+        verdict_sentence(belief.task, belief.verdict, belief.evidence),
+        _objects(belief),
+        belief.confidence,
+        Severity.INFO if good else Severity.WARNING,
+        {"task": belief.task, "verdict": str(belief.verdict)},
+    )
+
+
+def _objects(belief: TaskBelief) -> tuple[int, ...]:
+    return tuple(b.object_id for b in belief.bindings if b.object_id is not None)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,161 @@
+"""Who plays which actor: weighted matching of actors and believed objects (paper, section 6).
+
+Several identities are believed of each object, each with a strength. The weight of a pair is how
+strongly the object is believed to be one of the models that the actor stands for; the matching
+with the greatest total weight is taken, each object playing one actor at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from visup.agent import Binding, Mind, ObjectBelief, Presence
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.structure import stage_actors, stage_names, task_actors
+from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
+
+CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two actors want one object
+
+
+def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
+    """Model names that an actor stands for: the user's word, else the task's, else its own name."""
+    return tuple(mind.actors.get(actor, ())) or task.models(actor)
+
+
+def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
+    """How strongly an object is believed to be one of some models, 0 to 1."""
+    total = 0.0
+    for candidate in belief.candidates:  # plain loops: this is asked many times in each step
+        if candidate.name in models:
+            total += candidate.share
+    return min(1.0, total)
+
+
+def match(
+    task: Task,
+    mind: Mind,
+    before: Sequence[Binding] = (),
+    current: Sequence[str] = (),
+    settings: TaskSettings = DEFAULT_SETTINGS,
+) -> tuple[Binding, ...]:
+    """Match the actors of a task to objects.
+
+    Args:
+        task: The task.
+        mind: What is believed; confirmed objects can play an actor, seen or hidden. One that has
+            left keeps its part until another object takes it.
+        before: The bindings of the last step; they are kept unless another is clearly better.
+        current: Names of actors of the stage under way.
+        settings: Thresholds.
+
+    Returns:
+        One binding for each actor, in the order in which the task names them.
+    """
+    actors = task_actors(task)
+    models = [models_of(task, a, mind) for a in actors]
+    held = {b.actor: b.object_id for b in before if b.object_id is not None}
+    objects = [b for _, b in sorted(mind.objects.items()) if _eligible(b, held)]
+    if not actors or not objects:
+        return tuple(Binding(a, m) for a, m in zip(actors, models, strict=True))
+    pure = [[strength(o, m) for o in objects] for m in models]
+    weight = [
+        _weights(row, objects, held.get(actor), actor in current, settings)
+        for row, actor in zip(pure, actors, strict=True)
+    ]
+    chosen = best_matching(weight)
+    return tuple(
+        Binding(a, m, objects[chosen[i]].id, pure[i][chosen[i]]) if i in chosen else Binding(a, m)
+        for i, (a, m) in enumerate(zip(actors, models, strict=True))
+    )
+
+
+def best_matching(weight: Sequence[Sequence[float]]) -> dict[int, int]:
+    """Row -> column of the matching with the greatest total weight; what weighs nothing is left out."""
+    wanted = [[j for j, w in enumerate(row) if w > 0.0] for row in weight]
+    columns = [j for row in wanted for j in row]
+    if len(set(columns)) == len(columns) and all(len(row) <= 1 for row in wanted):
+        # Nobody has a choice and no two want the same, as nearly always.
+        return {i: row[0] for i, row in enumerate(wanted) if row}
+    rows, chosen = linear_sum_assignment(np.array(weight), maximize=True)
+    found = zip(rows.tolist(), chosen.tolist(), strict=True)
+    return {i: j for i, j in found if weight[i][j] > 0.0}
+
+
+def _weights(
+    strengths: Sequence[float],
+    objects: Sequence[ObjectBelief],
+    held: int | None,
+    current: bool,
+    settings: TaskSettings,
+) -> list[float]:
+    """The weight of each object for one actor; 0 where it is too weak to be bound."""
+    bonus = CURRENT_BONUS if current else 1.0
+    weight = [s * bonus for s in strengths]
+    for j, belief in enumerate(objects):
+        if held == belief.id:
+            weight[j] = _held_weight(weight[j], belief, settings)
+    return [w if w >= settings.bind_at else 0.0 for w in weight]
+
+
+def _eligible(belief: ObjectBelief, held: Mapping[str, int]) -> bool:
+    if belief.presence is Presence.LEFT:
+        return belief.id in held.values()
+    return belief.confirmed
+
+
+def _held_weight(weight: float, belief: ObjectBelief, settings: TaskSettings) -> float:
+    if belief.presence is Presence.LEFT:
+        return settings.bind_at
+    return weight + settings.keep_bonus
+
+
+def unexplained(
+    mind: Mind,
+    bindings: Sequence[Binding],
+    settings: TaskSettings = DEFAULT_SETTINGS,
+    optional: Collection[str] = (),
+) -> tuple[int, ...]:
+    """Objects in view that no actor explains, by id; nobody waits for `optional` actors.
+
+    With every actor bound that is any further object. With an actor still unbound, an object that
+    is not identified yet may be it, and so may one that could be any of the actors, or whose identity
+    rests on a few seconds only; only one that is clearly something else is unexplained.
+    """
+    bound = {b.object_id for b in bindings if b.object_id is not None}
+    others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
+    if all(b.object_id is not None for b in bindings if b.actor not in optional):
+        return tuple(o.id for o in others)
+    known = {m for b in bindings for m in b.models}
+    return tuple(
+        o.id
+        for o in others
+        if o.strength >= settings.familiar
+        and o.name not in known
+        and mind.time - o.first_seen >= settings.acquainted_s
+    )
+
+
+def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:
+    """How well some actors are matched, 0 to 1: the mean strength, 0 for an unbound one."""
+    by_actor = {b.actor: b.strength for b in bindings if b.object_id is not None}
+    return sum(by_actor.get(a, 0.0) for a in actors) / len(actors) if actors else 0.0
+
+
+def rank_stages(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[str, float], ...]:
+    """The stages of a task that may be under way, best matched first; ties as in the task."""
+    ranked = [(s, match_strength(stage_actors(task, s), bindings)) for s in stage_names(task)]
+    return tuple(sorted(ranked, key=lambda pair: -pair[1]))
+
+
+def rank_tasks(
+    tasks: Sequence[Task], mind: Mind, settings: TaskSettings = DEFAULT_SETTINGS
+) -> tuple[tuple[str, float], ...]:
+    """The tasks that may be under way, by their best matched stage; ties as given."""
+    ranked = []
+    for task in tasks:
+        stages = rank_stages(task, match(task, mind, settings=settings))
+        ranked.append((task.name, stages[0][1] if stages else 0.0))
+    return tuple(sorted(ranked, key=lambda pair: -pair[1]))

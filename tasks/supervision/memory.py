@@ -1,0 +1,45 @@
+"""What supervision remembers of a task from step to step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from visup.agent import TaskBelief
+from visup.tasks.supervision.hypotheses import Reading
+from visup.tasks.supervision.inference import ALONE, Activity
+
+
+@dataclass(frozen=True)
+class TaskMemory:
+    """What is remembered of one task from step to step.
+
+    Attributes:
+        time: Seconds of the step in which it was last followed.
+        readings: The courses followed; empty until its first actors are found.
+        belief: What was last believed.
+        interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
+            unexpected object that turns out to be one of the actors.
+        strangers: The objects that interrupted the task by being unexpected.
+        strange_since: Since when objects have been unexplained, by id.
+        broken_since: Since when each invariant has been broken, or None.
+        rival: A matching that would change who plays whom, by actor; empty when there is none.
+        rival_since: Since when it has been the better one.
+        lasting: Since when what is no plain relation of the mind has been true, by key.
+        activity: Whether it is going on, where several tasks are given.
+        gain: The evidence that it is, of each second, as it was seen last.
+        inferred: Seconds of the step in which it was last inferred whether it is.
+    """
+
+    time: float
+    readings: tuple[Reading, ...]
+    belief: TaskBelief
+    interrupted: str = ""
+    strangers: tuple[int, ...] = ()
+    strange_since: tuple[tuple[int, float], ...] = ()
+    broken_since: tuple[float | None, ...] = ()
+    rival: tuple[int | None, ...] = ()
+    rival_since: float = 0.0
+    lasting: tuple[tuple[str, float], ...] = ()
+    activity: Activity = ALONE
+    gain: float = 0.0
+    inferred: float = 0.0

@@ -1,0 +1,127 @@
+"""What supervision says: evidence of a stage, sentences of its events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from visup.agent import Status, TaskBelief, Verdict
+from visup.tasks.actions.actions import Meaning
+from visup.tasks.automaton.derivatives import Step
+from visup.tasks.verification.verify import Watch
+
+
+def names(words: Sequence[str]) -> str:
+    """Names as they are said: `the arm and the satellite`."""
+    the = [f"the {w.replace('_', ' ')}" for w in words]
+    return the[0] if len(the) == 1 else f"{', '.join(the[:-1])} and {the[-1]}"
+
+
+def evidence(step: Step, meaning: Meaning, watch: Watch, now: float, actions: Words) -> str:
+    """Why a step stands as it does: one clause, without capital and full stop.
+
+    Args:
+        step: The step.
+        meaning: Its action.
+        watch: What is kept about it.
+        now: Seconds.
+        actions: All actions, for their words.
+    """
+    who, have = names(step.actors), "has" if len(step.actors) == 1 else "have"
+    match watch.status:
+        case Status.FAILED if watch.late:
+            due = next(d for d in step.deadlines if now > d.at)
+            return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
+        case Status.FAILING | Status.FAILED if watch.contrary is not None:
+            what = _say(watch.contrary, actions)
+            return (
+                f"{who} {have} been {what} since {watch.contrary_since:.1f} s; "
+                f"`{step.stage}` asks for {step.action}"
+            )
+        case Status.FAILING | Status.FAILED if watch.fault is not None:
+            was, what = ("was" if have == "has" else "were"), _say(watch.fault, actions)
+            return (
+                f"{who} {was} {what} at {watch.fault_since:.1f} s and {have} not recovered; "
+                f"`{step.stage}` asks for {step.action}"
+            )
+        case Status.PROGRESSING if watch.helped_since is not None:
+            what = _say(watch.helped_by or "", actions)
+            return f"{who} {have} been {what} since {max(0.0, watch.helped_since):.1f} s"
+        case Status.STALLED if watch.helped_at is not None:
+            return f"{who} {have} not been {meaning.text} since {watch.helped_at:.1f} s"
+        case Status.UNKNOWN if watch.unseen_since is not None:
+            return f"{who} could not be observed since {watch.unseen_since:.1f} s"
+    return f"{who} should be {meaning.text}"
+
+
+def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Status, str]:
+    """How a step that has been left ended, and why.
+
+    Returns:
+        DONE; FAILED when it was left before its `for` was kept, after its time was over, or though
+        it was seen not to hold; UNKNOWN when it could not be seen, or may have been before.
+    """
+    who, was = names(step.actors), "was" if len(step.actors) == 1 else "were"
+    if watch.late:
+        due = next(d for d in step.deadlines if now > d.at)
+        return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
+    if step.hold_s is not None and not watch.fulfilled:
+        return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
+    end = step.sign("ends")
+    if end is not None and not watch.fulfilled:
+        if watch.denied:
+            return Status.FAILED, f"`{step.stage}` ends when {end.condition}, which was not so"
+        return Status.UNKNOWN, f"whether {end.condition} could not be seen"
+    if meaning.lasts and watch.begun is None:
+        return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
+    if meaning.lasts or watch.held:
+        return Status.DONE, f"{who} {was} {meaning.text} until {now:.1f} s"
+    if watch.broken_since is not None:
+        return Status.FAILED, f"{who} should be {meaning.text}, and {was} not"
+    return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"
+
+
+def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
+    """The sentence of an event of a stage."""
+    return f"{STAGE_WORDS[kind].format(stage=stage, task=task)}: {why}."
+
+
+def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
+    """The sentence of a verdict."""
+    return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
+
+
+Words = Mapping[str, Meaning]
+
+STAGE_WORDS = {
+    "stage_started": "Stage `{stage}` of task `{task}` has begun",
+    "stage_progressing": "Stage `{stage}` is progressing satisfactorily",
+    "stage_stalled": "Stage `{stage}` makes no progress",
+    "stage_failing": "Stage `{stage}` is failing",
+    "stage_failed": "Stage `{stage}` has failed",
+    "stage_done": "Stage `{stage}` is complete",
+    "stage_unknown": "Stage `{stage}` cannot be judged",
+}
+
+VERDICT_WORDS = {
+    Verdict.IN_PROGRESS: "is in progress again",
+    Verdict.SUCCEEDED: "has succeeded",
+    Verdict.FAILED: "has failed",
+    Verdict.INTERRUPTED: "is interrupted",
+    Verdict.UNKNOWN: "cannot be judged",
+}
+
+
+def _say(relation: str, actions: Words) -> str:
+    meaning = actions.get(relation)
+    return meaning.text if meaning else relation.replace("_", " ")
+
+
+def prospects_text(belief: TaskBelief) -> str:
+    """What may come next and how likely the task still ends well, in one line."""
+    said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
+    end = 1.0 - sum(p.probability for p in belief.prospects)
+    said += [f"the end ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
+    coming = f"next: {', '.join(said)}" if said else "next: not known"
+    if belief.success is None:
+        return coming
+    return f"{coming}; ends well with a probability of {belief.success:.0%}"

@@ -1,0 +1,200 @@
+"""The flow of a task as a picture, in the languages of Mermaid and Graphviz."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    AnyOrder,
+    Choice,
+    Comparison,
+    Counted,
+    Course,
+    Judged,
+    Reference,
+    Repeated,
+    Sequence,
+    Stage,
+    Task,
+    Timed,
+    Together,
+)
+
+BEGIN, END = "start", "finish"  # `end` is a word of Mermaid
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A box of the picture: its lines, and the stage that it belongs to (empty for none)."""
+
+    lines: tuple[str, ...]
+    stage: str = ""
+
+
+@dataclass
+class Flow:
+    """What follows what.
+
+    Attributes:
+        nodes: Boxes by number, in the order of the text.
+        edges: (from, to) -> what is written at the arrow.
+    """
+
+    nodes: dict[str, Node] = field(default_factory=dict)
+    edges: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def add(self, node: Node) -> str:
+        """Its number."""
+        number = f"n{len(self.nodes)}"
+        self.nodes[number] = node
+        return number
+
+    def link(self, before: Iterable[str], after: Iterable[str], label: str = "") -> None:
+        """Arrows from each of some boxes to each of others."""
+        others = tuple(after)
+        for a in before:
+            for b in others:
+                self.edges.setdefault((a, b), label)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A part of the picture: where it begins, where it ends, whether it may be left out."""
+
+    first: tuple[str, ...]
+    last: tuple[str, ...]
+    empty: bool = False
+
+
+def flow_of(task: Task) -> Flow:
+    """The flow of a task; a stage is drawn where it first comes, later only named."""
+    flow = Flow()
+    root = task.stage(task.name)
+    if root is not None:
+        whole = _Drawer(task, flow).stage(root)
+        flow.link([BEGIN], whole.first)
+        flow.link(whole.last, [END])
+        if whole.empty:
+            flow.link([BEGIN], [END])
+    return flow
+
+
+def mermaid(flow: Flow) -> str:
+    """A flow in the language of Mermaid (flowchart)."""
+    lines = ["flowchart TD", f"    {BEGIN}(( ))", f"    {END}((( )))"]
+    lines += [f'    {k}["{_mermaid_text(n.lines)}"]' for k, n in flow.nodes.items()]
+    for (a, b), label in flow.edges.items():
+        said = f"|{_mermaid_text((label,))}|" if label else ""
+        lines.append(f"    {a} -->{said} {b}")
+    return "\n".join(lines)
+
+
+def dot(flow: Flow) -> str:
+    """A flow in the language of Graphviz."""
+    lines = ["digraph task {", "    node [shape=box, style=rounded];"]
+    lines += [f"    {BEGIN} [shape=point];", f'    {END} [shape=doublecircle, label=""];']
+    lines += [f'    {k} [label="{_dot_text(n.lines)}"];' for k, n in flow.nodes.items()]
+    for (a, b), label in flow.edges.items():
+        said = f' [label="{_dot_text((label,))}"]' if label else ""
+        lines.append(f"    {a} -> {b}{said};")
+    return "\n".join([*lines, "}"])
+
+
+def _mermaid_text(lines: tuple[str, ...]) -> str:
+    text = "<br>".join(
+        x.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;") for x in lines
+    )
+    return text.replace('"', "&quot;").replace("|", "&#124;")
+
+
+def _dot_text(lines: tuple[str, ...]) -> str:
+    return "\\n".join(x.replace("\\", "\\\\").replace('"', '\\"') for x in lines)
+
+
+@dataclass
+class _Drawer:
+    task: Task
+    flow: Flow
+    drawn: set[str] = field(default_factory=set)
+
+    def stage(self, stage: Stage) -> _Part:
+        self.drawn.add(stage.name)
+        if isinstance(stage.body, Actors):
+            return self.box(str(Action(stage.name, stage.body.names)), stage=stage.name)
+        return self.course(stage.body, stage.name, ())
+
+    def box(self, *lines: str, stage: str = "") -> _Part:
+        number = self.flow.add(Node(lines, stage))
+        return _Part((number,), (number,))
+
+    def course(self, course: Course, stage: str, said: tuple[str, ...]) -> _Part:
+        """A part of the picture; `said` are the clauses around it, written into its boxes."""
+        match course:
+            case Action() | Comparison():
+                return self.box(f"<{stage}>", str(course), *said, stage=stage)
+            case Reference(stage=name):
+                return self.reference(name, stage, said)
+            case Timed(item=item, clauses=clauses):
+                return self.course(item, stage, (*map(str, clauses), *said))
+            case Judged(item=item, signs=signs):
+                return self.course(item, stage, (*map(str, signs), *said))
+            case Choice(options=options):
+                parts = [self.course(o, stage, said) for o in options]
+                return _Part(
+                    tuple(x for p in parts for x in p.first),
+                    tuple(x for p in parts for x in p.last),
+                    any(p.empty for p in parts),
+                )
+            case Sequence(items=items):
+                return self.sequence([self.course(i, stage, said) for i in items])
+            case Together(parts=items):
+                return self.fork("at the same time", items, stage, said)
+            case AnyOrder(items=items):
+                return self.fork("each, in any order", items, stage, said)
+            case Repeated(item=item, mark=mark):
+                part = self.course(item, stage, said)
+                if mark != "?":
+                    self.flow.link(part.last, part.first, "again")
+                return _Part(part.first, part.last, part.empty or mark != "+")
+            case Counted(item=item, least=least, times=times):
+                part = self.course(item, stage, said)
+                self.flow.link(part.last, part.first, times)
+                return _Part(part.first, part.last, part.empty or least == 0)
+
+    def reference(self, name: str, stage: str, said: tuple[str, ...]) -> _Part:
+        target = self.task.stage(name)
+        if target is None:
+            return self.box(f"<{name}>", *said, stage=name)
+        if isinstance(target.body, Actors):
+            action = Action(name, target.body.names)
+            return self.course(action, stage, said)
+        if name in self.drawn:
+            return self.box(f"<{name}>", "as above", *said, stage=name)
+        self.drawn.add(name)
+        return self.course(target.body, name, said)
+
+    def sequence(self, parts: list[_Part]) -> _Part:
+        first: list[str] = []
+        last: list[str] = []
+        empty = True
+        for part in parts:
+            self.flow.link(last, part.first)
+            if empty:
+                first += part.first
+            last = [*part.last, *(last if part.empty else ())]
+            empty = empty and part.empty
+        return _Part(tuple(first), tuple(last), empty)
+
+    def fork(
+        self, title: str, items: tuple[Course, ...], stage: str, said: tuple[str, ...]
+    ) -> _Part:
+        opening = self.box(title)
+        parts = [self.course(i, stage, said) for i in items]
+        closing = self.box("all of them")
+        for part in parts:
+            self.flow.link(opening.last, part.first)
+            self.flow.link(part.last, closing.first)
+        return _Part(opening.first, closing.last, all(p.empty for p in parts))

@@ -1,0 +1,171 @@
+"""What editors ask of a task file: what a name means, where it is defined, where it is used.
+
+Nothing here knows of the Language Server Protocol; places are lines and columns counted from 1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from visup.tasks.actions.actions import known_actions
+from visup.tasks.actions.describe import described, written
+from visup.tasks.checks.examine import examine
+from visup.tasks.checks.files import shipped_tasks
+from visup.tasks.diagnostics.diagnostic import Source
+from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.grammar.nodes import Span, Task
+from visup.tasks.grammar.statement import NAME
+from visup.tasks.grammar.units import UNITS
+
+STATEMENTS = ("actor", "optional actor", "zone", "parameter", "include", "never", "always", "task")
+WORDS = {
+    "for": "must hold so long without a break: `for 5 s`",
+    "within": "must be over so long after it began: `within 60 s`",
+    "at least": "how often at least: `at least 2 times`",
+    "at most": "how often at most: `at most 5 times`",
+    "any order": "each once, one after the other: `any order (<a>, <b>)`",
+    "begins when": "by what it begins: `begins when touching(arm, satellite)`",
+    "ends when": "by what it ends",
+    "progresses when": "what counts as progress",
+    "fails when": "what counts as failure, in place of the contrary of the action",
+    "during": "for which stages an invariant is meant: `during <approach>`",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A name in a file.
+
+    Attributes:
+        name: The name without brackets.
+        kind: 'stage', 'action', 'name' (an actor, zone or parameter) or 'include'.
+        span: Where it stands, without brackets.
+    """
+
+    name: str
+    kind: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A word that may be put in, with what it means."""
+
+    text: str
+    kind: str
+    about: str
+
+
+PATTERN = re.compile(
+    rf'include\s*"(?P<include>[^"\n]*)"|"[^"\n]*"|<[ ]*(?P<stage>{NAME})[ ]*>'
+    rf"|(?<!\w)(?P<action>{NAME})(?=\s*\()|(?<!\w)(?P<name>{NAME})"
+)
+
+
+def words(text: str) -> Iterator[Word]:
+    """Every name of a file, also of one with mistakes; comments and texts are passed over."""
+    code, _ = clean(text, Source(text, ""))
+    for number, line in enumerate(code.split("\n"), 1):
+        for match in PATTERN.finditer(line):
+            kind = match.lastgroup
+            if kind is not None:
+                start, end = match.span(kind)
+                yield Word(match[kind], kind, Span(number, start + 1, number, end + 1))
+
+
+def word_at(text: str, line: int, column: int) -> Word | None:
+    """The name at a place, also just behind it, or None."""
+    for word in words(text):
+        if word.span.line == line and word.span.column <= column <= word.span.end_column:
+            return word
+    return None
+
+
+def meaning(text: str, file: str, word: Word) -> str | None:
+    """What a name means, in Markdown, or None."""
+    task, _ = examine(text, file)
+    action = known_actions().get(word.name)
+    if word.kind == "stage":
+        stage = task.stage(word.name)
+        return f"```\n{stage}\n```" if stage else None
+    if word.kind == "action" and action is not None:
+        return described(action)
+    for declared in task.declared:
+        if declared.name == word.name:
+            return f"`{declared}`"
+    if word.kind == "name" and any(w.name == word.name for w in _actors(text)):
+        return f"actor `{word.name}`: stands for the model of its own name"
+    return None
+
+
+def definition(text: str, file: str, word: Word) -> Span | None:
+    """Where a stage, actor, zone or parameter is defined, or None; `span.file` tells the file."""
+    task, _ = examine(text, file)
+    if word.kind == "include":
+        return None
+    if word.kind == "stage":
+        return next((s.span for s in task.stages if s.name == word.name), None)
+    return next((d.span for d in task.declared if d.name == word.name), None)
+
+
+def same_names(text: str, word: Word) -> list[Word]:
+    """All places of this file that mean the same stage, or the same actor, zone or parameter.
+
+    A stage in the strict form is an action too; both change together, so neither can be renamed.
+    """
+    if word.kind not in ("stage", "name"):
+        return []
+    if word.kind == "stage" and word.name in known_actions():
+        task, _ = examine(text)
+        stage = task.stage(word.name)
+        if stage is not None and not hasattr(stage.body, "span"):
+            return []
+    return [w for w in words(text) if (w.kind, w.name) == (word.kind, word.name)]
+
+
+def proposals(text: str, file: str, line: int, column: int) -> list[Proposal]:
+    """What may stand at a place, by what stands before it in its line."""
+    rows = text.split("\n")
+    before = rows[line - 1][: column - 1] if 0 < line <= len(rows) else ""
+    task, _ = examine(text, file)
+    if re.search(r"#", before):
+        return []
+    if re.search(r'\binclude\s+"[^"]*$', before):
+        return [Proposal(n, "file", "a task that ships with visup") for n in shipped_tasks()]
+    if re.search(rf"<[ ]*(?:{NAME})?$", before):
+        return [Proposal(s.name, "stage", str(s)) for s in task.stages]
+    if re.search(rf"\d\s*(?:{NAME})?$", before) and not re.search(rf"{NAME}$", before):
+        return [Proposal(u, "unit", d.replace("_", " ")) for u, (d, _) in UNITS.items()]
+    if re.search(r"\([^()]*$", before):
+        return _named(text, task)
+    known = [
+        Proposal(m.name, "action", f"{written(m)}: {m.about}") for m in known_actions().values()
+    ]
+    said = [Proposal(w, "keyword", about) for w, about in WORDS.items()]
+    stages = [Proposal(f"<{s.name}>", "stage", str(s)) for s in task.stages]
+    starts = [Proposal(w, "keyword", "begins a statement") for w in STATEMENTS]
+    if re.fullmatch(rf"\s*(?:{NAME})?", before):
+        return [*starts, *known, *stages]
+    return [*known, *stages, *said, *_named(text, task, ("zones", "parameters"))]
+
+
+def _named(
+    text: str, task: Task, kinds: tuple[str, ...] = ("actors", "zones", "parameters")
+) -> list[Proposal]:
+    declared = {d.name: str(d) for k in kinds for d in getattr(task, k)}
+    if "actors" in kinds:
+        for word in _actors(text):
+            declared.setdefault(word.name, "an actor")
+    return [Proposal(n, "actor", about) for n, about in sorted(declared.items())]
+
+
+def _actors(text: str) -> list[Word]:
+    """Names that stand in brackets, where actors stand."""
+    code, _ = clean(text, Source(text, ""))
+    rows = code.split("\n")
+    inside = (w for w in words(text) if w.kind == "name")
+    return [
+        w for w in inside if re.search(r"\([^()]*$", rows[w.span.line - 1][: w.span.column - 1])
+    ]

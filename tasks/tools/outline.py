@@ -1,0 +1,110 @@
+"""The tree of a task as plain branches, for whoever draws it: the terminal, the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    AnyOrder,
+    Choice,
+    Comparison,
+    Counted,
+    Course,
+    Judged,
+    Reference,
+    Repeated,
+    Sequence,
+    Task,
+    Timed,
+    Together,
+)
+
+Kind = Literal["task", "stage", "action", "actor", "clause", "way", "words"]
+"""What a branch is: `clause` is a condition on what it holds, `way` how its parts follow."""
+
+REPEATS = {"?": "perhaps", "*": "any number of times", "+": "at least once"}
+TITLES = {Choice: "one of", Together: "at the same time", AnyOrder: "each, in any order"}
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A node of the tree of a task.
+
+    Attributes:
+        text: What is written at it.
+        kind: What it is.
+        stage: The stage that it is, or that asks for it; empty for the task itself.
+        inside: What grows from it.
+        again: Whether it only names a stage that is drawn above.
+    """
+
+    text: str
+    kind: Kind
+    stage: str = ""
+    inside: tuple[Branch, ...] = ()
+    again: bool = False
+
+
+def outline(task: Task) -> Branch:
+    """The tree of a task: its stages with what they ask for.
+
+    Args:
+        task: A task without mistakes.
+
+    Returns:
+        The task's own branch; each stage is opened where it is first referred to.
+    """
+    return Branch(task.name, "task", "", tuple(_stage(task, task.name, set())))
+
+
+def _stage(task: Task, name: str, drawn: set[str]) -> Iterator[Branch]:
+    """What a stage asks for; nothing when it is drawn already."""
+    stage = task.stage(name)
+    if stage is None or name in drawn:
+        return
+    drawn.add(name)
+    if stage.text:
+        yield Branch(stage.text, "words", name)
+    if isinstance(stage.body, Actors):
+        for actor in stage.body.names:
+            yield Branch(str(actor), "actor", name)
+    else:
+        yield from _course(task, stage.body, name, drawn)
+
+
+def _course(task: Task, course: Course, stage: str, drawn: set[str]) -> Iterator[Branch]:
+    """The branches of a course in the order of the text."""
+
+    def under(text: str, kind: Kind, *items: Course) -> Branch:
+        inside = tuple(b for i in items for b in _course(task, i, stage, drawn))
+        return Branch(text, kind, stage, inside)
+
+    match course:
+        case Action() | Comparison():
+            yield Branch(str(course), "action", stage)
+        case Reference(stage=name):
+            again = name in drawn
+            yield Branch(name, "stage", name, tuple(_stage(task, name, drawn)), again)
+        case Sequence(items=items):
+            for item in items:
+                yield from _course(task, item, stage, drawn)
+        case Choice(options=parts) | Together(parts=parts) | AnyOrder(items=parts):
+            inside: list[Branch] = []
+            for part in parts:
+                in_turn = isinstance(part, Sequence)
+                inside += (
+                    [under("in turn", "way", part)]
+                    if in_turn
+                    else _course(task, part, stage, drawn)
+                )
+            yield Branch(TITLES[type(course)], "way", stage, tuple(inside))
+        case Timed(item=item, clauses=said) | Judged(item=item, signs=said):
+            yield under(" ".join(map(str, said)), "clause", item)
+        case Repeated(item=item, mark=mark):
+            yield under(REPEATS[mark], "way", item)
+        case Counted(item=item):
+            yield under(course.times, "way", item)

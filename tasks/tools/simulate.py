@@ -1,0 +1,105 @@
+"""The legal courses of a task, walked, listed and drawn at random: `visup task simulate`.
+
+A course is told as moments: what is under way, from one change to the next.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from random import Random
+
+from visup.tasks.automaton.derivatives import State, Step, begin, enter, form, leaves, moves
+from visup.tasks.grammar.nodes import Task
+
+LONGEST = 200  # moments after which a course drawn at random is cut off
+MOST_LOOKED_AT = 50_000  # beginnings of courses that a listing looks at
+
+Moment = tuple[str, ...]
+"""What is under way at the same time, as text: `<approach> converging(arm, satellite)`."""
+
+Course = tuple[Moment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where one is in a task.
+
+    Attributes:
+        state: What is under way and what remains; None at the end.
+    """
+
+    state: State[None] | None
+
+    @property
+    def moment(self) -> Moment:
+        """What is under way; empty at the end."""
+        return _moment(self.state) if self.state is not None else ()
+
+
+def beginnings(task: Task) -> tuple[Place, ...]:
+    """The places where a task can begin; one at the end when nothing need be seen."""
+    return _distinct(enter(task, begin(task), None, 0.0))
+
+
+def followings(task: Task, place: Place) -> tuple[Place, ...]:
+    """The places that can come next; none after the end."""
+    if place.state is None:
+        return ()
+    return _distinct(m.state for m in moves(task, place.state, None, 0.0))
+
+
+def courses(task: Task) -> Iterator[Course]:
+    """The courses of a task, each once, those of few moments first.
+
+    It stops by itself when a task has so many that `MOST_LOOKED_AT` beginnings were looked at.
+    """
+    told: set[Course] = set()
+    looked_at: set[object] = set()
+    todo: deque[tuple[Course, Place]] = deque(((), p) for p in beginnings(task))
+    for _ in range(MOST_LOOKED_AT):
+        if not todo:
+            return
+        before, place = todo.popleft()
+        if place.state is None:
+            if before not in told:
+                told.add(before)
+                yield before
+        else:
+            now = (*before, place.moment)
+            for following in followings(task, place):
+                key = (now, None if following.state is None else form(following.state))
+                if key not in looked_at:  # several ways may have led there
+                    looked_at.add(key)
+                    todo.append((now, following))
+
+
+def sample(task: Task, rng: Random) -> tuple[Course, bool]:
+    """A course drawn at random, and whether it came to its end within `LONGEST` moments."""
+    place = rng.choice(beginnings(task))
+    course: list[Moment] = []
+    while place.state is not None and len(course) < LONGEST:
+        course.append(place.moment)
+        place = rng.choice(followings(task, place))
+    return tuple(course), place.state is None
+
+
+def _distinct(states: Iterator[State[None] | None]) -> tuple[Place, ...]:
+    found: dict[object, Place] = {}
+    for state in states:
+        found.setdefault(None if state is None else form(state), Place(state))
+    return tuple(found.values())
+
+
+def _moment(state: State[None]) -> Moment:
+    steps = (leaf.step for leaf in leaves(state))
+    return tuple(f"<{s.stage}> {_written(s)}" for s in steps)
+
+
+def _written(step: Step) -> str:
+    """What a step asks for, as it is written: its key begins with the name of the action."""
+    name, _, rest = step.action.partition(" ")
+    zone, sign = ("", rest) if rest[:1] in ("<", ">") else (rest, "")
+    actors = ", ".join([*step.actors, *([zone] if zone else [])])
+    return f"{name}({actors}){' ' + sign if sign else ''}"

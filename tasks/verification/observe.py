@@ -1,0 +1,225 @@
+"""What is seen of one action at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+from visup.agent import Mind, Presence, Relation, Truth
+from visup.rules.predicates.snapshot import Facts
+from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.vocabulary import Look
+
+NOTHING: Mapping[str, Look] = MappingProxyType({})
+NEVER: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """What is seen of an action between its actors.
+
+    Attributes:
+        holds: Whether the action holds.
+        helps: A true relation by which it holds or comes nearer, or None.
+        entry: A true relation by which it begins, or None.
+        not_yet: Whether the entry does not count yet (`while_not`).
+        contrary: A true relation that says that it fails, or None.
+        stern: Whether the contrary counts although the action holds: the course itself says so.
+        over: Whether what its course says of its end is seen; None when the course says nothing.
+        observed: Whether anything at all is known about it; False while an actor is not found
+            or its object is hidden.
+    """
+
+    holds: Truth = Truth.UNKNOWN
+    helps: Relation | None = None
+    entry: Relation | None = None
+    not_yet: bool = False
+    contrary: Relation | None = None
+    stern: bool = False
+    over: Truth | None = None
+    observed: bool = False
+
+
+UNSEEN = Sighting()
+
+
+class Relations:
+    """All relations of a mind at one moment, found by name and objects.
+
+    Args:
+        mind: The mind.
+        looks: Words and keys that are not plain relations of the mind (see `vocabulary`).
+        before: Since when what `lasting` was told of has been true, by key.
+    """
+
+    def __init__(
+        self,
+        mind: Mind,
+        looks: Mapping[str, Look] = NOTHING,
+        before: Mapping[str, float] = NEVER,
+    ) -> None:
+        self._mind = mind
+        self._looks = looks
+        self._before = before
+        self._looked: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
+        self.after: dict[str, float] = {}
+
+    def find(self, name: str, objects: tuple[int, ...]) -> Relation:
+        """The relation of that name between these objects; one of unknown truth when there is none.
+
+        `decoupled`, `apart`, `present` and `gone` follow from what else is believed unless some
+        rule gives them itself.
+        """
+        if name in self._looks:
+            return self._look(name, objects)
+        found = self._found.get((name, objects))
+        if found is None:
+            found = self._found[name, objects] = self._given_or_derived(name, objects)
+        return found
+
+    def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
+        found = self._mind.relation(name, *objects)
+        if found is not None and found.truth is not Truth.UNKNOWN:
+            return found
+        derive = DERIVED.get(name)
+        derived = derive(self._mind, self, objects) if derive else None
+        return derived or found or Relation(name, objects, Truth.UNKNOWN, self._mind.time)
+
+    @property
+    def time(self) -> float:
+        """Seconds of this moment."""
+        return self._mind.time
+
+    @cached_property
+    def _facts(self) -> Facts:
+        return Facts(self._mind)
+
+    def _look(self, name: str, objects: tuple[int, ...]) -> Relation:
+        key = (name, objects)
+        if key not in self._looked:
+            truth = self._looks[name](self._facts, objects)
+            self._looked[key] = self.lasting(name, objects, truth)
+        return self._looked[key]
+
+    def lasting(self, name: str, objects: tuple[int, ...], truth: Truth) -> Relation:
+        """A relation of that truth, with the time since when it has been true without a break.
+
+        While it cannot be observed the time is kept: not seen is not "no".
+        """
+        key = f"{name} {objects}"
+        since = self._before.get(key, self._mind.time)
+        if truth is Truth.TRUE or (truth is Truth.UNKNOWN and key in self._before):
+            self.after[key] = since
+        return Relation(name, objects, truth, since if truth is Truth.TRUE else self._mind.time)
+
+    def first_true(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
+        """The first of some relations that is true, or None."""
+        for name in names:
+            relation = self.find(name, objects)
+            if relation.truth is Truth.TRUE:
+                return relation
+        return None
+
+    def first_given(self, names: Iterable[str], objects: tuple[int, ...]) -> Relation | None:
+        """The first of some relations that a rule gives as true, none of them merely derived.
+
+        Two objects that are not coupled yet are `decoupled` in the derived sense, and no failure.
+        """
+        for name in names:
+            relation = self._mind.relation(name, *objects)
+            if name in self._looks:
+                relation = self._look(name, objects)
+            if relation is not None and relation.truth is Truth.TRUE:
+                return relation
+        return None
+
+    def known(self, names: Iterable[str], objects: tuple[int, ...]) -> bool:
+        """Whether the truth of any of some relations is known."""
+        return any(self.find(n, objects).truth is not Truth.UNKNOWN for n in names)
+
+
+def observe(meaning: Meaning, objects: tuple[int | None, ...], relations: Relations) -> Sighting:
+    """What is seen of an action.
+
+    Args:
+        meaning: The action.
+        objects: Ids of the objects that play its actors; None for one that is not found.
+        relations: What holds now.
+
+    Returns:
+        The sighting; `UNSEEN` when an actor is not found.
+    """
+    ids = tuple(o for o in objects if o is not None)
+    if len(ids) < len(objects):
+        return UNSEEN
+    holds = _holds(meaning, ids, relations)
+    helps = relations.first_true(meaning.helps, ids)
+    contrary = relations.first_given(meaning.contrary, ids)
+    known = (*meaning.helps, *meaning.contrary)
+    return Sighting(
+        holds=holds,
+        helps=helps,
+        entry=relations.first_true(meaning.begins, ids),
+        not_yet=holds is not Truth.TRUE
+        and relations.first_true(meaning.while_not, ids) is not None,
+        contrary=contrary,
+        observed=relations.known(known, ids),
+    )
+
+
+def _holds(meaning: Meaning, ids: tuple[int, ...], relations: Relations) -> Truth:
+    """True when one of the relations is, false when all that are known are false."""
+    if relations.first_true(meaning.holds, ids) is not None:
+        return Truth.TRUE
+    return Truth.FALSE if relations.known(meaning.holds, ids) else Truth.UNKNOWN
+
+
+Derive = Callable[[Mind, Relations, tuple[int, ...]], Relation | None]
+
+
+def _coupled(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+    """Coupled when the mind says so, whether or not a relation of that name is kept."""
+    pair = tuple(sorted(ids))
+    since = next((c.since for c in mind.couplings if c.objects == pair), None)
+    return None if since is None else Relation("coupled", ids, Truth.TRUE, since)
+
+
+def _decoupled(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+    return _opposite("decoupled", relations.find("coupled", ids))
+
+
+def _apart(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+    return _opposite("apart", relations.find("touching", ids))
+
+
+def _present(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+    belief = mind.objects.get(ids[0])
+    if belief is None:
+        return None
+    here = belief.presence is not Presence.LEFT
+    since = belief.first_seen if here else belief.last_seen
+    return Relation("present", ids, Truth.TRUE if here else Truth.FALSE, since)
+
+
+def _gone(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+    return _opposite("gone", relations.find("present", ids))
+
+
+def _opposite(name: str, relation: Relation) -> Relation | None:
+    if relation.truth is Truth.UNKNOWN:
+        return None
+    truth = Truth.FALSE if relation.truth is Truth.TRUE else Truth.TRUE
+    return Relation(name, relation.objects, truth, relation.since, relation.confidence)
+
+
+DERIVED: Mapping[str, Derive] = {
+    "coupled": _coupled,
+    "decoupled": _decoupled,
+    "apart": _apart,
+    "present": _present,
+    "gone": _gone,
+}
+"""Relations that follow from others or from presence."""

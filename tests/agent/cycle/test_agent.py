@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tests.agent.scripted import Scripted, counting, exploding_at, frames, worried_while
+from visup.agent import Directive, Mind, Observation, Outcome, Severity
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.step import Step
+from visup.agent.storage.jsonable import plain
+
+
+def told(steps: list[Step]) -> list[object]:
+    return [plain(replace(s, observation=Observation(0, 0, (0, 0)))) for s in steps]
+
+
+def make() -> Agent:
+    thinkers = Thinkers(update=(counting,), cogitate=(worried_while(lambda t: 0.3 <= t < 0.6),))
+    return Agent([Scripted("eye", ("x",))], thinkers)
+
+
+def test_the_same_frames_give_the_same_steps() -> None:
+    assert told(list(make().steps(frames(30)))) == told(list(make().steps(frames(30))))
+
+
+def test_two_agents_never_meet() -> None:
+    a, b = make(), make()
+    alone = told(list(make().steps(frames(20))))
+    mixed = [(a.step(f), b.step(f)) for f in frames(20)]
+    assert told([s for s, _ in mixed]) == told([s for _, s in mixed]) == alone
+
+
+def test_a_run_stops_at_its_condition_and_goes_on_from_there() -> None:
+    agent, source = make(), frames(10)
+    first = agent.run(source, until=lambda s: s.frame_index == 3)
+    then = agent.run(source)
+    assert first is not None
+    assert first.frame_index == 3
+    assert then is not None
+    assert then.frame_index == 9
+    assert agent.mind.memory["counting"] == 10
+
+
+def test_a_run_over_nothing_gives_no_step() -> None:
+    assert make().run(frames(0)) is None
+
+
+def test_a_thinker_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None:
+    thinkers = Thinkers(update=(counting, exploding_at(4)))
+    agent = Agent([Scripted("eye", ("x",))], thinkers)
+    steps = list(agent.steps(frames(8)))
+    before, hit, after = steps[3], steps[4], steps[5]
+    assert hit.mind.memory == before.mind.memory  # half of a step never enters the mind
+    assert hit.mind.time == hit.time
+    assert hit.mind.unknown == {"x"}
+    assert [a.kind for a in hit.mind.alerts] == ["thinking_failed"]
+    assert hit.mind.alerts[0].severity is Severity.CRITICAL
+    assert after.mind.memory["counting"] == 5
+
+
+def test_an_open_alert_is_not_closed_by_a_step_that_could_not_think() -> None:
+    always = worried_while(lambda _: True)
+    blown = [exploding_at(i) for i in range(5, 40)]
+    agent = Agent([], Thinkers(cogitate=(always, *blown)))
+    last = agent.run(frames(40))
+    assert last is not None
+    assert "worry" in {a.kind for a in last.mind.alerts}
+
+
+def test_directives_reach_behaviours_in_the_next_step() -> None:
+    def asks(mind: Mind, seen: Observation) -> Outcome:
+        wish = Directive("expect_regions", "There should be two.", {"count": seen.frame_index})
+        return Outcome(mind, directives=(wish,))
+
+    eye = Scripted("eye", ("x",))
+    Agent([eye], Thinkers(cogitate=(asks,))).run(frames(3))
+    assert [[d.data["count"] for d in given] for given in eye.directives] == [[], [0], [1]]
+
+
+def test_a_failed_behaviour_is_an_alert() -> None:
+    def says(i: int) -> object:
+        raise ValueError("broken")
+
+    last = Agent([Scripted("eye", ("x",), says)]).run(frames(2))
+    assert last is not None
+    assert [(a.kind, a.evidence) for a in last.mind.alerts] == [
+        ("behaviour_failed", ("ValueError: broken",))
+    ]
+
+
+def test_observers_see_every_step_and_the_mind_is_theirs_to_keep() -> None:
+    kept: list[Mind] = []
+    agent = make()
+    agent.observers = (lambda step, frame: kept.append(step.mind),)
+    agent.run(frames(5))
+    assert [m.memory["counting"] for m in kept] == [1, 2, 3, 4, 5]

@@ -1,0 +1,234 @@
+"""What comes of behaviours that hang, end themselves, are slow, leak, or fail now and then."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.agent.scripted import Scripted, frames
+from visup.agent import Contract, Directive, Frame, Observation, Report, ReportState
+from visup.agent.contract.limits import Limits
+from visup.agent.cycle.agent import Agent
+from visup.agent.execution.behaviour_slot import PATIENCE
+from visup.agent.execution.pipeline import in_order, perceive
+from visup.agent.model.step import Step
+
+
+class Plug:
+    """A behaviour that calls a function of frame and observation."""
+
+    def __init__(self, does: Callable[[Frame, Observation], Any], **declared: Any) -> None:
+        self.contract = Contract("plug", gives=("x",), **declared)
+        self.does = does
+
+    def perceive(self, frame: Frame, seen: Observation, directives: Sequence[Directive]) -> Any:
+        said = self.does(frame, seen)
+        return [] if said is None else [self.contract.percept(frame, said)]
+
+
+def reports(plug: Plug, limits: Limits, count: int, fps: float = 10.0) -> list[Report]:
+    return [s.reports[0] for s in Agent([plug], limits=limits).steps(frames(count, fps))]
+
+
+def at(index: int, does: Callable[[], Any]) -> Callable[[Frame, Observation], Any]:
+    return lambda frame, seen: does() if frame.index == index else frame.index
+
+
+def spin() -> None:
+    while True:
+        pass
+
+
+def leave() -> None:
+    raise SystemExit(3)
+
+
+def interrupt() -> None:
+    raise KeyboardInterrupt
+
+
+class Unreadable(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+def unreadable() -> None:
+    raise Unreadable
+
+
+@pytest.mark.parametrize("does", [spin, lambda: time.sleep(0.6)])
+def test_a_hang_costs_its_limit_once_and_the_step_goes_on(does: Callable[[], Any]) -> None:
+    before = threading.active_count()
+    begin = time.monotonic()
+    told = reports(Plug(at(1, does)), Limits(hang_s=0.2), 40)
+    assert time.monotonic() - begin < 5.0
+    assert [r.state for r in told[:2]] == [ReportState.RAN, ReportState.LATE]
+    assert told[1].error == "it gave no answer within 200 ms"
+    assert all(r.state is not ReportState.RAN for r in told[1:11])
+    deadline = time.monotonic() + 10
+    while threading.active_count() > before and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert threading.active_count() <= before  # what was given up ends, and so do idle threads
+
+
+def test_a_behaviour_that_comes_back_from_a_hang_runs_again() -> None:
+    told = reports(Plug(at(1, spin)), Limits(hang_s=0.2), 40)
+    assert told[-1].state is ReportState.RAN
+    assert told[-1].percepts[0].value == 39
+
+
+@pytest.mark.parametrize(
+    ("does", "said"),
+    [
+        (leave, "it called for an exit (SystemExit)"),
+        (interrupt, "it called for an exit (KeyboardInterrupt)"),
+        (unreadable, "Unreadable: (its message cannot be read)"),
+    ],
+)
+def test_a_plug_in_ends_itself_never_the_supervisor(does: Callable[[], Any], said: str) -> None:
+    told = reports(Plug(at(1, does)), Limits(), 4)
+    assert [r.state for r in told] == [ReportState.RAN, ReportState.FAILED] + [ReportState.RAN] * 2
+    assert said in told[1].error
+
+
+def test_an_exit_is_contained_in_the_thread_of_the_caller_too() -> None:
+    told = reports(Plug(at(1, leave)), Limits(hang_s=None), 4)
+    assert [r.state.value for r in told] == ["ran", "failed", "ran", "ran"]
+
+
+def test_threads_change_nothing_in_what_is_perceived() -> None:
+    def run(limits: Limits) -> list[Step]:
+        behaviours = [Scripted("eye", ("x",)), Scripted("namer", ("y",), needs=("x",))]
+        return list(Agent(behaviours, limits=limits).steps(frames(20)))
+
+    threaded, direct = run(Limits()), run(Limits(hang_s=None))
+    assert [s.reports for s in threaded] == [s.reports for s in direct]
+
+
+def test_without_budgets_no_decision_hangs_on_time() -> None:
+    ticks = iter(range(0, 10**6, 1000))  # a clock by which every run takes for ever
+    limits = Limits(hang_s=None, clock=lambda: float(next(ticks)))
+    told = reports(Plug(lambda f, s: f.index, cost_ms=1.0), limits, 10)
+    assert {r.state for r in told} == {ReportState.RAN}
+
+
+def test_over_budget_is_late_and_too_often_late_is_suspended() -> None:
+    now = [0.0]
+
+    def slow(frame: Frame, seen: Observation) -> int:
+        now[0] += 0.05
+        return frame.index
+
+    limits = Limits(hang_s=None, budgets=True, clock=lambda: now[0])
+    told = reports(Plug(slow, cost_ms=40.0), limits, 8)
+    assert [r.state for r in told[:PATIENCE]] == [ReportState.LATE] * PATIENCE
+    assert {r.state for r in told[PATIENCE:]} == {ReportState.SUSPENDED}
+    assert told[0].error == "it took longer than its budget of 40 ms"
+    assert {r.state for r in reports(Plug(slow, cost_ms=60.0), limits, 8)} == {ReportState.RAN}
+
+
+def test_what_rests_after_a_failure_stays_unknown_until_it_has_run_again() -> None:
+    def fails(frame: Frame, seen: Observation) -> int:
+        if frame.index == 5:
+            raise ValueError("no light")
+        return frame.index
+
+    slots = in_order([Plug(fails, every_s=0.5)])
+    seen = [perceive(slots, frame, ()) for frame in frames(12)]
+    assert ["x" in s.unknown for s in seen] == [5 <= i < 10 for i in range(12)]
+    assert [s.reports[0].state for s in seen[:2]] == [ReportState.RAN, ReportState.RESTED]
+
+
+def test_who_is_blind_because_another_failed_leaves_its_kinds_unknown() -> None:
+    def fails(_: int) -> object:
+        raise ValueError("no light")
+
+    chain = [Scripted("a", ("A",), fails), Scripted("b", ("B",), needs=("A",))]
+    seen = perceive(in_order([*chain, Scripted("c", ("C",), needs=("B",))]), next(frames(1)), ())
+    assert seen.unknown == {"A", "B", "C"}
+    assert [r.state.value for r in seen.reports] == ["failed", "blind", "blind"]
+
+
+def test_one_of_two_who_look_for_a_kind_is_not_enough() -> None:
+    def fails(_: int) -> object:
+        raise ValueError("no light")
+
+    both = [Scripted("a", ("x",)), Scripted("b", ("x",), fails)]
+    seen = perceive(in_order(both), next(frames(1)), ())
+    assert seen.of("x") == (0,)
+    assert not seen.observed("x")
+
+
+def test_memory_that_is_kept_is_noticed() -> None:
+    kept: list[Any] = []
+
+    def hoard(frame: Frame, seen: Observation) -> int:
+        kept.append(np.ones(8 * 2**20, np.uint8))
+        return frame.index
+
+    told = reports(Plug(hoard, memory_mb=30.0), Limits(), 12)
+    kept.clear()
+    first = next(i for i, r in enumerate(told) if r.state is ReportState.FAILED)
+    assert 3 <= first <= 6
+    assert "grow by more than 30 MB" in told[first].error
+    assert told[first + 1].state is ReportState.SUSPENDED
+
+
+def test_a_frame_cannot_be_written_to() -> None:
+    def scribble(frame: Frame, seen: Observation) -> None:
+        frame.image[:] = 0
+
+    given = list(frames(3))
+    agent = Agent([Plug(scribble)])
+    told = [agent.step(frame).reports[0] for frame in given]
+    assert all("read-only" in r.error for r in told)
+    assert [int(f.image[0, 0, 0]) for f in given] == [0, 1, 2]
+
+
+def test_the_past_is_as_long_as_asked_for_and_nobody_else_sees_it() -> None:
+    def past(frame: Frame, seen: Observation) -> list[int]:
+        assert all(p.seen.frame_index == p.frame.index for p in seen.past)
+        return [p.frame.index for p in seen.past]
+
+    steps = list(Agent([Plug(past, history=2)]).steps(frames(4)))
+    assert [s.observation.of("x")[0] for s in steps] == [[], [0], [0, 1], [1, 2]]
+    assert all(s.observation.past == () for s in steps)
+
+
+def test_a_clock_that_is_set_back_keeps_nobody_waiting() -> None:
+    image = np.zeros((4, 6, 3), np.uint8)
+    slots = in_order([Plug(lambda f, s: f.index, every_s=10.0)])
+    times = [100.0, 101.0, 3.0]
+    states = [perceive(slots, Frame(i, t, image), ()).reports[0].state for i, t in enumerate(times)]
+    assert states == [ReportState.RAN, ReportState.RESTED, ReportState.RAN]
+
+
+def test_the_method_start_is_called_once_before_the_first_run() -> None:
+    class Opened(Plug):
+        opened = 0
+
+        def start(self) -> None:
+            self.opened += 1
+
+    plug = Opened(lambda f, s: f.index)
+    assert {r.state for r in reports(plug, Limits(), 3)} == {ReportState.RAN}
+    assert plug.opened == 1
+
+
+def test_a_start_that_fails_is_tried_again() -> None:
+    class Reluctant(Plug):
+        tries = 0
+
+        def start(self) -> None:
+            self.tries += 1
+            if self.tries < 3:
+                raise OSError("the device is busy")
+
+    told = reports(Reluctant(lambda f, s: f.index), Limits(), 4)
+    assert [r.state.value for r in told] == ["failed", "failed", "ran", "ran"]
+    assert told[0].error == "OSError: the device is busy"

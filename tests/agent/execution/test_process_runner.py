@@ -1,0 +1,251 @@
+"""Behaviours in processes of their own. Classes stand at the top, so that they can be sent there."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing as mp
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.agent.scripted import frames
+from tests.paths import ROOT
+from visup.agent import Contract, Directive, Frame, Observation, Outcome, Percept, ReportState
+from visup.agent.contract.limits import Limits
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.errors import BehaviourError
+from visup.agent.model.step import Step
+from visup.agent.plugins.loader import load
+
+LIMITS = Limits(hang_s=0.5)
+
+
+class Alone:
+    """Counts its runs, and does what it is told at frame 2."""
+
+    contract = Contract("alone", gives=("pid", "count"), isolate=True, history=2, memory_mb=64)
+
+    def __init__(self, does: str = "") -> None:
+        self.does = does
+        self.count = 0
+
+    def perceive(
+        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+    ) -> Iterator[Percept]:
+        self.count += 1
+        if frame.index == 2 and self.does:
+            DOES[self.does](frame)
+        yield self.contract.percept(frame, os.getpid())
+        value = [self.count, int(frame.image.sum()), [p.frame.index for p in seen.past]]
+        yield self.contract.percept(
+            frame, [*value, [d.data["n"] for d in directives]], kind="count"
+        )
+
+
+def spin(frame: Frame) -> None:
+    while True:
+        pass
+
+
+def hoard(frame: Frame) -> None:
+    np.ones(256 * 2**20, np.uint8)
+
+
+def scribble(frame: Frame) -> None:
+    frame.image[:] = 0
+
+
+def unsendable(frame: Frame) -> None:
+    raise type("Odd", (Exception,), {})("an exception that no other process knows")
+
+
+DOES: dict[str, Callable[[Frame], Any]] = {
+    "spin": spin,
+    "sleep": lambda frame: time.sleep(60),
+    "exit": lambda frame: sys.exit(3),
+    "end": lambda frame: os._exit(3),
+    "crash": lambda frame: ctypes.string_at(0),
+    "kill": lambda frame: os.kill(os.getpid(), signal.SIGKILL),
+    "hoard": hoard,
+    "scribble": scribble,
+    "odd": unsendable,
+}
+
+
+def numbered(mind: Any, seen: Observation) -> Outcome:
+    wish = Directive("look_at", "Look.", MappingProxyType({"n": seen.frame_index}))
+    return Outcome(mind, directives=(wish,))
+
+
+def watch(behaviour: Any, count: int, limits: Limits = LIMITS) -> list[Step]:
+    agent = Agent([behaviour], Thinkers(cogitate=(numbered,)), limits=limits)
+    try:
+        return list(agent.steps(frames(count)))
+    finally:
+        agent.close()
+
+
+def counts(steps: list[Step]) -> list[Any]:
+    return [v for s in steps for v in s.observation.of("count")]
+
+
+def test_another_process_perceives_what_this_one_would() -> None:
+    apart, here = watch(Alone(), 6), watch(Alone(), 6, Limits(here=True))
+    assert counts(apart) == counts(here)
+    assert counts(here)[3] == [4, 3 * 6 * 4 * 3, [1, 2], [2]]
+    assert {v for s in apart for v in s.observation.of("pid")}.isdisjoint({os.getpid()})
+
+
+@pytest.mark.parametrize(
+    ("does", "state", "said"),
+    [
+        ("spin", ReportState.LATE, "it gave no answer within 500 ms"),
+        ("sleep", ReportState.LATE, "it gave no answer within 500 ms"),
+        ("end", ReportState.FAILED, "its process ended with exit code 3"),
+        ("crash", ReportState.FAILED, "its process ended by signal 11"),
+        ("kill", ReportState.FAILED, "its process ended by signal 9"),
+        ("hoard", ReportState.FAILED, "MemoryError"),
+    ],
+)
+def test_what_breaks_a_process_is_told_and_a_new_one_goes_on(
+    does: str, state: ReportState, said: str
+) -> None:
+    steps = watch(Alone(does), 16)
+    told = [s.reports[0] for s in steps]
+    assert told[2].state is state
+    assert said in told[2].error
+    assert [r.state for r in told[3:12]] == [ReportState.SUSPENDED] * 9
+    assert told[-1].state is ReportState.RAN
+    assert counts(steps)[-1][0] == 4  # it began anew at frame 12
+    assert "behaviour_failed" in {a.kind for a in steps[5].mind.alerts}
+
+
+@pytest.mark.parametrize(
+    ("does", "said"), [("exit", "it called for an exit"), ("scribble", "read-only"), ("odd", "Odd")]
+)
+def test_what_only_fails_keeps_its_process(does: str, said: str) -> None:
+    steps = watch(Alone(does), 5)
+    assert said in steps[2].reports[0].error
+    assert [c[0] for c in counts(steps)] == [1, 2, 4, 5]
+
+
+def test_a_closed_agent_leaves_no_process() -> None:
+    agent = Agent([Alone()], limits=LIMITS)
+    pid = agent.step(next(frames(1))).observation.of("pid")[0]
+    assert alive(pid)
+    agent.close()
+    assert not alive(pid)
+
+
+def test_a_forgotten_agent_leaves_no_process() -> None:
+    agent = Agent([Alone()], limits=LIMITS)
+    pid = agent.step(next(frames(1))).observation.of("pid")[0]
+    del agent
+    assert not alive(pid)
+
+
+KILLED = """
+import os, signal, sys
+from tests.agent.scripted import frames
+from tests.agent.execution.test_process_runner import Alone
+from visup.agent.cycle.agent import Agent
+if __name__ == "__main__":
+    agent = Agent([Alone()])
+    print(agent.step(next(frames(1))).observation.of("pid")[0], flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_supervisor_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
+    script = tmp_path / "killed.py"
+    script.write_text(KILLED)
+    root = ROOT
+    paths = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": paths},
+    )
+    pid = int(done.stdout)
+    deadline = time.monotonic() + 10
+    while alive(pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not alive(pid)
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{pid}/stat")
+    return not status.exists() or status.read_text().split()[2] != "Z"
+
+
+class Holding(Alone):
+    """Holds what cannot be sent from the beginning, or once it is started."""
+
+    def __init__(self, when: str) -> None:
+        super().__init__()
+        self.when = when
+        if when == "made":
+            self.start()
+
+    def start(self) -> None:
+        if self.when == "never":
+            raise OSError("no device")
+        self.held = (n for n in range(3))
+
+
+def test_what_cannot_be_sent_is_refused_with_the_way_out() -> None:
+    with pytest.raises(BehaviourError, match="cannot be sent to a process") as caught:
+        Agent([Holding("made")], limits=LIMITS)
+    assert "`start`" in str(caught.value)
+    assert counts(watch(Holding("started"), 2))[-1][0] == 2
+
+
+def test_a_start_that_fails_is_told() -> None:
+    told = [s.reports[0] for s in watch(Holding("never"), 2)]
+    assert {r.state for r in told} == {ReportState.FAILED}
+    assert told[0].error.endswith("it does not start: OSError: no device")
+
+
+def test_a_behaviour_of_a_file_can_be_isolated_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "lamp.py"
+    path.write_text(
+        "import os\n"
+        "from dataclasses import dataclass\n"
+        "from visup.agent import Contract\n"
+        "@dataclass\n"
+        "class Light:\n"
+        "    pid: int\n"
+        "class Lamp:\n"
+        "    contract = Contract('lamp', gives=('lamp',))\n"
+        "    def perceive(self, frame, seen, directives):\n"
+        "        yield self.contract.percept(frame, Light(os.getpid()))\n"
+    )
+    (lamp,) = load(str(path))
+    steps = watch(lamp, 2, Limits(isolate=frozenset({"lamp"})))
+    assert steps[-1].reports[0].error == ""
+    assert steps[-1].observation.of("lamp")[0].pid != os.getpid()
+
+
+def test_a_name_that_is_not_there_cannot_be_isolated() -> None:
+    with pytest.raises(BehaviourError, match="called 'nose' to isolate"):
+        Agent([Alone()], limits=Limits(isolate=frozenset({"nose"})))
+
+
+def test_it_works_where_processes_can_only_be_spawned(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mp, "get_all_start_methods", lambda: ["spawn"])
+    assert counts(watch(Alone(), 2))[-1][0] == 2

@@ -1,0 +1,157 @@
+"""States of agents: what is thawed goes on as what was frozen, and files cannot run anything."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections import deque
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.storage.test_codec import plugin_values, regions, same
+from visup.agent import Health, HealthStatus, Region
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.checkpoint import MAGIC, StateError, frozen, thawed
+from visup.agent.storage.codec import packed
+
+
+@settings(max_examples=40)
+@given(st.lists(regions(), max_size=2), plugin_values)
+def test_what_is_thawed_is_what_was_frozen(given_regions: list[Region], value: Any) -> None:
+    assert same(thawed(frozen([given_regions, value])), [given_regions, value])
+
+
+def test_one_object_stays_one() -> None:
+    shared = [1, 2]
+    a, b, c = thawed(frozen((shared, shared, [1, 2])))
+    assert a is b
+    assert a is not c
+
+
+def test_containers_keep_their_kind_and_order_in_memory() -> None:
+    columns = np.asfortranarray(np.arange(6.0).reshape(2, 3))
+    told = thawed(frozen((deque([1, 2], 5), MappingProxyType({(1, 2): {3}}), columns)))
+    assert (told[0], told[0].maxlen) == (deque([1, 2]), 5)
+    assert isinstance(told[1], MappingProxyType)
+    assert told[1][1, 2] == {3}
+    assert told[2].flags.f_contiguous
+    assert (told[2] == columns).all()
+
+
+@dataclass
+class Elsewhere:
+    x: int = 1
+
+
+@pytest.mark.parametrize("value", [print, Elsewhere(), lambda: 1, int, object(), np.array([{}])])
+def test_what_is_not_state_is_refused(value: object) -> None:
+    with pytest.raises(StateError):
+        frozen({"x": [value]})
+
+
+def test_what_holds_itself_is_refused() -> None:
+    loop: list[Any] = []
+    loop.append(loop)
+    with pytest.raises(StateError, match="holds itself"):
+        frozen(loop)
+
+
+def forged(table: Any, root: Any = (0,)) -> bytes:
+    tree = json.dumps([table, root, []]).encode()
+    return struct.pack("<8sQII", MAGIC, len(tree), zlib.crc32(tree), zlib.crc32(b"")) + tree
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        [["object", "os:system", []]],
+        [["object", "subprocess:Popen", [["args", "x"]]]],
+        [["object", "visup.agent.storage.checkpoint:frozen", []]],
+        [["object", "visup.agent.storage.checkpoint:sys", []]],
+        [["object", "visup.agent.storage.checkpoint:np.ndarray", []]],
+        [["object", "visup.no.such:Thing", []]],
+        [["enum", "visup.agent.model.records:Frame", 1]],
+        [["enum", "visup.agent.model.records:Severity", 99]],
+        [["array", 0]],
+        [["named", "visup.agent.model.records:Health", []]],
+        [["strange"]],
+        [["tuple", [[7]]]],
+        [["dict", [[[0], 1]]]],
+        {"a": 1},
+        3,
+    ],
+)
+def test_a_forged_state_is_refused(table: Any) -> None:
+    with pytest.raises(OutputError, match="cannot be read"):
+        thawed(forged(table))
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_damaged_bytes_are_refused(data: st.DataObject) -> None:
+    good = frozen({"health": Health(HealthStatus.OK), "n": np.arange(5)})
+    at = data.draw(st.integers(0, len(good) - 1))
+    cut = data.draw(st.booleans())
+    bad = good[:at] if cut else good[:at] + bytes([good[at] ^ 1 << (at % 8)]) + good[at + 1 :]
+    with pytest.raises(OutputError):
+        thawed(bad)
+
+
+class Summing:
+    """A behaviour that holds state from frame to frame, and can tell it."""
+
+    def __init__(self) -> None:
+        self.inner = Scripted("sum", ("sum",), self._said)
+        self.contract = self.inner.contract
+        self.total = 0
+
+    def _said(self, index: int) -> int:
+        if index % 7 == 3:
+            raise RuntimeError("at times")
+        self.total += index
+        return self.total
+
+    def perceive(self, frame: Any, seen: Any, directives: Any) -> Any:
+        return self.inner.perceive(frame, seen, directives)
+
+    def save(self) -> dict[str, int]:
+        return {"total": self.total}
+
+    def load(self, state: Any) -> None:
+        self.total = state["total"]
+
+
+def made() -> Agent:
+    worry = worried_while(lambda t: t % 3 < 1.5)
+    return Agent([Summing()], Thinkers(update=(counting,), cogitate=(worry,)))
+
+
+@given(st.integers(1, 59))
+@settings(max_examples=15)
+def test_an_agent_that_takes_up_a_state_goes_on_like_the_one_that_gave_it(at: int) -> None:
+    sequence = list(frames(60))
+    first = made()
+    first.run(sequence[:at])
+    second = made()
+    assert second.load(thawed(frozen(first.save())))
+    for frame in sequence[at:]:
+        a, b = first.step(frame), second.step(frame)
+        assert packed(a.observation) == packed(b.observation)
+        assert (a.events, a.alerts) == (b.events, b.alerts)
+
+
+def test_without_all_behaviours_only_the_mind_is_kept() -> None:
+    first = Agent([Scripted("eye", ("x",))], Thinkers(update=(counting,)))
+    first.run(frames(5))
+    second = Agent([Scripted("eye", ("x",))], Thinkers(update=(counting,)))
+    assert not second.load(thawed(frozen(first.save())))
+    assert second.mind.memory["counting"] == 5

@@ -1,0 +1,249 @@
+"""The codec of percepts: what is read back is what was seen, to the last bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import zlib
+from contextlib import suppress
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from tests.paths import ROOT
+from visup.agent import (
+    Concern,
+    Depth,
+    Health,
+    HealthStatus,
+    Hypothesis,
+    Observation,
+    Percept,
+    Region,
+    Report,
+    ReportState,
+    Severity,
+)
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.codec import decoded, encoded, packed, runs, unpacked, unrun
+
+numbers = st.floats(allow_nan=False)
+masks = st.tuples(st.integers(1, 12), st.integers(1, 12)).flatmap(lambda s: arrays(bool, s))
+walks = st.lists(st.sampled_from([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, -1), (0, -1), (1, -1)]))
+contours = st.one_of(
+    walks.map(lambda w: np.cumsum([(5, 7), *w], axis=0).astype(np.float32)),
+    arrays(np.float32, st.tuples(st.integers(0, 9), st.just(2))),
+)
+
+
+@st.composite
+def regions(draw: st.DrawFn) -> Region:
+    mask = draw(masks)
+    h, w = mask.shape
+    motion = draw(st.none() | arrays(np.float64, (2, 3), elements=numbers))
+    return Region(
+        id=draw(st.integers(1, 10**6)),
+        bbox=(draw(st.integers(-5, 9)), draw(st.integers(0, 9)), w, h),
+        mask=mask,
+        contour=draw(contours),
+        centroid=(draw(numbers), draw(numbers)),
+        area=draw(numbers),
+        velocity=(draw(numbers), draw(numbers)),
+        motion=motion,
+        cut=draw(st.booleans()),
+        visible_since=draw(st.none() | numbers),
+    )
+
+
+hypotheses = st.builds(
+    Hypothesis,
+    region_id=st.integers(1, 9),
+    name=st.text(max_size=9),
+    view=st.integers(0, 99),
+    similarity=numbers,
+    rotation=st.none() | numbers,
+    scale=st.none() | numbers,
+    direction=st.none() | st.tuples(numbers, numbers, numbers),
+)
+leaves = st.none() | st.booleans() | st.integers() | numbers | st.text(max_size=5) | st.binary()
+keys = st.text(max_size=4) | st.integers() | st.tuples(st.integers(), st.text(max_size=2))
+plugin_values = st.recursive(
+    leaves,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.tuples(inner, inner)
+        | st.dictionaries(keys, inner, max_size=3)
+        | st.frozensets(st.integers(), max_size=3)
+    ),
+    max_leaves=8,
+)
+
+
+def seen_of(*values: tuple[str, Any]) -> Observation:
+    percepts = tuple(Percept(kind, value, 1.25, "eye", 0.5) for kind, value in values)
+    report = Report("eye", ReportState.RAN, tuple({k for k, _ in values}), percepts)
+    return Observation(7, 1.25, (640, 480), (report, Report("ear", ReportState.FAILED, ("x",))))
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equal in type and to the last bit, arrays too."""
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray):
+        return bool(a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes())
+    if dataclasses.is_dataclass(a):
+        names = [f.name for f in dataclasses.fields(a)]
+        return all(same(getattr(a, n), getattr(b, n)) for n in names)
+    if isinstance(a, tuple | list):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, dict):
+        return list(a) == list(b) and all(same(a[k], b[k]) for k in a)
+    if isinstance(a, float):
+        return a == b and math.copysign(1.0, a) == math.copysign(1.0, b)
+    return bool(a == b)
+
+
+@settings(max_examples=60)
+@given(st.lists(regions(), max_size=3), st.lists(hypotheses, max_size=3))
+def test_regions_and_hypotheses_come_back_as_they_were(
+    given_regions: list[Region], given_hypotheses: list[Hypothesis]
+) -> None:
+    values = [("region", r) for r in given_regions] + [("hypothesis", h) for h in given_hypotheses]
+    seen = seen_of(*values)
+    assert same(unpacked(packed(seen)), seen)
+
+
+@settings(max_examples=80)
+@given(plugin_values)
+def test_plain_values_of_plug_ins_come_back_as_they_were(value: Any) -> None:
+    seen = seen_of(("own", value))
+    assert same(unpacked(packed(seen)), seen)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        Depth(1, "a", 2.0, math.inf),
+        Health(HealthStatus.FROZEN, "It does not change."),
+        Concern("x", (1, 2), Severity.CRITICAL, "Why.", ("a", "b"), "k"),
+        np.float32(0.1),
+        np.array([[1, 2], [3, 4]], np.uint16),
+        np.array(3.5),
+        {"$": "looks like a tag"},
+        {"$": "tuple", "of": [1]},
+        -0.0,
+        {1, 2},
+    ],
+)
+def test_records_and_arrays_come_back_as_they_were(value: Any) -> None:
+    assert same(decoded(json.loads(json.dumps(encoded(value)))), value)
+
+
+def test_a_mapping_that_cannot_be_written_to_stays_so() -> None:
+    back = decoded(encoded(MappingProxyType({"a": 1})))
+    assert isinstance(back, MappingProxyType)
+    assert dict(back) == {"a": 1}
+
+
+@given(masks)
+def test_runs_say_what_a_mask_is(mask: np.ndarray[Any, np.dtype[np.bool_]]) -> None:
+    """Against a loop over the pixels."""
+    lengths, value = [0], False
+    for pixel in mask.ravel():
+        if pixel != value:
+            lengths.append(0)
+            value = bool(pixel)
+        lengths[-1] += 1
+    assert runs(mask) == lengths
+    assert (unrun(lengths, mask.shape) == mask).all()
+
+
+@pytest.mark.parametrize("lengths", [[3], [5, -1], [[2, 2]], [2**62, 2**62], ["a"], [1.5, 2.5]])
+def test_runs_that_do_not_fill_the_box_are_refused(lengths: Any) -> None:
+    with pytest.raises((ValueError, TypeError)):
+        unrun(lengths, (2, 2))
+
+
+class Strange:
+    pass
+
+
+def test_a_value_that_is_not_plain_leaves_what_its_behaviour_gives_unobserved() -> None:
+    back = unpacked(packed(seen_of(("own", Strange()), ("other", 1))))
+    assert back.reports[0].state is ReportState.RESTED
+    assert "Strange" in back.reports[0].error
+    assert not back.observed("own")
+    assert not back.observed("other")
+
+
+REGION = Region(
+    1,
+    (0, 0, 2, 2),
+    np.ones((2, 2), bool),
+    np.array([[0, 0], [1, 0], [1, 1]], np.float32),
+    (0.5, 0.5),
+    4.0,
+)
+
+
+@settings(max_examples=150)
+@given(st.data())
+def test_damaged_bytes_are_refused_or_read_never_more(data: st.DataObject) -> None:
+    good = packed(seen_of(("region", REGION), ("own", {"a": (1, b"x")})))
+    at = data.draw(st.integers(0, len(good) - 1))
+    bad = good[:at] + data.draw(st.binary(max_size=3)) + good[at + 1 :]
+    with suppress(OutputError):
+        assert same(unpacked(bad), unpacked(good))
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4),
+    lambda v: (
+        st.lists(v, max_size=3)
+        | st.dictionaries(st.sampled_from(["$", "of", "a", "dtype", "shape"]), v, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=200)
+@given(json_values, st.sampled_from(["time", "frame_index", "frame_size", "reports", "value"]))
+def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, place: str) -> None:
+    told = {"frame_index": 1, "time": 0.5, "frame_size": [4, 4], "reports": []}
+    if place == "value":
+        percept = ["own", value, 0.5, "eye", 1.0]
+        told["reports"] = [{"behaviour": "eye", "state": "ran", "gives": [], "percepts": [percept]}]
+    else:
+        told[place] = value
+    with suppress(OutputError):
+        assert isinstance(unpacked(zlib.compress(json.dumps(told).encode())), Observation)
+
+
+def test_a_bomb_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("visup.agent.storage.codec.LARGEST", 10**5)
+    with pytest.raises(OutputError, match="too large"):
+        unpacked(zlib.compress(b" " * 10**7))
+
+
+def test_the_schema_in_the_docs_is_that_of_the_code() -> None:
+    from visup.schema import schema_text
+
+    path = ROOT / "docs" / "step.schema.json"
+    assert path.read_text() == schema_text()
+
+
+@settings(max_examples=30)
+@given(st.lists(regions(), max_size=2), hypotheses, plugin_values)
+def test_every_document_keeps_the_schema(found: list[Region], one: Hypothesis, own: Any) -> None:
+    from visup.agent.storage.codec import document
+    from visup.schema import StepDocument
+
+    values = [("region", r) for r in found] + [("hypothesis", one), ("own", own)]
+    text = json.dumps(document(seen_of(*values)))
+    StepDocument.model_validate_json(text)

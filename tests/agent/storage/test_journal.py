@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.paths import ROOT
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.journal import Journal
+from visup.agent.storage.journal_reader import export_events, read_events, read_facts, read_steps
+
+CRASH = """
+import os, signal, sys
+from pathlib import Path
+from tests.agent.scripted import counting, frames
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.storage.journal import Journal
+
+journal = Journal(Path(sys.argv[1]))
+agent = Agent([], Thinkers(update=(counting,)), observers=(journal.record,))
+for frame in frames(100):
+    agent.step(frame)
+    print(frame.index, flush=True)
+    if frame.index == 41:
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def run(path: Path, count: int) -> None:
+    journal = Journal(path)
+    worry = worried_while(lambda t: t >= 0.5)
+    thinkers = Thinkers(update=(counting,), cogitate=(worry,))
+    Agent([Scripted("eye", ("x",))], thinkers, observers=(journal.record,)).run(frames(count))
+    journal.note(verdict="succeeded")
+    journal.close()
+
+
+def test_a_run_can_be_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    run(path, 12)
+    events = list(read_events(path))
+    assert [e["text"] for e in events if e["kind"] == "counted"] == [
+        f"I counted {i}." for i in range(1, 13)
+    ]
+    assert [e["kind"] for e in events].count("alert") == 1
+    assert [s["frame_index"] for s in read_steps(path)] == list(range(12))
+    assert read_facts(path) == {"verdict": "succeeded"}
+
+
+def test_exported_events_are_one_object_a_line_and_equal_runs_give_equal_bytes(
+    tmp_path: Path,
+) -> None:
+    for name in ("a", "b"):
+        run(tmp_path / f"{name}.sqlite", 9)
+        export_events(tmp_path / f"{name}.sqlite", tmp_path / f"{name}.jsonl")
+    a, b = ((tmp_path / f"{n}.jsonl").read_bytes() for n in ("a", "b"))
+    assert a == b
+    keys = {"kind", "time", "frame_index", "text", "objects", "confidence", "severity", "data"}
+    assert all(set(json.loads(line)) == keys for line in a.splitlines())
+
+
+def test_a_killed_run_keeps_every_step_that_was_taken(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    root = ROOT
+    done = subprocess.run(
+        [sys.executable, "-c", CRASH, str(path)],
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == -signal.SIGKILL
+    printed = [int(line) for line in done.stdout.split()]
+    assert [s["frame_index"] for s in read_steps(path)] == printed
+
+
+@pytest.mark.parametrize("place", ["missing/journal.sqlite", "."])
+def test_a_journal_that_cannot_be_written_says_so(tmp_path: Path, place: str) -> None:
+    with pytest.raises(OutputError, match="journal cannot be written"):
+        Journal(tmp_path / place)
+
+
+def test_reading_something_else_says_so(tmp_path: Path) -> None:
+    (tmp_path / "x.sqlite").write_text("not a database, but long enough to look like a file")
+    with pytest.raises(OutputError, match="not a journal"):
+        list(read_events(tmp_path / "x.sqlite"))
+
+
+def test_a_step_that_cannot_be_written_leaves_the_earlier_ones(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    journal = Journal(path)
+    agent = Agent([], Thinkers(update=(counting,)), observers=(journal.record,))
+    agent.run(frames(3))
+    blocker = sqlite3.connect(path)
+    blocker.execute("DROP TABLE events")  # as good as a disk that fills up
+    blocker.commit()
+    blocker.close()
+    with pytest.raises(OutputError):
+        agent.run(frames(1))
+    journal.close()
+    assert [s["frame_index"] for s in read_steps(path)] == [0, 1, 2]

@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tests.clips import moving_disc, write_clip
+from tests.paths import ROOT
+from visup.agent.model.errors import VisupError
+from visup.agent.plugins.loader import load
+from visup.cli import app
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent
+from visup.testing import check_behaviour
+
+
+def visup(*words: object) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [str(w) for w in words])
+    if isinstance(result.exception, VisupError):
+        return 2, str(result.exception)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.output
+
+
+@pytest.mark.parametrize("name", ["lamp", "two_words", "_", "Lamp2"])
+def test_a_new_behaviour_runs_at_once(name: str, tmp_path: Path) -> None:
+    code, _ = visup("behaviours", "new", name, "--out", tmp_path)
+    assert code == 0
+    (made,) = load(str(tmp_path / f"{name}.py"))
+    assert made.contract.name == name
+    check_behaviour(made)
+    assert len((tmp_path / f"{name}.py").read_text().splitlines()) < 40
+
+
+def test_nothing_is_written_over(tmp_path: Path) -> None:
+    (tmp_path / "lamp.py").write_text("mine")
+    code, told = visup("behaviours", "new", "lamp", "--out", tmp_path)
+    assert (code, "exists already" in told) == (2, True)
+    assert (tmp_path / "lamp.py").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["two words", "class", "1st", ""])
+def test_what_is_no_name_is_refused(name: str, tmp_path: Path) -> None:
+    code, told = visup("behaviours", "new", name, "--out", tmp_path)
+    assert (code, "no name for a behaviour" in told) == (2, True)
+
+
+def test_check_says_what_it_found_and_exits_accordingly(tmp_path: Path) -> None:
+    visup("behaviours", "new", "lamp", "--out", tmp_path)
+    path = tmp_path / "lamp.py"
+    code, told = visup("behaviours", "check", path)
+    assert (code, told.count("ok ")) == (0, 14)
+    path.write_text(path.read_text().replace("(x, y)", "float('nan')"))
+    code, told = visup("behaviours", "check", path, "--set", "lamp.contrast=1")
+    assert code == 1
+    assert (
+        "failed runs on a disc that moves: frame 0: behaviour 'lamp' reported 'lamp' as nan" in told
+    )
+    assert "expected a finite number, or None" in told
+    assert visup("behaviours", "check", tmp_path / "none.py")[0] == 2
+    code, told = visup("behaviours", "check", path, "--set", "lamp.contrast=-1")
+    assert (code, "expected: greater than 0" in told) == (2, True)
+
+
+def test_list_shows_what_is_installed_at_80_columns() -> None:
+    code, told = visup("behaviours", "list")
+    assert code == 0
+    assert all(name in told for name in ("motion", "shape", "depth", "health"))
+    assert max(map(len, told.splitlines())) <= 80
+
+
+def test_an_installed_behaviour_is_checked_by_name() -> None:
+    code, told = visup("behaviours", "check", "health")
+    assert (code, "failed" in told) == (0, False)
+
+
+def test_settings_go_from_the_command_line_into_the_run(tmp_path: Path) -> None:
+    visup("behaviours", "new", "lamp", "--out", tmp_path)
+    made = WatchSettings(
+        "clip.mp4",
+        behaviours=(tmp_path / "lamp.py",),
+        plugin_settings={"lamp": {"contrast": 7}},
+        isolate=("lamp",),
+        budgets=True,
+    )
+    agent = build_agent(made)
+    lamp = next(b for b in agent.behaviours if b.contract.name == "lamp")
+    assert lamp.settings.contrast == 7  # type: ignore[attr-defined]
+    assert (set(agent.limits.isolate), agent.limits.budgets) == ({"lamp"}, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--set", "lamp.contrast=3"), "there is no behaviour called 'lamp' to set"),
+        (("--set", "lamp"), "cannot be read"),
+        (("--settings", "none.toml"), "No such file"),
+        (("--isolate", "lamp"), "called 'lamp' to isolate"),
+    ],
+)
+def test_what_cannot_be_set_is_refused_before_the_run(
+    options: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    clip = write_clip(tmp_path / "clip.avi", moving_disc(3))
+    code, told = visup("watch", clip, "--out", tmp_path / "run", *options)
+    assert (code, message in told) == (2, True), told
+
+
+def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(tmp_path: Path) -> None:
+    clip = write_clip(tmp_path / "clip.avi", moving_disc(12))
+    (tmp_path / "mine.py").write_text(
+        "import os\n"
+        "from visup.agent import Contract\n"
+        "class Mine:\n"
+        "    contract = Contract('mine', gives=('mine',))\n"
+        "    def perceive(self, frame, seen, directives):\n"
+        "        os._exit(7)\n"
+    )
+    command = [sys.executable, "-m", "visup.cli", "watch", str(clip), "--json", "--no-video"]
+    command += ["--behaviour", "mine.py", "--isolate", "mine", "--out", "run"]
+    root = ROOT
+    paths = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    assert done.stderr == ""
+    assert "The behaviour 'mine' failed; what it gives is unknown." in done.stdout
+    assert "its process ended with exit code 7" in done.stdout
+    assert '"frames": 12' in done.stdout

@@ -1,0 +1,250 @@
+"""The command as a user meets it: exit codes, one clear message each, never a traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.clips import moving_disc, write_clip
+from visup.cli import main
+
+MISTAKES = """\
+<dock> ::= <approach> <captured>
+<approach> ::= convergin(arm, satellite)
+<captured> := coupled(arm, satellite)
+<again> ::= diverging(arm
+"""
+
+
+class Result:
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+
+Call = Callable[..., Result]
+Make = Callable[[Path], list[object]]
+
+
+@pytest.fixture
+def visup(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> Call:
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: object) -> Result:
+        monkeypatch.setattr(sys, "argv", ["visup", *map(str, words)])
+        capfd.readouterr()
+        try:
+            main()
+            code = 0
+        except SystemExit as end:
+            code = int(end.code or 0)
+        out, err = capfd.readouterr()
+        return Result(code, out, err)
+
+    return call
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    return write_clip(tmp_path / "clip.avi", moving_disc())
+
+
+def text_named_mp4(folder: Path) -> list[object]:
+    (folder / "story.mp4").write_text("once upon a time\n" * 50)
+    return ["watch", folder / "story.mp4"]
+
+
+def missing_video(folder: Path) -> list[object]:
+    return ["watch", folder / "nothing.mp4"]
+
+
+def folder_without_images(folder: Path) -> list[object]:
+    (folder / "empty").mkdir()
+    return ["watch", folder / "empty"]
+
+
+def task_with_mistakes(folder: Path) -> list[object]:
+    (folder / "bad.task").write_text(MISTAKES)
+    return ["task", "check", folder / "bad.task"]
+
+
+def watch_with_bad_task(folder: Path) -> list[object]:
+    (folder / "bad.task").write_text(MISTAKES)
+    return ["watch", folder / "clip.avi", "--task", folder / "bad.task"]
+
+
+def foreign_database(folder: Path) -> list[object]:
+    db = sqlite3.connect(folder / "other.db")
+    db.execute("CREATE TABLE t (x)")
+    db.commit()
+    db.close()
+    return ["watch", folder / "clip.avi", "--models", folder / "other.db"]
+
+
+def text_database(folder: Path) -> list[object]:
+    (folder / "text.db").write_text("not a database" * 100)
+    return ["models", "list", folder / "text.db"]
+
+
+def out_is_a_file(folder: Path) -> list[object]:
+    (folder / "taken").write_text("a file")
+    return ["watch", folder / "clip.avi", "--out", folder / "taken"]
+
+
+def out_holds_a_run(folder: Path) -> list[object]:
+    (folder / "old").mkdir()
+    (folder / "old" / "journal.sqlite").write_text("an earlier run")
+    return ["watch", folder / "clip.avi", "--out", folder / "old"]
+
+
+def unreadable_actor(folder: Path) -> list[object]:
+    return ["watch", folder / "clip.avi", "--actor", "satellite"]
+
+
+def unknown_actor(folder: Path) -> list[object]:
+    return ["watch", folder / "clip.avi", "--task", "dock", "--actor", "sattelite=x"]
+
+
+def unknown_task(folder: Path) -> list[object]:
+    return ["watch", folder / "clip.avi", "--task", "dokc"]
+
+
+def bad_rules(folder: Path) -> list[object]:
+    (folder / "bad.rules").write_text("rule without end")
+    return ["watch", folder / "clip.avi", "--rules", folder / "bad.rules"]
+
+
+def bad_behaviour(folder: Path) -> list[object]:
+    (folder / "plugin.py").write_text("x = 1")
+    return ["watch", folder / "clip.avi", "--behaviour", folder / "plugin.py"]
+
+
+def bad_zones(folder: Path) -> list[object]:
+    (folder / "bad.toml").write_text('[[zone]]\nname = "dock"\npolygon = [[0, 0], [9, 9]]\n')
+    return ["watch", folder / "clip.avi", "--zones", folder / "bad.toml"]
+
+
+def bad_every(folder: Path) -> list[object]:
+    return ["watch", folder / "clip.avi", "--every", "0"]
+
+
+def unknown_option(folder: Path) -> list[object]:
+    return ["watch", folder / "clip.avi", "--no-such-option"]
+
+
+def eval_of_nothing(folder: Path) -> list[object]:
+    (folder / "hollow").mkdir()
+    return ["eval", "missions", folder / "hollow"]
+
+
+def scenario_that_is_none(folder: Path) -> list[object]:
+    (folder / "x.toml").write_text("name = 3\n[camera]\nsize = 'large'\n")
+    return ["render", folder / "x.toml", "--out", folder / "rendered"]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (text_named_mp4, "story.mp4"),
+        (missing_video, "nothing.mp4"),
+        (folder_without_images, "empty"),
+        (task_with_mistakes, "bad.task:2"),
+        (watch_with_bad_task, "bad.task:2"),
+        (foreign_database, "other.db"),
+        (text_database, "text.db"),
+        (out_is_a_file, "taken"),
+        (out_holds_a_run, "holds a run already"),
+        (unreadable_actor, "NAME=MODEL"),
+        (unknown_actor, "satellite"),
+        (unknown_task, "dock"),
+        (bad_rules, "bad.rules:1"),
+        (bad_zones, "the polygon has 2 corners"),
+        (bad_behaviour, "plugin.py"),
+        (bad_every, "--every"),
+        (unknown_option, "--no-such-option"),
+        (eval_of_nothing, "hollow"),
+        (scenario_that_is_none, "x.toml"),
+    ],
+)
+def test_bad_input_is_one_message_and_exit_code_2(
+    visup: Call, clip: Path, tmp_path: Path, make: Make, said: str
+) -> None:
+    result = visup(*make(tmp_path))
+    assert result.code == 2, result.out + result.err
+    everything = result.out + result.err
+    assert said in everything.replace("\n", "") or said in everything
+    assert "Traceback" not in everything
+
+
+def test_three_mistakes_in_a_task_give_three_messages(visup: Call, tmp_path: Path) -> None:
+    result = visup(*task_with_mistakes(tmp_path))
+    everything = result.out + result.err
+    assert all(f"bad.task:{line}" in everything for line in (2, 3, 4))
+    assert "converging" in everything  # did you mean
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
+def test_an_output_folder_without_permission(visup: Call, clip: Path, tmp_path: Path) -> None:
+    (tmp_path / "locked").mkdir(mode=0o500)
+    result = visup("watch", clip, "--out", tmp_path / "locked" / "run")
+    assert result.code == 2
+    assert "cannot be written" in result.err
+
+
+def test_a_run_leaves_all_of_its_files(visup: Call, clip: Path, tmp_path: Path) -> None:
+    result = visup("watch", clip, "--out", tmp_path / "run")
+    assert result.code == 0, result.out + result.err
+    assert "Verdict" in result.out.splitlines()[-1]
+    for name in ("journal.sqlite", "events.jsonl", "report.html", "annotated.webm"):
+        assert (tmp_path / "run" / name).stat().st_size > 0, name
+
+
+def test_json_output_is_one_object_a_line_and_the_verdict_last(
+    visup: Call, clip: Path, tmp_path: Path
+) -> None:
+    result = visup("watch", clip, "--json", "--out", tmp_path / "run", "--no-video")
+    lines = [json.loads(line) for line in result.out.splitlines()]
+    assert lines[-1]["kind"] == "result"
+    assert lines[-1]["frames"] == 40
+    assert any(e["kind"] == "entry" for e in lines[:-1])
+
+
+def test_quiet_says_the_verdict_and_where_the_report_is(
+    visup: Call, clip: Path, tmp_path: Path
+) -> None:
+    result = visup("watch", clip, "--quiet", "--out", tmp_path / "run", "--no-video")
+    assert len(result.out.splitlines()) == 2
+
+
+def test_a_video_that_breaks_off_keeps_what_was_seen_and_says_so(
+    visup: Call, clip: Path, tmp_path: Path
+) -> None:
+    whole = clip.read_bytes()
+    (tmp_path / "cut.avi").write_bytes(whole[: len(whole) * 2 // 3])
+    result = visup("watch", tmp_path / "cut.avi", "--json", "--out", tmp_path / "run", "--no-video")
+    last = json.loads(result.out.splitlines()[-1])
+    assert 10 < last["frames"] < 40
+    assert last["problem"]
+
+
+def test_default_run_folders_are_numbered(visup: Call, clip: Path, tmp_path: Path) -> None:
+    for folder in ("runs/clip", "runs/clip-2"):
+        visup("watch", clip, "--quiet", "--no-video", "--every", "8")
+        assert (tmp_path / folder / "journal.sqlite").exists()
+
+
+def test_the_version_is_told(visup: Call) -> None:
+    assert visup("--version").out.startswith("visup ")
+
+
+def test_the_doctor_finds_nothing_broken(visup: Call) -> None:
+    result = visup("doctor")
+    assert result.code == 0, result.out
+    assert "broken" not in result.out

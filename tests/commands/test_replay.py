@@ -1,0 +1,85 @@
+"""`visup replay` and `visup watch --resume` as a user meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.clips import moving_disc, write_clip
+from tests.commands.test_cli import Call, visup
+from visup.agent.storage.journal_reader import JOURNAL
+
+__all__ = ["visup"]  # the fixture
+
+RULE = 'rule seen(a): warning\n    when in_view(a) > 0.2 s\n    say "{a} {is} seen."\n'
+
+
+@pytest.fixture
+def run(visup: Call, tmp_path: Path) -> Path:
+    clip = write_clip(tmp_path / "clip.avi", moving_disc(30), fps=15.0)
+    assert visup("watch", clip, "--out", tmp_path / "run", "--no-video", "--quiet").code == 0
+    return tmp_path / "run"
+
+
+def test_a_replay_tells_the_story_again_without_the_video(visup: Call, run: Path) -> None:
+    (run.parent / "clip.avi").unlink()
+    told = visup("replay", run)
+    assert told.code == 0
+    assert "in view" in told.out
+    assert "30 frames reasoned about again" in told.out
+    assert "Verdict" in told.out
+
+
+def test_the_exit_code_says_whether_anything_changes(visup: Call, run: Path) -> None:
+    same = visup("replay", run, "--diff")
+    assert (same.code, same.out.splitlines()[-1]) == (0, "Nothing changes.")
+    rules = run.parent / "own.rules"
+    rules.write_text(RULE)
+    other = visup("replay", run, "--rules", rules, "--diff", "--out", run.parent / "other")
+    assert other.code == 1
+    assert "+ " in other.out
+    assert "alerts: 0 gone, 1 new" in other.out
+    assert "verdict: none -> interrupted" in other.out
+    back = visup("replay", run, "--against", run.parent / "other", "--quiet")
+    assert back.code == 1
+    assert "alerts: 1 gone, 0 new" in back.out
+    assert "- " not in back.out.replace("interrupted -> none", "")
+    assert visup("replay", run.parent / "other", "--diff").code == 0
+    lines = (run.parent / "other" / "events.jsonl").read_text().splitlines()
+    alerts = [json.loads(e) for e in lines]
+    assert [e["kind"] for e in alerts].count("alert") == 1
+
+
+def test_mistakes_are_told_in_one_message(visup: Call, run: Path) -> None:
+    nothing = visup("replay", run.parent / "no-such-run")
+    assert (nothing.code, "no recorded run" in nothing.err) == (2, True)
+    bad = run.parent / "bad.rules"
+    bad.write_text("rule")
+    assert visup("replay", run, "--rules", bad).code == 2
+    data = bytearray((run / JOURNAL).read_bytes())
+    data[4096:30000] = bytes(30000 - 4096)
+    (run / JOURNAL).write_bytes(data)
+    damaged = visup("replay", run)
+    assert damaged.code == 2
+    assert "Traceback" not in damaged.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--resume", "run"), "is over"),
+        (("clip.avi", "--resume", "run"), "takes no source"),
+        (("--resume", "run", "--fps", "5"), "takes no source"),
+        (("--resume", "."), "no recorded run"),
+        ((), "--resume"),
+        (("clip.avi", "--sink", "tape:x"), "cannot be read"),
+    ],
+)
+def test_what_cannot_be_resumed_is_told(
+    visup: Call, run: Path, words: tuple[str, ...], said: str
+) -> None:
+    told = visup("watch", *words)
+    assert told.code == 2
+    assert said in told.err

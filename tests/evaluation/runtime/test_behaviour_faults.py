@@ -1,0 +1,88 @@
+"""A small campaign of injected faults; `visup eval faults` runs a thousand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.mind import Mind
+from visup.agent.model.records import Observation
+from visup.evaluation.runtime import behaviour_faults
+from visup.evaluation.runtime.behaviour_faults import KINDS, Trial, draw, evaluate_faults, run
+from visup.evaluation.runtime.fault_injection import DEADLY, FAULTS, WAITING
+from visup.rules.language.parser import shipped_rules
+from visup.rules.predicates.inputs_missing import blind, inputs
+
+QUICK = sorted(FAULTS.keys() - WAITING - DEADLY)
+
+
+@pytest.mark.parametrize("fault", QUICK)
+def test_a_fault_within_the_process_is_told_and_nothing_reads_fine(fault: str) -> None:
+    trial = Trial(QUICK.index(fault), fault, KINDS[len(fault) % len(KINDS)], False, 14)
+    run(trial)
+    assert trial.problems == []
+    assert trial.recovered
+
+
+@pytest.mark.parametrize("fault", sorted(WAITING | DEADLY))
+def test_a_fault_in_another_process_is_told_and_nothing_reads_fine(fault: str) -> None:
+    trial = Trial(0, fault, "region", True, 14)
+    run(trial)
+    assert trial.problems == []
+    assert trial.recovered
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_campaign_sees_what_is_taken_for_known(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Let the mind forget what is unknown: then the campaign must find it out."""
+
+    class Careless(Agent):
+        def __post_init__(self) -> None:
+            def forget(mind: Mind, seen: Observation) -> object:
+                from visup.agent import Outcome
+
+                return Outcome(replace(mind, unknown=frozenset()))
+
+            update = (*self.thinkers.update, forget)
+            self.thinkers = Thinkers(update, self.thinkers.cogitate)  # type: ignore[arg-type]
+            super().__post_init__()
+
+    monkeypatch.setattr(behaviour_faults, "Agent", Careless)
+    trial = Trial(0, "exception", kind, False, 14)
+    run(trial)
+    assert any(p.startswith("unknown: ") for p in trial.problems)
+
+
+def test_the_campaign_sees_rules_that_read_what_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("visup.rules.safety.verdicts.blind", lambda mind, word: False)
+    trial = Trial(0, "exception", "region", False, 14)
+    run(trial)
+    assert any(p.startswith("fine: probe_") for p in trial.problems)
+
+
+def test_every_shipped_rule_reads_words_whose_inputs_are_known() -> None:
+    assert shipped_rules()
+    assert inputs("healthy") == {"health"}
+    assert inputs("gap") == {"region"}
+    assert blind(Mind(unknown=frozenset({"region"})), "gap")
+    assert not blind(Mind(unknown=frozenset({"lamp"})), "gap")
+
+
+def test_what_is_drawn_depends_on_the_seed_alone() -> None:
+    assert [draw(n, 3) for n in range(40)] == [draw(n, 3) for n in range(40)]
+    assert [draw(n, 3) for n in range(40)] != [draw(n, 4) for n in range(40)]
+    assert {draw(n, 0).fault for n in range(len(FAULTS))} == set(FAULTS)
+
+
+def test_the_figures_add_up(tmp_path: Path) -> None:
+    figures = evaluate_faults(count=3)
+    assert figures["total"]["trials"] == 3
+    assert figures["total"]["ended"] == figures["total"]["told"] == 3
+    assert figures["total"]["fine"] == 0
+    assert figures["failures"] == []
+    assert sum(item["trials"] for item in figures["items"].values()) == 3

@@ -1,0 +1,157 @@
+"""What must not matter does not: where, how large, and how turned a silhouette is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.percepts.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape
+from visup.percepts.shape.matching.graph_matching import match
+from visup.percepts.shape.matching.similarity import compare
+from visup.percepts.shape.silhouette.silhouette import normalise
+
+FEW = settings(max_examples=12, deadline=None)
+Lobes = tuple[tuple[int, float], ...]
+
+
+@FEW
+@given(FLOWERS, st.integers(0, 80), st.integers(0, 80))
+def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
+    mask = flower(lobes, size=40)
+    moved = np.pad(mask, ((dy, 3), (dx, 5)))
+    here, there = normalise(mask), normalise(moved)
+    assert here is not None
+    assert there is not None
+    np.testing.assert_allclose(here.contour, there.contour, atol=1e-9)
+    assert there.origin == pytest.approx((here.origin[0] + dx, here.origin[1] + dy), abs=1e-6)
+
+
+@FEW
+@given(LIMBS, st.floats(0, 2 * np.pi))
+def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float) -> None:
+    likeness = compare(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
+    assert likeness.of_outlines > 0.93
+    # Where limbs are alike, noise decides which hangs below which; the graph bears it.
+    assert likeness.of_graphs > 0.8
+    assert likeness.similarity > 0.9
+
+
+@FEW
+@given(FLOWERS, st.floats(30, 200))
+def test_scale_hardly_changes_a_shape(lobes: Lobes, size: float) -> None:
+    likeness = compare(shape(flower(lobes, size=60)), shape(flower(lobes, size=size)))
+    assert likeness.similarity > 0.8
+
+
+@FEW
+@given(FLOWERS)
+def test_a_shape_looks_like_its_mirror_image(lobes: Lobes) -> None:
+    mask = flower(lobes)
+    assert compare(shape(mask), shape(mask[:, ::-1])).similarity > 0.85
+
+
+@FEW
+@given(FLOWERS, LIMBS)
+def test_similarity_is_symmetric_and_a_share(lobes: Lobes, angles: tuple[float, ...]) -> None:
+    a, b = shape(flower(lobes)), shape(limbs(angles))
+    assert compare(a, b).similarity == compare(b, a).similarity
+    assert 0.0 <= compare(a, b).similarity <= 1.0
+    assert match(a.graph, b.graph).similarity == match(b.graph, a.graph).similarity
+
+
+@pytest.mark.parametrize("name", sorted(ZOO))
+def test_a_shape_is_like_itself_fully_and_like_others_less(name: str) -> None:
+    own = shape(ZOO[name])
+    assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
+    for other in sorted(set(ZOO) - {name}):
+        assert compare(own, shape(ZOO[other])).similarity < 0.75
+
+
+def test_growing_damage_lowers_the_similarity() -> None:
+    whole = limbs((0.3, 1.2, 2.0, 4.0))
+    own = shape(whole)
+    found = []
+    for share in (0.0, 0.15, 0.3, 0.45):
+        damaged = whole.copy()
+        rows = np.flatnonzero(whole.any(axis=1))
+        damaged[rows[0] : rows[0] + int(share * len(rows))] = False
+        found.append(compare(own, shape(damaged)))
+    for similarities in ([f.similarity for f in found], [f.of_graphs for f in found]):
+        assert similarities == sorted(similarities, reverse=True)
+        assert similarities[-1] < similarities[0] - 0.1
+
+
+def test_holes_and_islands_do_not_matter() -> None:
+    mask = ZOO["clover"].copy()
+    clean = shape(mask)
+    mask[130:136, 130:136] = False
+    mask[2:6, 2:6] = True
+    seen = compare(clean, shape(mask))
+    assert seen.of_graphs == pytest.approx(1.0, abs=1e-6)
+    assert seen.of_outlines == pytest.approx(1.0, abs=1e-6)
+    # The map of the area shows them, for what they are: a thousandth of it, to the eighth power.
+    assert 1 - seen.of_areas < 0.01
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [
+        np.zeros((40, 40), bool),
+        np.zeros((0, 0), bool),
+        np.eye(3, dtype=bool),
+        np.pad(np.ones((1, 1), bool), 20),
+    ],
+    ids=["empty", "no pixels", "three pixels", "one pixel"],
+)
+def test_a_mask_that_shows_nothing_has_no_shape(mask: np.ndarray) -> None:
+    assert normalise(mask) is None
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [
+        np.ones((50, 50), bool),
+        np.ones((1, 400), bool),
+        np.ones((400, 2), bool),
+        np.indices((64, 64)).sum(axis=0) % 2 == 0,
+        np.random.default_rng(0).random((80, 80)) < 0.5,
+        np.random.default_rng(1).random((80, 80)) < 0.7,
+        np.eye(200, dtype=bool),
+    ],
+    ids=["full", "row", "column", "checkerboard", "noise", "dense noise", "diagonal"],
+)
+def test_odd_masks_have_a_shape_or_none_and_never_fail(mask: np.ndarray) -> None:
+    silhouette = normalise(mask)
+    if silhouette is not None:
+        own = shape(mask)
+        assert np.isfinite(own.contour).all()
+        assert own.graph.weights.sum() == pytest.approx(1.0, abs=1e-4)
+        assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(-3.1, 3.1))
+def test_a_mirror_image_is_told_apart_on_request(turn: float) -> None:
+    """A body with limbs to one side only is not its mirror image, however it is turned."""
+    angles = (0.3, 1.2, 2.9)
+    own, image = shape(limbs(angles)), shape(limbs(angles, turn=turn)[:, ::-1])
+    either, strict = compare(own, image), compare(own, image, mirror=False)
+    assert either.mirrored
+    assert not strict.mirrored
+    assert either.similarity > 0.9
+    assert strict.similarity < either.similarity - 0.1
+    again = compare(own, shape(limbs(angles, turn=turn)), mirror=False)
+    assert again.similarity > 0.9
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.one_of(st.integers(1, 600), st.integers(4000, 8192)), st.integers(1, 2), st.booleans())
+def test_a_line_has_a_finite_outline_or_none(length: int, width: int, upright: bool) -> None:
+    mask = np.zeros((width + 2, length + 2), dtype=bool)
+    mask[1:-1, 1:-1] = True
+    found = normalise(mask.T if upright else mask)
+    if found is not None:
+        assert np.isfinite(found.contour).all()
+        assert np.ptp(found.contour, axis=0).min() > 0

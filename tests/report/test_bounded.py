@@ -1,0 +1,85 @@
+"""Containers of bounded memory, against plain lists."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from visup.report.bounded import Heaviest, SpanRecorder, Thinned
+from visup.report.records import Span
+
+
+@given(most=st.integers(2, 40), count=st.integers(0, 500))
+@settings(max_examples=100, deadline=None)
+def test_a_thinned_stream_is_even_starts_at_its_start_and_never_overflows(
+    most: int, count: int
+) -> None:
+    kept = Thinned[int](most)
+    made: list[int] = []
+
+    def make(i: int) -> int:
+        made.append(i)
+        return i
+
+    for i in range(count):
+        kept.offer(partial(make, i))
+    items = kept.items()
+    assert len(items) <= most
+    if count:
+        stride = items[1] - items[0] if len(items) > 1 else max(count, 1)
+        assert list(items) == list(range(0, count, stride))
+        assert len(items) >= min(count, most // 2)
+    assert set(items) <= set(made)
+    assert len(made) <= count
+
+
+@given(
+    weights=st.lists(st.integers(0, 5), max_size=60),
+    most=st.integers(1, 10),
+)
+@settings(max_examples=100, deadline=None)
+def test_the_heaviest_stay_and_among_equals_the_earlier(weights: list[int], most: int) -> None:
+    kept = Heaviest[tuple[int, int]](most, lambda x: x[1])
+    for item in enumerate(weights):
+        if kept.has_room_for(item[1]):
+            kept.add(item)
+    best = sorted(enumerate(weights), key=lambda x: (-x[1], x[0]))[:most]
+    assert list(kept.items()) == sorted(best)
+
+
+STATES = st.lists(
+    st.dictionaries(st.sampled_from("abc"), st.sampled_from(["on", "off"])), max_size=40
+)
+
+
+@given(states=STATES)
+@settings(max_examples=100, deadline=None)
+def test_spans_say_at_each_moment_what_was_told(states: list[dict[str, str]]) -> None:
+    recorder = SpanRecorder(most=1000)
+    for t, state in enumerate(states):
+        recorder.note(float(t), {(k,): v for k, v in state.items()})
+    spans = recorder.spans(float(len(states)))
+    for t, state in enumerate(states):
+        told = {s.subject[0]: s.value for s in spans if s.start <= t < s.end}
+        assert told == state
+    for a in spans:
+        followers = [b for b in spans if b.subject == a.subject and b.start == a.end]
+        assert all(b.value != a.value for b in followers)
+
+
+def test_spans_that_do_not_fit_are_dropped() -> None:
+    recorder = SpanRecorder(most=2)
+    for t in range(6):
+        recorder.note(t, {("x",): str(t)})
+    assert recorder.spans(6.0) == (
+        Span(("x",), "0", 0, 1),
+        Span(("x",), "1", 1, 2),
+        Span(("x",), "5", 5, 6.0),
+    )
+
+
+def test_nothing_told_leaves_no_span() -> None:
+    assert SpanRecorder(most=2).spans(1.0) == ()
+    assert Thinned[int](2).items() == ()

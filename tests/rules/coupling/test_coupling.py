@@ -1,0 +1,111 @@
+"""Caught, bounced off, or passing: when two bodies are believed to be one."""
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tests.rules.runs import Thought, think
+from tests.rules.scenes import box_region, seen
+from visup.agent import Observation, Truth
+from visup.rules.reasoners import default_thinkers
+
+Place = Callable[[float], float]
+
+
+def scene(right: Place, left: Place = lambda t: 100.0, seconds: float = 10.0) -> list[Thought]:
+    def observations() -> Iterator[Observation]:
+        for i in range(round(25 * seconds)):
+            boxes = [(left(i / 25), 1), (right(i / 25), 2)]
+            yield seen(i, [box_region(n, (x, 200, 80, 60)) for x, n in boxes])
+
+    return run(observations())
+
+
+def run(observations: Iterator[Observation]) -> list[Thought]:
+    rules = default_thinkers()
+    return list(think((*rules.update, *rules.cogitate), observations))
+
+
+def told(thoughts: list[Thought]) -> list[tuple[str, float]]:
+    return [
+        (e.kind, e.time) for t in thoughts for e in t.events if e.kind in ("coupled", "decoupled")
+    ]
+
+
+def closing(t: float) -> float:
+    """Comes from 60 px away at 15 px/s and is there at 4 s."""
+    return 180 + 15 * max(0.0, 4 - t)
+
+
+def test_what_comes_to_rest_at_another_is_coupled_soon() -> None:
+    found = told(scene(closing))
+    assert [k for k, _ in found] == ["coupled"]
+    assert 4.0 < found[0][1] < 5.5
+
+
+def test_what_bounces_off_is_never_coupled() -> None:
+    for speed in (5.0, 8.0, 15.0):
+        away = lambda t, v=speed: closing(t) if t < 4 else 180 + v * (t - 4)  # noqa: E731
+        assert told(scene(away)) == []
+
+
+def test_what_touches_from_the_start_without_motion_is_not_known_to_be_coupled() -> None:
+    thoughts = scene(lambda t: 180.0)
+    assert told(thoughts) == []
+    touching = thoughts[-1].mind.relation("touching", 1, 2)
+    assert touching is not None
+    assert touching.truth is Truth.TRUE
+
+
+def test_what_moves_together_in_touch_is_coupled_though_nobody_saw_them_meet() -> None:
+    assert [k for k, _ in told(scene(lambda t: 180 + 12 * t, lambda t: 100 + 12 * t))] == [
+        "coupled"
+    ]
+
+
+def test_what_keeps_its_distance_without_touch_is_not_coupled() -> None:
+    thoughts = scene(lambda t: 240 + 12 * t, lambda t: 100 + 12 * t)
+    assert told(thoughts) == []
+    together = thoughts[-1].mind.relation("moving_together", 1, 2)
+    assert together is not None
+    assert together.truth is Truth.TRUE
+
+
+def test_coupled_bodies_that_part_are_decoupled() -> None:
+    found = told(scene(lambda t: closing(t) if t < 7 else 180 + 15 * (t - 7)))
+    assert [k for k, _ in found] == ["coupled", "decoupled"]
+    assert 7.0 < found[1][1] < 9.0
+
+
+@pytest.mark.parametrize("parts_at", [None, 8.0])
+def test_regions_that_become_their_union_are_coupled(parts_at: float | None) -> None:
+    """The two close in; from contact on there is one region, which keeps its shape."""
+
+    def at(i: int) -> Observation:
+        t = i / 25
+        parted = parts_at is not None and t >= parts_at
+        x = 180 + 20 * (t - parts_at) if parts_at and parted else closing(t)
+        if t < 4 or parted:
+            return seen(i, [box_region(1, (100, 200, 80, 60)), box_region(2, (x, 200, 80, 60))])
+        return seen(i, [box_region(1, (100, 200, 160, 60))])
+
+    thoughts = run(at(i) for i in range(300))
+    found = told(thoughts)
+    assert [k for k, _ in found] == (["coupled"] if parts_at is None else ["coupled", "decoupled"])
+    assert 4.0 < found[0][1] < 6.5
+    assert {e.kind for t in thoughts for e in t.events} <= {
+        "entry", "relation", "coupled", "decoupled",
+    }  # fmt: skip
+    assert thoughts[190].mind.couplings[0].objects == (1, 2)
+
+
+def test_a_region_that_hides_another_did_not_swallow_it() -> None:
+    """The left box grows over the other one as a big object does that comes near."""
+
+    def at(i: int) -> Observation:
+        reach = min(200.0, 80 + 2.0 * max(0, i - 25))
+        left = 100 + reach
+        rest = box_region(2, (max(180.0, left), 220, 260 - max(180.0, left), 30))
+        return seen(i, [box_region(1, (100, 150, reach, 160)), rest])
+
+    assert told(run(at(i) for i in range(200))) == []

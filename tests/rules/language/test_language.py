@@ -1,0 +1,301 @@
+"""The rule language: laws on random rules, good and bad sentences as tables."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.oracles.rule_formulas import random_formula
+from visup.agent import Severity
+from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.rules.formula.nodes import (
+    ZERO,
+    And,
+    Comparison,
+    Formula,
+    Future,
+    Last,
+    Not,
+    Often,
+    Or,
+    Past,
+    Predicate,
+    Quantified,
+    Rule,
+    Since,
+    Until,
+    Window,
+)
+from visup.rules.formula.terms import Arithmetic, Combined, Measure, OverTime, Term
+from visup.rules.formula.units import DIMENSION, Number, Unit
+from visup.rules.language import build
+from visup.rules.language.build import always, exists, fact, number, percent, px, px_s, quantity
+from visup.rules.language.build import s as seconds
+from visup.rules.language.cost import bounds_of
+from visup.rules.language.parser import load_rules, parse_formula, parse_rules, shipped_rules
+from visup.rules.predicates.snapshot import RELATION_NAMES
+from visup.rules.predicates.vocabulary import QUANTITIES, WORDS, signals
+
+durations = st.builds(
+    Number,
+    st.integers(1, 500).map(lambda n: n / 10),
+    st.sampled_from([Unit.S, Unit.MS]),
+)
+windows = st.builds(lambda d: Window(ZERO, d), durations) | st.builds(
+    lambda n: Window(Number(n / 4, Unit.S), Number(n / 2, Unit.S)), st.integers(1, 20)
+)
+spans = st.builds(lambda d: Window(ZERO, d), durations)
+
+
+def arguments(takes: tuple[str, ...]) -> tuple[str, ...]:
+    objects = iter("ab")
+    other = {"relation": "converging", "kind": "region", "name": "probe", "zone": "bay"}
+    return tuple(next(objects) if t == "object" else other[t] for t in takes)
+
+
+predicates = st.sampled_from(sorted(WORDS)).map(
+    lambda name: Predicate(name, arguments(WORDS[name].takes))
+)
+
+
+@st.composite
+def comparisons(draw: st.DrawFn) -> Comparison:
+    name = draw(st.sampled_from(sorted(QUANTITIES)))
+    dimension = QUANTITIES[name].dimension
+    unit = draw(st.sampled_from([u for u, (d, _) in DIMENSION.items() if d == dimension]))
+    bound = Number(draw(st.integers(-300, 300)) / 4, unit)
+    operator = draw(st.sampled_from(["<", "<=", ">", ">="]))
+    slack = draw(st.integers(0, 20)) / 2 * (-1 if ">" in operator else 1)
+    leave = Number(bound.value + slack, unit) if draw(st.booleans()) else None
+    left = Measure(name, arguments(QUANTITIES[name].takes))
+    terms: list[Term] = [
+        left,
+        Arithmetic(left, "-", Number(2.0, unit)),
+        Arithmetic(Number(3.0), "*", Arithmetic(left, "+", left)),
+        Arithmetic(Arithmetic(left, "/", Number(2.0)), "-", Arithmetic(left, "-", left)),
+        Combined("max", (left, Number(1.0, unit))),
+        Combined("abs", (left,)),
+        OverTime("lowest", left, Number(2.0, Unit.S)),
+    ]
+    return Comparison(draw(st.sampled_from(terms)), operator, bound, leave)
+
+
+def joined(inner: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:
+    several = st.lists(inner, min_size=2, max_size=3).map(tuple)
+    kinds = st.sampled_from(["always", "once"])
+    ahead = st.sampled_from(["eventually", "henceforth"])
+    near = Predicate("touching", ("a", "c"))
+    return st.one_of(
+        st.builds(Not, inner),
+        st.builds(And, several),
+        st.builds(Or, several),
+        st.builds(Past, kinds, inner, st.none() | windows),
+        st.builds(Future, ahead, inner, windows),
+        st.builds(Since, inner, inner, st.none() | spans),
+        st.builds(Until, inner, inner, spans),
+        st.builds(Often, inner, st.just(Number(60.0, Unit.PERCENT)), durations),
+        st.builds(Often, inner, st.just(Number(3.0)), st.just(Number(5.0))),
+        st.builds(Last, inner, durations),
+        st.builds(
+            lambda kind, f, again: Quantified(kind, "c", And((near, f)), again),
+            st.sampled_from(["exists", "forall"]),
+            predicates,
+            st.booleans(),
+        ),
+    )
+
+
+formulas: st.SearchStrategy[Formula] = st.recursive(
+    predicates | comparisons(), joined, max_leaves=6
+)
+
+BOTH = Predicate("converging", ("a", "b"))
+rules = st.builds(
+    lambda when, unless, hold, cooldown, severity, again: Rule(
+        "some_rule",
+        ("a", "b"),
+        severity,
+        And((BOTH, when)),
+        "{a} {is} near {b}.",
+        unless,
+        hold,
+        cooldown,
+        again,
+    ),
+    formulas,
+    st.none() | formulas,
+    st.none() | durations,
+    st.none() | durations,
+    st.sampled_from(list(Severity)),
+    st.sampled_from([(), ("b",)]),
+)
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(rules)
+def test_a_rule_printed_is_the_rule_read(rule: Rule) -> None:
+    assert parse_rules(str(rule)) == (rule,)
+
+
+def test_shipped_rules_print_back_too() -> None:
+    shipped = shipped_rules()
+    assert parse_rules("\n".join(map(str, shipped))) == shipped
+    assert {"collision_course", "unexpected_object"} <= {r.name for r in shipped}
+
+
+def test_random_formulas_of_signals_print_back() -> None:
+    from random import Random
+
+    for seed in range(300):
+        formula = random_formula(Random(seed), 3)
+        plain = parse_formula(str(formula), signals("x", "y")) if _sound(formula) else formula
+        assert plain == formula
+
+
+def _sound(formula: Formula) -> bool:
+    """Whether its units fit: rates do not compare with plain numbers."""
+    try:
+        parse_formula(str(formula), signals("x", "y"))
+    except (RuleError, ManyErrors):
+        return False
+    return True
+
+
+def wrap(when: str, head: str = "rule r(a, b): info", say: str = '"{a} {b}"') -> str:
+    return f"{head}\n    when {when}\n    say {say}\n"
+
+
+BAD = [
+    (wrap("convergin(a, b)"), "no relation or fact 'convergin'", "mean 'converging'", 2, 10),
+    (wrap("converging(a)"), "takes 2 argument(s), not 1", "converging(object, object)", 2, 10),
+    (wrap("converging(a, a) and seen(b)"), "asked of one object twice", "", 2, 10),
+    (wrap("converging(a, c) and seen(b)"), "'c' is no variable", "one of a, b", 2, 10),
+    (wrap("gap(a, b) < 3 s"), "a length is compared with a time", "a length: px", 2, 10),
+    (wrap("gap(a, b) < 3"), "a length is compared with a number", "a length: px", 2, 10),
+    (wrap("gapp(a, b) < 3 px"), "no quantity 'gapp'", "did you mean 'gap'?", 2, 10),
+    (wrap("gap(a, b)"), "no relation or fact 'gap'", "compare it with a number", 2, 10),
+    (wrap("touching(a, b) for 2 px"), "'for' wants a time", "such as 2 s", 2, 29),
+    (wrap("touching(a, b) for 0 s"), "'for' wants a time above 0", "", 2, 29),
+    (wrap("seen(a)"), "the variable 'b' of 'r' is not used", "leave it out", 1, 6),
+    (wrap("touching(a, b)", say='"{c}"'), "mentions 'c'", "one of a, b, is", 1, 6),
+    (wrap("expected(near, a, b)"), "'near' is no relation", "one of converging", 2, 10),
+    (wrap("touching(a, b) and"), "'say' does not belong here", "'not'", 3, 5),
+    (wrap("touching(a b)"), "'b' does not belong here", "')' or ','", 2, 21),
+    (wrap("touching(a, b)", "rule r(a, b): warnin"), "'warnin'", "mean 'warning'", 1, 15),
+    (wrap("touching(a, b)", "rule r(a, b) info"), "'info' does not belong", "':'", 1, 14),
+    (wrap("touching(a, b)", "rul r(a, b): info"), "'rul' does not belong", "'rule'", 1, 1),
+    (wrap("touching(a, b)", say="near"), "'near' does not belong", "double quotes", 3, 9),
+    ("rule r(a): info\n    when seen(a)\n", "ends too early", "'say'", 2, 17),
+    (wrap("gap(a, b) + 3 s < 3 px"), "a length is added to a time", "a length: px", 2, 10),
+    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "a time is compared with a length", "a time: s", 2, 10),
+    (wrap("gap(a, b) + 3 px"), "is a quantity, neither true nor false", "compare it", 2, 10),
+    (wrap("touching(a, b) + 3 px < 5 px"), "no quantity 'touching'", "true or false", 2, 10),
+    (wrap("(seen(a) and seen(b)) < 5 px"), "is true or false, and no quantity", "a quantity", 2, 11),
+    (wrap("rate(gap(a, b), 2 s) < 5 px"), "a speed is compared with a length", "a speed: px/s", 2, 10),
+    (wrap("rate(gap(a, b)) < 5 px/s"), "'rate' takes something and a time", "such as rate", 2, 10),
+    (wrap("abs(gap(a, b), 1 px) < 5 px"), "'abs' does not take 2", "abs(gap(a, b))", 2, 10),
+    (wrap("gap(a, b) < 5 px leave 3 px"), "ends it where it does not yet begin", "at least 5 px", 2, 33),
+    (wrap("gap(a, b) < 5 px leave 9 s"), "'leave' wants a length", "", 2, 33),
+    (wrap("eventually touching(a, b)"), "would wait without end", "eventually[5 s]", 2, 10),
+    (wrap("seen(a) until seen(b)"), "would wait without end", "until[5 s]", 2, 10),
+    (wrap("touching(a, b) for 5 s to 2 s ago"), "a window from 5 s to 2 s is empty", "shorter", 2, 36),
+    (wrap("touching(a, b) in 7 of 5 samples"), "cannot be counted", "3 of 5 samples", 2, 28),
+    (wrap("touching(a, b) in 120 % of 5 s"), "'120 %' is no share", "such as 60 %", 2, 28),
+    (wrap("exists b: touching(a, b)"), "'b' is already the name", "another name", 2, 10),
+    (wrap("touching(a, b) and exists c: seen(a)"), "'c' of 'exists' is not used", "leave it out", 2, 29),
+    (wrap("gap(a, b) > 3 px for 20 min"), "would keep 244,806 values", "at most 100,000", 1, 6),
+    (wrap("exists c: exists d: (touching(a, c) and touching(b, d))"), "looks at 4 objects together",
+     "at most 3", 1, 6),
+    (wrap("touching(a, b)", "rule r(a, for): info"), "'for' does not belong here", "a name", 1, 11),
+    (wrap("touching(a, b)\n    hold 2 px"), "'hold' wants a time", "such as 2 s", 3, 10),
+    (wrap("last(touching(a, b), 3) and seen(a)"), "'last' takes something and a time", "", 2, 10),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "what", "more", "line", "column"), BAD)
+def test_a_mistake_is_told_with_its_place(
+    text: str, what: str, more: str, line: int, column: int
+) -> None:
+    with pytest.raises(RuleError) as caught:
+        parse_rules(text, "my.rules")
+    message = str(caught.value)
+    assert what in message
+    assert more in message
+    assert isinstance(caught.value.where, Place)
+    assert (caught.value.where.line, caught.value.where.column) == (line, column)
+    assert "^" in message
+
+
+def test_all_mistakes_of_a_file_are_told_at_once_in_the_order_of_the_text() -> None:
+    text = wrap("convergin(a, b)") + wrap("touching(a, b") + wrap("gap(a, b) < 1 s")
+    text = text.replace("rule r(", "rule q(", 1)
+    with pytest.raises(ManyErrors) as caught:
+        parse_rules(text, "my.rules")
+    lines = [e.where.line for e in caught.value.errors if isinstance(e.where, Place)]
+    assert lines == [2, 6, 8]
+
+
+def test_two_rules_of_one_name_are_a_mistake() -> None:
+    with pytest.raises(RuleError, match="two rules 'r'"):
+        parse_rules(wrap("touching(a, b)") * 2)
+
+
+def test_files_that_cannot_be_read_give_a_clear_word(tmp_path: Path) -> None:
+    with pytest.raises(RuleError, match="cannot be read"):
+        load_rules(tmp_path / "none.rules")
+    (tmp_path / "binary.rules").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(RuleError, match="not text"):
+        load_rules(tmp_path / "binary.rules")
+    (tmp_path / "good.rules").write_text(wrap("touching(a, b)"))
+    assert load_rules(tmp_path / "good.rules")[0].name == "r"
+
+
+def test_an_empty_file_has_no_rules() -> None:
+    assert parse_rules("# nothing here\n") == ()
+
+
+def test_what_a_rule_costs_is_known_when_it_is_loaded() -> None:
+    (rule,) = parse_rules(wrap("eventually[2 s] (gap(a, b) < 3 px until[1 s] touching(a, b))"))
+    assert bounds_of(rule).delay_s == 3.0
+    (facts,) = parse_rules(wrap("touching(a, b) for 20 min"))
+    assert bounds_of(facts).kept < 10
+    (short,), (long,) = (parse_rules(wrap(f"gap(a, b) < 3 px for {n} s")) for n in (1, 10))
+    assert 8 < bounds_of(long).kept / bounds_of(short).kept < 11
+
+
+def test_python_and_text_give_the_same_tree() -> None:
+    text = """
+rule crowd(a, b may repeat): critical
+    when (gap(a, b) + 3 px < 20 px leave 25 px for 1 s or not touching(a, b) within 1 s to 2 s ago)
+        and exists c: (gap(a, c) < 5 px in 60 % of 2 s and abs(speed(a) - speed(c)) < 2 px/s)
+        and touching(a, b) since[3 s] seen(a) and last(rate(gap(a, b), 1 s), 2 s) < -3 px/s
+    unless always coupled(a, b) in 3 of 5 samples
+    hold 2 s
+    cooldown 5 s
+    say "{a} {is} near {b}."
+"""
+    gap, speed, touching = quantity.gap, quantity.speed, fact.touching
+    close = (gap("a", "b") + px(3) < px(20)).leaving(px(25)).lasting(seconds(1))
+    apart = ~touching("a", "b").within(seconds(1), seconds(2))
+    near = (gap("a", "c") < px(5)).often(percent(60), seconds(2))
+    other = exists("c", near & (abs(speed("a") - speed("c")) < px_s(2)))
+    touched = touching("a", "b").since(fact.seen("a"), seconds(3))
+    shrinks = gap("a", "b").over("rate", seconds(1)).over("last", seconds(2)) < px_s(-3)
+    made = build.rule(
+        "crowd", "a b", "critical", (close | apart) & other & touched & shrinks,
+        "{a} {is} near {b}.",
+        unless=always(fact.coupled("a", "b").often(number(3), number(5))),
+        hold=seconds(2), cooldown=seconds(5), may_repeat="b",
+    )  # fmt: skip
+    assert (made,) == parse_rules(text)
+    assert (made,) == parse_rules(str(made))
+
+
+def test_a_rule_in_python_is_checked_as_one_of_a_file_is() -> None:
+    with pytest.raises(RuleError, match="a length is compared with a time"):
+        build.rule("r", "a b", "info", quantity.gap("a", "b") < seconds(3), "{a} {b}")
+
+
+def test_every_relation_is_a_word() -> None:
+    assert set(RELATION_NAMES) <= set(WORDS)

@@ -1,0 +1,251 @@
+"""Operators over time: equal to an oracle, for one signal and for objects that come and go."""
+
+from collections.abc import Iterator
+from math import inf
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.oracles.rule_formulas import (
+    SIGNALS,
+    random_formula,
+    random_times,
+    random_value,
+)
+from tests.oracles.rule_oracle import robustness
+from visup.evaluation.reasoning.rules import alike
+from visup.rules.formula.nodes import Formula, Predicate
+from visup.rules.formula.units import ticks
+from visup.rules.language.parser import parse_formula
+from visup.rules.monitoring.compiler import Compiler
+from visup.rules.monitoring.intervals import Interval
+from visup.rules.monitoring.linker import Layout
+from visup.rules.monitoring.monitor import Monitor, verdict
+from visup.rules.monitoring.operators import most_samples
+from visup.rules.monitoring.states import States
+from visup.rules.predicates.vocabulary import signals
+from visup.rules.safety.compiled_rules import Ruled
+from visup.rules.safety.verdicts import rerowed
+
+History = list[tuple[float, dict[str, Interval]]]
+
+
+def history(rng: Random, times: list[float]) -> History:
+    return [(t, {name: random_value(rng) for name in SIGNALS}) for t in times]
+
+
+def judged(formula: Formula, samples: History) -> list[Interval]:
+    monitor = Monitor(formula)
+    return [monitor.step(t, values) for t, values in samples]
+
+
+@pytest.mark.parametrize("block", range(4))
+def test_random_formulas_with_random_gaps_are_what_the_oracle_says(block: int) -> None:
+    for seed in range(200 * block, 200 * block + 200):
+        rng = Random(f"online {seed}")
+        formula = random_formula(rng, rng.randint(1, 3))
+        samples = history(rng, random_times(rng, rng.randint(4, 20)))
+        truth = robustness(formula, [(ticks(t), v) for t, v in samples])
+        told = judged(formula, samples)
+        assert all(map(alike, told, truth)), f"{seed}: {formula}"
+
+
+def cast(rng: Random, count: int) -> Iterator[tuple[int, ...]]:
+    """Objects that are there, sample by sample: now and then one comes or goes."""
+    here = {1, 2}
+    for _ in range(count):
+        if rng.random() < 0.15:
+            here = here ^ {rng.randint(1, 5)}
+        yield tuple(sorted(here))
+
+
+def sampled(
+    layout: Layout, states: States, now: int, objects: dict[int, dict[str, Interval]]
+) -> tuple[States, Any]:
+    """One sample of the signals of some objects: the states after it, and all intervals."""
+    arena = np.full(layout.size, np.nan)
+    for step, node in layout.program.looks():
+        values = [objects[i][node.name] for i in sorted(objects)]
+        at = layout.places[step]
+        arena[at : at + 2 * layout.n] = np.array(values, dtype=float).reshape(layout.n, 2).T.ravel()
+    return layout.step(states, now, np.zeros(0, np.int8), arena), arena
+
+
+def by_arrays(
+    formula: Formula, times: list[float], seen: list[dict[int, dict[str, Interval]]]
+) -> list[dict[int, Interval]]:
+    """The formula of `a` for all objects at once, as rules are judged."""
+    compiler = Compiler()
+    place = compiler.formula(formula, (("a", False),))
+    prepared = Ruled((), compiler, ())
+    ids = tuple(sorted(seen[0]))
+    states = prepared.fresh(len(ids))
+    told: list[dict[int, Interval]] = []
+    for time, objects in zip(times, seen, strict=True):
+        now = tuple(sorted(objects))
+        if now != ids:
+            states = rerowed(prepared, states, ticks(time), ids, now)
+        ids, layout = now, prepared.layout(len(now))
+        states, arena = sampled(layout, states, ticks(time), objects)
+        told.append({i: layout.interval(place.step, (k,), arena) for k, i in enumerate(ids)})
+    return told
+
+
+@pytest.mark.parametrize("block", range(4))
+def test_of_all_objects_at_once_it_is_the_same_and_who_is_new_has_no_past(block: int) -> None:
+    for seed in range(60 * block, 60 * block + 60):
+        rng = Random(f"arrays {seed}")
+        formula = random_formula(rng, rng.randint(1, 3), ("a",))
+        times = random_times(rng, rng.randint(4, 20))
+        seen = [
+            {i: {name: random_value(rng) for name in SIGNALS} for i in here}
+            for here in cast(rng, len(times))
+        ]
+        told = by_arrays(formula, times, seen)
+        for begin, end, object_id in stays(seen):
+            stay = [(ticks(times[k]), seen[k][object_id]) for k in range(begin, end)]
+            truth = robustness(formula, stay)
+            mine = [told[k][object_id] for k in range(begin, end)]
+            assert all(map(alike, mine, truth)), f"{seed}: {formula}, object {object_id}"
+
+
+def stays(seen: list[dict[int, dict[str, Interval]]]) -> Iterator[tuple[int, int, int]]:
+    """(begin, end, object) of every stretch of samples in which an object is there."""
+    for object_id in {i for objects in seen for i in objects}:
+        begin = None
+        for k in range(len(seen) + 1):
+            here = k < len(seen) and object_id in seen[k]
+            if here and begin is None:
+                begin = k
+            if not here and begin is not None:
+                yield begin, k, object_id
+                begin = None
+
+
+def test_facts_keep_one_moment_and_are_judged_as_the_oracle_judges_numbers_without_end() -> None:
+    """`for` and `within` of what is no matter of degree have an operator of their own."""
+    for seed in range(150):
+        rng = Random(f"facts {seed}")
+        window = rng.choice((40, 80, 200, 500, 1000))
+        text = rng.choice(("x() > 0 for {} ms", "x() > 0 within {} ms", "not (x() > 0 for {} ms)"))
+        formula = parse_formula(text.format(window), signals("x"))
+        times = random_times(rng, 20)
+        codes = [rng.choice((-1, 0, 1)) for _ in times]
+        bounds = {-1: (-inf, -inf), 0: (-inf, inf), 1: (inf, inf)}
+        truth = robustness(
+            formula, [(ticks(t), {"x": bounds[c]}) for t, c in zip(times, codes, strict=True)]
+        )
+        compiler = Compiler()
+        place = compiler.formula(fact_for(formula), (("a", False),))
+        layout = Ruled((), compiler, ()).layout(1)
+        states = layout.fresh
+        for time, code, expected in zip(times, codes, truth, strict=True):
+            arena = np.full(layout.size, np.nan)
+            states = layout.step(states, ticks(time), np.array([code], np.int8), arena)
+            found = layout.interval(place.step, (0,), arena)
+            assert found == expected, f"{seed}: {formula}"
+
+
+def fact_for(formula: Formula) -> Formula:
+    """The same formula of the fact `seen(a)` instead of the comparison."""
+    from dataclasses import replace
+
+    from visup.rules.formula.nodes import Comparison, Not, Past
+
+    if isinstance(formula, Comparison):
+        return Predicate("seen", ("a",))
+    assert isinstance(formula, Not | Past)
+    return replace(formula, part=fact_for(formula.part))
+
+
+def test_an_older_state_goes_on_rightly_after_newer_ones_were_made_from_it() -> None:
+    for seed in range(60):
+        rng = Random(f"branch {seed}")
+        formula = random_formula(rng, 3)
+        times = random_times(rng, 24)
+        common, rest = history(rng, times[:12]), [history(rng, times[12:]) for _ in range(3)]
+        monitor = Monitor(formula)
+        for t, values in common:
+            monitor.step(t, values)
+        fork = monitor.state
+        for branch in (*rest, rest[0]):
+            monitor.state = fork
+            told = [monitor.step(t, values) for t, values in branch]
+            truth = robustness(formula, [(ticks(t), v) for t, v in (*common, *branch)])
+            assert all(map(alike, told, truth[12:])), f"{seed}: {formula}"
+
+
+def size_of(state: Any, counted: set[int]) -> int:
+    """How many cells a state holds that were not counted before."""
+    todo, count = [state], 0
+    while todo:
+        one = todo.pop()
+        if isinstance(one, tuple) and id(one) not in counted:
+            counted.add(id(one))
+            count += 1
+            todo += one
+    return count
+
+
+def test_states_of_many_samples_share_all_but_a_few_cells() -> None:
+    formula = parse_formula("(x() > 1 since[20 s] x() > 2) for 10 s", signals("x"))
+    monitor, rng, states = Monitor(formula), Random(5), []
+    for k in range(3000):
+        monitor.step(k * 0.04, {"x": rng.random() * 3})
+        states.append(monitor.state)
+    counted: set[int] = set()
+    assert sum(size_of(s, counted) for s in states) < 60 * len(states)
+
+
+def test_what_a_window_holds_is_bounded_by_its_length() -> None:
+    monitor = Monitor(parse_formula("x() > 1 for 1 s", signals("x")))
+    sizes = []
+    for k in range(1500):
+        monitor.step(k * 0.01, {"x": float(k % 7)})
+        sizes.append(size_of(monitor.state, set()))
+    # A cell and a value for each sample, and one value more for those that were folded anew.
+    assert max(sizes) <= 3 * most_samples(ticks(1.0)) + 5
+
+
+@pytest.mark.parametrize(
+    ("text", "samples", "expected"),
+    [
+        # Nothing is known of the time before the first sample.
+        ("x() > 1 for 0.1 s", {0.0: 3, 0.1: 2}, [(-inf, 2), (1, 1)]),
+        ("x() > 1 within 0.1 s", {0.0: 0, 0.1: 0.5}, [(-1, inf), (-0.5, -0.5)]),
+        # A window holds the sample that stands where it begins.
+        ("x() > 1 for 0.1 s", {0.0: 0, 0.05: 3, 0.12: 4}, [(-inf, -1), (-inf, -1), (-1, -1)]),
+        # A sample speaks for half a second; then nothing is known.
+        ("x() > 1 for 1 s", {0.0: 3, 0.5: 3, 1.0: 3}, [(-inf, 2), (-inf, 2), (2, 2)]),
+        ("x() > 1 for 1 s", {0.0: 3, 0.5: 3, 1.1: 3}, [(-inf, 2), (-inf, 2), (-inf, 2)]),
+        # The last value is held only when that is asked for.
+        ("last(x() > 1, 0.2 s)", {0.0: 3, 0.1: None, 0.3: None}, [(2, 2), (2, 2), (-inf, inf)]),
+        # Of equal numbers >= holds and > does not.
+        ("x() >= 1", {0.0: 1}, [(1e-300, 1e-300)]),
+        ("x() > 1", {0.0: 1}, [(-1e-300, -1e-300)]),
+        # Once entered, the second threshold counts.
+        ("x() > 5 leave 3", {0: 4, 1: 6, 2: 4, 3: 2, 4: 4},
+         [(-1, -1), (1, 1), (1, 1), (-1, -1), (-1, -1)]),
+        ("x() > 1 in 2 of 3 samples", {0: 2, 0.1: 0, 0.2: 2}, [(-1, 1), (-1, 0), (0, 0)]),
+        ("x() > 1 in 50 % of 0.2 s", {0: 2, 0.1: 0, 0.2: 0, 0.3: 0},
+         [(-0.5, 0.5), (0, 0.5), (0, 0), (-0.5, -0.5)]),
+        ("eventually[0.1 s] x() > 1", {0: 3, 0.1: 0, 0.2: 0.5}, [(2, inf), (2, 2), (-0.5, -0.5)]),
+        ("rate(x(), 0.2 s) > 1 /s", {0: 1, 0.1: 3, 0.2: 2}, [(-inf, inf), (-inf, inf), (4, 4)]),
+        ("once x() > 1 and not always x() > 1", {0: 3, 0.1: 0}, [(-2, -2), (1, 1)]),
+        ("x() < 2 since x() > 3", {0: 4, 0.1: 1, 0.2: 5, 0.3: 2.5}, [(1, 1), (1, 1), (2, 2), (-0.5, -0.5)]),
+    ],
+)  # fmt: skip
+def test_examples(text: str, samples: dict[float, float | None], expected: list[Interval]) -> None:
+    monitor = Monitor(parse_formula(text, signals("x")))
+    told = [monitor.step(t, {"x": v}) for t, v in samples.items()]
+    assert all(map(alike, told, expected)), told
+
+
+def test_a_verdict_of_the_future_comes_late_and_what_stands_beside_it_waits() -> None:
+    both = "x() > 1 and eventually[0.2 s] x() > 5"
+    monitor = Monitor(parse_formula(both, signals("x")))
+    assert monitor.delay == pytest.approx(0.2)
+    told = [monitor.step(k / 10, {"x": x}) for k, x in enumerate((2.0, 0.0, 9.0, 0.0, 0.0))]
+    assert [verdict(t).value for t in told] == ["unknown", "unknown", "true", "false", "true"]

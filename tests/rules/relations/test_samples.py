@@ -1,0 +1,75 @@
+"""Samples of many minds in one memory: no history is changed by what comes after it."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from visup.agent.storage.checkpoint import frozen, thawed
+from visup.rules.geometry.regions import FAN
+from visup.rules.relations.samples import ROOM, History, extended, without
+
+Row = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def row(time: float) -> Row:
+    """A sample of one object, told apart by its time."""
+    return (
+        time,
+        np.full((1, FAN), time),
+        np.full((1, FAN), round(time) % 2 == 0),
+        np.full((1, 1), -time),
+        np.full(1, 10 * time),
+    )
+
+
+def empty() -> History:
+    blank = np.zeros((0, 1, FAN))
+    return History((1,), np.zeros(0), blank, blank > 0, np.zeros((0, 1, 1)), np.zeros((0, 1)))
+
+
+def holds(history: History, times: list[float]) -> bool:
+    """Whether a history is what a plain list of its samples would be."""
+    rows = [row(t) for t in times]
+    wanted = [np.array([r[k] for r in rows]) for k in range(5)]
+    return all(
+        np.array_equal(a, w.reshape(a.shape)) for a, w in zip(history.arrays, wanted, strict=True)
+    )
+
+
+STEPS = st.lists(
+    st.tuples(st.integers(0, 10**6), st.sampled_from(["add", "drop", "freeze"])), max_size=60
+)
+
+
+@settings(deadline=None)
+@given(STEPS, st.integers(0, ROOM + 3))
+def test_histories_that_branch_and_forget_stay_as_plain_lists(
+    steps: list[tuple[int, str]], begun: int
+) -> None:
+    """Any history made so far may go on, be shortened, or be written to a file and read back."""
+    first, times = empty(), [float(t) for t in range(begun)]
+    for t in times:
+        first = extended(first, row(t))
+    made = [(first, times)]
+    for number, (pick, what) in enumerate(steps):
+        history, known = made[pick % len(made)]
+        if what == "add":
+            time = 1000.0 + number
+            made.append((extended(history, row(time)), [*known, time]))
+        elif what == "drop":
+            made.append((without(history, min(2, len(known))), known[2:]))
+        else:
+            made.append((thawed(frozen(history)), known))
+    assert all(holds(history, known) for history, known in made)
+
+
+def test_minds_in_a_row_share_the_memory_of_their_samples() -> None:
+    """A hundred kept histories of a window of 30 samples take less than a tenth of their length."""
+    history, kept = empty(), []
+    for t in range(150):
+        history = extended(without(history, max(0, len(history.times) - 29)), row(float(t)))
+        kept.append(history)
+    memory = {id(h.support.base): h.support.base for h in kept[50:]}
+    assert all(m is not None for m in memory.values())
+    taken = sum(m.nbytes for m in memory.values() if m is not None)
+    assert taken < 0.1 * sum(h.support.nbytes for h in kept[50:])

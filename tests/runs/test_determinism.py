@@ -1,0 +1,39 @@
+"""The same input gives the same bytes: twice, and however many cores there are."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EVERY = 6
+
+RUN = """
+import os, sys
+from pathlib import Path
+cores = [int(c) for c in sys.argv[2].split(",")]
+os.sched_setaffinity(0, cores)
+from visup.runs.demo import demo_settings
+from visup.runs.runner import RunOptions, supervise
+folder = Path(sys.argv[1])
+folder.mkdir()
+supervise(demo_settings(int(sys.argv[3])), folder, options=RunOptions(video=False, report=False))
+"""
+
+
+def told(folder: Path, cores: list[int]) -> bytes:
+    subprocess.run(
+        [sys.executable, "-c", RUN, str(folder), ",".join(map(str, cores)), str(EVERY)], check=True
+    )
+    return (folder / "events.jsonl").read_bytes()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
+def test_events_are_the_same_byte_for_byte_on_one_core_and_on_all(tmp_path: Path) -> None:
+    cores = sorted(os.sched_getaffinity(0))
+    one = told(tmp_path / "one", cores[:1])
+    assert b'"stage_failing"' in one
+    assert told(tmp_path / "all", cores) == one

@@ -1,0 +1,126 @@
+"""Reasons go down to percepts; what is missing is told with its amount."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.stepping.timelines import reasoning_stepper
+from visup.agent import Hypothesis, Region
+from visup.agent.model.errors import VisupError
+from visup.stepping import Stepper
+from visup.stepping.explanations.evidence import Why
+from visup.terminal.display import html, shown
+
+
+@pytest.fixture(scope="module")
+def it() -> Stepper:
+    stepper = reasoning_stepper(100)
+    stepper.step(100)
+    return stepper
+
+
+def test_an_alert_goes_back_to_the_percepts_of_the_frame_that_opened_it(it: Stepper) -> None:
+    why = it.why("alert 1")
+    assert (why.frame_index, why.text.split(":")[0]) == (15, "alert 1, unexpected_object")
+    texts = [w.text for w in why.walk()]
+    assert "in_view(the hubble) > 0.5 s is true, by 0.1" in texts
+    found = [p.value for p in why.percepts]
+    assert [p.time for p in why.percepts] == [0.6] * len(found)
+    assert [v.id for v in found if isinstance(v, Region)] == [2]
+    assert {v.name for v in found if isinstance(v, Hypothesis)} == {"hubble", "arm"}
+    seen = it.seen_at(16)
+    assert {id(type(v)) for v in found} <= {id(type(v)) for k in KINDS for v in seen.of(k)}
+
+
+KINDS = ("region", "hypothesis", "depth")
+
+TOLD = {
+    "verdict": ("the verdict on dock is interrupted", "unexpected_object(the hubble) is true"),
+    "approach": ("stage approach is failing", "the arm and the satellite have been diverging"),
+    "stage captured": ("stage captured is pending", "arm is played by object 3"),
+    "touching 1 2": ("touching(the satellite, the hubble) is false", "its quantity is"),
+    "coupled 1 3": ("coupled(the satellite, the arm) is false", "touching"),
+    "identity 1": ("object 1 is spartan", "votes, share"),
+    "object 3": ("object 3 is believed to be seen", "first seen at 0.00 s"),
+    "collision_course 1 2": ("collision_course(the", "converging("),
+    "rule unexpected_object 2": ("unexpected_object(the hubble) is true", "in_view"),
+}
+
+
+@pytest.mark.parametrize("text", TOLD)
+def test_why_has_its_reasons_and_its_percepts(it: Stepper, text: str) -> None:
+    why = it.why(text)
+    head, below = TOLD[text]
+    assert why.text.startswith(head)
+    assert any(below in w.text for w in why.walk())
+    assert any(isinstance(p.value, Region | Hypothesis) for p in why.percepts)
+
+
+def test_records_themselves_can_be_asked_about(it: Stepper) -> None:
+    mind = it.mind
+    asked = [mind.alerts[0], mind.objects[1], mind.tasks[0], mind.tasks[0].stages[0]]
+    asked += [next(iter(mind.relations))]
+    assert all(it.why(what).percepts for what in asked)
+
+
+def test_every_event_has_a_reason_that_ends_in_percepts(it: Stepper) -> None:
+    told = [e for _, e in it.told()]
+    assert {e.kind for e in told} >= {"entry", "identified", "alert", "verdict", "relation"}
+    for event in told:
+        why = it.why(event)
+        assert why.frame_index == event.frame_index
+        assert why.percepts, event.kind
+
+
+MISSING = {
+    "coupled 1 2": "log odds that they touch and are at rest 0 of 5: 5 short",
+    "collision_course": "time_to_contact(",
+    "collision_course 1 2": "converging(the satellite, the hubble) is false",
+    "stage captured": "before it, approach is failing",
+    "captured": "awaited: coupled(the arm, the satellite) is false",
+    "approach": "stage approach has begun",
+    "exit 2": "missing for 0 s of 0.3 s: 0.3 s short",
+    "occlusion 1": "100% of it shows",
+    "reappearance 1": "object 1 is seen",
+    "identified 1": "was identified as spartan",
+    "entry 1": "has entered",
+    "touching 1 2": "its quantity is",
+    "touching 1 9": "object 9 is not believed to be there",
+    "unexpected_object": "alert 1 is open since 0.60 s",
+}
+
+
+@pytest.mark.parametrize("text", MISSING)
+def test_what_is_missing_is_told(it: Stepper, text: str) -> None:
+    assert any(MISSING[text] in w.text for w in it.why_not(text).walk())
+
+
+def test_what_was_missing_then_is_told_of_the_past() -> None:
+    it = reasoning_stepper()
+    it.step(6)
+    entry = [w.text for w in it.why_not("entry 1").walk()]
+    assert "seen steadily for 0.2 s of 0.36 s: 0.16 s short" in entry
+    it.step(9)
+    named = [w.text for w in it.why_not("identified 1").walk()]
+    assert any("leads for" in w and w.endswith("short") for w in named)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "nonsense", "alert 7", "object 9", "touching 1 9", "relation", "rule nothing 1"]
+)
+def test_what_nobody_knows_is_refused_in_words(it: Stepper, text: str) -> None:
+    with pytest.raises(VisupError):
+        it.why(text)
+
+
+@pytest.mark.parametrize("text", ["", "coupled 1", "object 1", "entry 9", "stage nothing"])
+def test_what_cannot_be_missing_is_refused_in_words(it: Stepper, text: str) -> None:
+    with pytest.raises(VisupError):
+        it.why_not(text)
+
+
+def test_reasons_show_themselves() -> None:
+    why = Why("a", (Why("b", (Why("c"),)),), 3, 0.5)
+    assert str(why) == "a [frame 3, 0.50 s]\n  b\n    c"
+    assert "frame 3" in html(why)
+    assert shown(why) is not None

@@ -1,0 +1,179 @@
+"""What if: a branch holds to its beliefs, and leaves the course that it left as it was."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.stepping.timelines import reasoning_bytes, reasoning_course, reasoning_stepper, told
+from visup.agent import Presence, Relation, RelationTable, Truth
+from visup.agent.model.errors import SettingsError
+from visup.rules.language.parser import parse_rules
+from visup.stepping import Stepper
+from visup.stepping.what_if import (
+    Belief,
+    IdentityIs,
+    PresenceIs,
+    RelationIs,
+    with_relation,
+    with_rules,
+    with_tasks,
+)
+from visup.tasks import load_tasks
+from visup.terminal.what_if_commands import supposed
+
+RULE = parse_rules('rule seen_one(a): info when seen(a) say "{a} is seen."')
+
+
+def at(number: int = 30) -> Stepper:
+    it = reasoning_stepper()
+    it.step(number)
+    return it
+
+
+@pytest.mark.parametrize(
+    "belief",
+    [
+        RelationIs("touching", (1, 3), Truth.TRUE, 1.2),
+        RelationIs("coupled", (1, 2), Truth.TRUE, 1.2),
+        RelationIs("diverging", (1, 3), Truth.FALSE, 1.2),
+        RelationIs("converging", (3, 1), Truth.TRUE, 1.2),
+        RelationIs("touching", (1, 2), Truth.UNKNOWN, 1.2),
+        IdentityIs(2, "arm"),
+        IdentityIs(1, "unknown object"),
+        PresenceIs(3, Presence.LEFT),
+        PresenceIs(1, Presence.HIDDEN),
+    ],
+)
+def test_a_branch_holds_to_its_belief_and_the_course_stays(belief: Belief) -> None:
+    it = at()
+    branch = it.branch(belief)
+    assert is_so(branch, belief)
+    for _ in range(20):
+        branch.step()
+        assert is_so(branch, belief)
+    assert it.at == 30
+    real: list[bytes] = []
+    it.step(20, tell=lambda step: real.append(told(step)))
+    assert real == list(reasoning_bytes()[30:50])
+
+
+def is_so(it: Stepper, belief: Belief) -> bool:
+    mind = it.mind
+    match belief:
+        case RelationIs(name=name, objects=objects, truth=truth, since=since):
+            found = mind.relation(name, *objects)
+            coupled = name != "coupled" or mind.coupled(*objects) is (truth is Truth.TRUE)
+            measured = truth is not Truth.TRUE  # what is measured so anyway has its own time
+            return (
+                found is not None
+                and found.truth is truth
+                and coupled
+                and (measured or found.since == since)
+            )
+        case IdentityIs(object_id=number, name=name):
+            return (mind.objects[number].name, mind.objects[number].confidence) == (name, 1.0)
+        case PresenceIs(object_id=number, presence=presence):
+            return mind.objects[number].presence is presence
+    return False
+
+
+def test_a_branch_without_beliefs_is_the_very_course() -> None:
+    it = at(17)
+    branch = it.branch()
+    made: list[bytes] = []
+    branch.step(30, tell=lambda step: made.append(told(step)))
+    assert made == list(reasoning_bytes()[17:47])
+    assert not branch.compare()
+    assert it.at == 17
+    branch.back(20)
+    assert told(branch.last) == reasoning_bytes()[26]
+    with pytest.raises(SettingsError, match="at least 17"):
+        branch.go(16)
+
+
+def test_other_rules_and_tasks_say_something_else_on_a_branch() -> None:
+    it = at(10)
+    rules = it.branch(thinkers=with_rules(it.agent.thinkers, RULE))
+    rules.step(20)
+    changed = rules.compare()
+    assert {e["data"]["alert_kind"] for e in changed.new if e["kind"] == "alert"} == {"seen_one"}
+    assert [e["data"]["alert_kind"] for e in changed.gone if e["kind"] == "alert"] == [
+        "unexpected_object"
+    ]
+    task = it.branch(thinkers=with_tasks(it.agent.thinkers, load_tasks("undock")))
+    task.step(5)
+    assert [t.task for t in task.mind.tasks] == ["undock"]
+    none = it.branch(thinkers=with_tasks(it.agent.thinkers, ()))
+    none.step(5)
+    assert none.mind.tasks == ()
+    assert [t.task for t in it.mind.tasks] == ["dock"]
+
+
+def test_an_answer_in_the_past_is_given_on_a_branch() -> None:
+    it = at(40)
+    it.go(30)
+    branch = it.branch()
+    branch.answer(2, "arm")
+    branch.step(10)
+    changed = branch.compare()
+    assert next(e["kind"] for e in changed.new) == "answer"
+    assert branch.mind.objects[2].name == "arm"
+    assert it.mind_at(40).objects[2].name == "hubble"
+    with pytest.raises(SettingsError, match="this is no branch"):
+        it.compare()
+
+
+def test_a_relation_is_replaced_and_no_other() -> None:
+    table = reasoning_course()[-1].mind.relations
+    assert isinstance(table, RelationTable)
+    other = with_relation(table, Relation("touching", (3, 2), Truth.TRUE, 0.5))
+
+    def true(relations: RelationTable) -> set[tuple[str, tuple[int, ...]]]:
+        return {(r.name, r.objects) for r in relations.all() if r.truth is Truth.TRUE}
+
+    assert isinstance(other, RelationTable)
+    assert true(other) - true(table) == {("touching", (2, 3))}
+    assert true(table) <= true(other)
+
+
+GOOD = {
+    "touching 1 2": RelationIs("touching", (1, 2), Truth.TRUE, 2.36),
+    "relation touching(2, 1) false": RelationIs("touching", (2, 1), Truth.FALSE, 2.36),
+    "object 2 arm": IdentityIs(2, "arm"),
+    "object 1 satellite": IdentityIs(1, "spartan"),
+    "object 3 hidden": PresenceIs(3, Presence.HIDDEN),
+    "object 1 unknown": IdentityIs(1, "unknown object"),
+}
+
+
+@pytest.mark.parametrize("text", list(GOOD))
+def test_beliefs_can_be_told_in_words(text: str) -> None:
+    assert supposed(reasoning_course()[-1].mind, text.split()) == GOOD[text]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "nothing is supposed"),
+        ("touchin 1 2", "did you mean 'touching'"),
+        ("touching 1", "no relation of two objects"),
+        ("touching 1 2 maybe", "no relation of two objects"),
+        ("touching 1 9", "there is no object 9"),
+        ("object 9 arm", "there is no object 9"),
+        ("object arm", "what of which object"),
+        ("object 1", "what of which object"),
+        ("object 1 arn", "did you mean 'arm'"),
+    ],
+)
+def test_what_is_no_belief_is_refused_in_words(text: str, said: str) -> None:
+    with pytest.raises(SettingsError) as fault:
+        supposed(reasoning_course()[-1].mind, text.split())
+    assert said in str(fault.value)
+
+
+def test_a_belief_is_retracted() -> None:
+    mind = reasoning_course()[-1].mind
+    assert supposed(mind, ["touching", "1", "2"], retract=True) == RelationIs(
+        "touching", (1, 2), Truth.UNKNOWN, mind.time
+    )
+    assert supposed(mind, ["object", "1"], retract=True) == IdentityIs(1, "unknown object")

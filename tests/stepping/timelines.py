@@ -1,0 +1,71 @@
+"""Agents with what they perceive, for tests of stepping."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from tests.agent.scripted import Scripted, counting, frames, worried_while
+from visup.agent import Directive, Mind, Observation, Outcome
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.step import Step
+from visup.agent.storage.checkpoint import frozen
+from visup.evaluation.runtime.soak import scripted
+from visup.evaluation.runtime.stepping import whole
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import reasoning_agent
+from visup.stepping import GivenFeed, Stepper
+
+COUNT = 60
+SETTINGS = WatchSettings(
+    "scripted", tasks=("dock",), actors={"satellite": ("spartan",), "arm": ("arm",)}
+)
+
+
+def asking(mind: Mind, seen: Observation) -> Outcome:
+    """Asks for something else in each step."""
+    wish = Directive("expect_regions", "There should be some.", {"count": seen.frame_index % 3})
+    return Outcome(mind, directives=(wish,))
+
+
+def plain_agent() -> Agent:
+    """Counts, is worried for a while, and sees what it was asked for."""
+    thinkers = Thinkers(
+        update=(counting,), cogitate=(worried_while(lambda t: 1.0 <= t < 2.5),), match=(asking,)
+    )
+    return Agent([Scripted("eye", ("x",), lambda i: (i * 7) % 5)], thinkers)
+
+
+def plain_stepper(count: int = COUNT) -> Stepper:
+    return Stepper(plain_agent(), frames(count), spacing=7, latest=5)
+
+
+def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> Stepper:
+    """Three bodies that are recognised, a task, the shipped rules."""
+    feed = GivenFeed(scripted(count))
+    return Stepper(reasoning_agent(SETTINGS), feed, spacing=spacing, latest=latest)
+
+
+def told(step: Step | None) -> bytes:
+    """All that a step came to, as bytes."""
+    assert step is not None
+    return frozen((whole(step.mind), step.events, step.alerts, step.directives))
+
+
+@cache
+def plain_course() -> tuple[bytes, ...]:
+    """What the steps of `plain_stepper` come to when they are simply made."""
+    return tuple(told(s) for s in plain_agent().steps(frames(COUNT)))
+
+
+@cache
+def reasoning_course(count: int = COUNT) -> tuple[Step, ...]:
+    """The steps of `reasoning_stepper` when they are simply made."""
+    agent = reasoning_agent(SETTINGS)
+    return tuple(agent.rethink(seen) for seen in scripted(count))
+
+
+@cache
+def reasoning_bytes() -> tuple[bytes, ...]:
+    """What the steps of `reasoning_stepper` come to when they are simply made, and not looked into."""
+    agent = reasoning_agent(SETTINGS)
+    return tuple(told(agent.rethink(seen)) for seen in scripted(COUNT))

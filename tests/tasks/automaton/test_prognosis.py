@@ -1,0 +1,133 @@
+"""What supervision tells beyond statuses: how sure it is, what comes next, what is taken back."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from tests.tasks.scripted import Played, Script, Spell, play
+from visup.agent import TaskBelief, Verdict
+from visup.tasks import load_task, parse_task
+from visup.tasks.automaton.recognise import Recogniser
+from visup.tasks.automaton.stage_hmm import SUPERVISED, Seen
+from visup.tasks.supervision.sentences import prospects_text
+from visup.tasks.supervision.supervise import task_thinker
+
+FAILS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 12.8),
+    Spell("diverging", 12.8, 30),
+)
+SUCCEEDS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 30),
+    Spell("coupled", 13.0, 30),
+)
+
+
+def watch(*spells: Spell, until: float = 26.0, text: str = "", fps: float = 10.0) -> Played:
+    task = parse_task(text) if text else load_task("dock")
+    return play(task_thinker([task]), Script(spells), until, fps)
+
+
+def belief(played: Played, time: float) -> TaskBelief:
+    return played.at(time).tasks[0]
+
+
+@pytest.mark.parametrize("spells", [FAILS, SUCCEEDS])
+def test_readings_share_all_probability_and_the_likeliest_is_told(
+    spells: tuple[Spell, ...],
+) -> None:
+    played = watch(*spells)
+    for mind in played.minds[5:]:
+        readings = mind.memory["tasks"][0].readings
+        masses = [r.mass for r in readings]
+        assert math.isclose(sum(masses), 1.0)
+        assert masses == sorted(masses, reverse=True)
+        assert mind.tasks[0].confidence == masses[0]
+
+
+def test_how_sure_it_is_does_not_hang_on_the_frame_rate() -> None:
+    runs = [watch(*FAILS, until=15.0, fps=fps) for fps in (5.0, 10.0, 25.0)]
+    for time in (8.0, 12.6, 15.0):
+        told = [belief(run, time).confidence for run in runs]
+        assert max(told) - min(told) < 0.1
+
+
+def test_what_comes_next_is_told_with_its_probability() -> None:
+    played = watch(*SUCCEEDS)
+    early = belief(played, 6.0)
+    assert [p.stage for p in early.prospects] == ["captured"]
+    assert early.prospects[0].probability > 0.8
+    assert sum(p.probability for p in belief(played, 14.5).prospects) < 0.2
+    retry = watch(
+        *FAILS,
+        text="<t> ::= <go> (<on> | <back> <t>)\n<go> ::= converging(arm, satellite)\n"
+        "<on> ::= coupled(arm, satellite)\n<back> ::= diverging(arm, satellite)",
+    )
+    told = {p.stage: p.probability for p in belief(retry, 0.8).prospects}
+    assert told == {"on": pytest.approx(0.5, abs=0.1), "back": pytest.approx(0.5, abs=0.1)}
+
+
+def test_success_falls_with_a_failure_and_rises_towards_the_end() -> None:
+    good, bad = watch(*SUCCEEDS), watch(*FAILS)
+
+    def hope(played: Played, time: float) -> float:
+        found = belief(played, time).success
+        assert found is not None
+        return found
+
+    assert hope(good, 20.0) > hope(good, 13.0) > hope(good, 5.0) > 0.6
+    assert hope(good, 20.0) > 0.95
+    assert hope(bad, 15.0) < hope(bad, 12.7) / 2
+    assert belief(bad, 25.0).verdict is Verdict.FAILED
+    assert hope(bad, 25.0) == 0.0
+
+
+def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> None:
+    played = watch(
+        Spell("converging", 0.5, 5.0),
+        Spell("touching", 4.8, 5.3),  # a glimpse of a touch, and the approach goes on
+        Spell("converging", 6.0, 60.0),
+        until=50.0,
+    )
+    assert belief(played, 8.0).current == "captured"
+    assert played.last.tasks[0].current == "approach"
+    taken = [e for e in played.events if e.kind == "stage_revised"]
+    assert [e.data["stage"] for e in taken] == ["approach"]
+    assert "told done at 5." in taken[0].text
+    assert "is now believed not to have happened" in taken[0].text
+    assert not [e for e in watch(*SUCCEEDS).events if e.kind == "stage_revised"]
+
+
+def test_a_relation_that_is_not_sure_counts_for_less() -> None:
+    for seen in (Seen.NEITHER, Seen.CONTRARY):
+        fits = [SUPERVISED.fit(seen, sure, 1.0) for sure in (1.0, 0.7, 0.3, 0.0)]
+        assert fits == sorted(fits)
+        assert fits[-1] == pytest.approx(1.0)
+    halves = SUPERVISED.fit(Seen.CONTRARY, 0.8, 0.5) ** 2
+    assert halves == pytest.approx(SUPERVISED.fit(Seen.CONTRARY, 0.8, 1.0))
+
+
+def test_prospects_are_said_in_one_line() -> None:
+    played = watch(*SUCCEEDS)
+    said = prospects_text(belief(played, 6.0))
+    assert said.startswith("next: `captured` (")
+    assert "ends well with a probability of 8" in said
+    assert prospects_text(TaskBelief("t", Verdict.UNKNOWN)) == "next: not known"
+
+
+def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:
+    fit = SUPERVISED.fit
+    order = [fit(s, 1.0, 1.0) for s in (Seen.CONTRARY, Seen.NEITHER, Seen.UNKNOWN, Seen.HOLDS)]
+    assert order == sorted(order)
+
+
+def test_a_stage_that_comes_back_to_itself_inside_another_is_not_looked_into_for_ever() -> None:
+    task = parse_task(
+        "<t> ::= <loop>\n<loop> ::= converging(arm, satellite)"
+        " | touching(arm, satellite) & (diverging(arm, satellite) <loop>)"
+    )
+    recogniser = Recogniser(task)
+    assert 0.0 < recogniser.success(recogniser.start()) < 1.0

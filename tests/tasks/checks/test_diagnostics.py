@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import time
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.paths import ROOT
+from visup.agent.model.errors import ManyErrors, Place, TaskError
+from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
+from visup.tasks import load_task, parse_task, shipped_tasks
+from visup.tasks.actions.actions import Meaning
+from visup.tasks.checks.examine import examine
+from visup.tasks.checks.load import read_text
+from visup.tasks.diagnostics.diagnostic import CODES, TaskFault, closest
+from visup.tasks.grammar.structure import stage_names, task_actors
+
+HERE = ROOT / "tests/tasks"
+GOOD = sorted((HERE / "good").glob("*.task"))
+BAD = sorted((HERE / "bad").glob("*.task"))
+
+
+def text_of(path: Path) -> str:
+    return path.read_bytes().decode("utf-8")
+
+
+def expected_of(text: str, word: str) -> list[str]:
+    line = next(x for x in text.splitlines() if x.startswith(f"# {word}:"))
+    return line.split(":", 1)[1].split()
+
+
+@pytest.mark.parametrize("path", GOOD, ids=lambda p: p.stem)
+def test_good_files_have_the_stages_and_actors_that_they_say(path: Path) -> None:
+    text = text_of(path)
+    task = parse_task(text, path.name)
+    assert list(stage_names(task)) == expected_of(text, "stages")
+    assert sorted(task_actors(task)) == sorted(expected_of(text, "actors"))
+    assert parse_task(str(task)) == task
+
+
+@pytest.mark.parametrize("path", BAD, ids=lambda p: p.stem)
+def test_bad_files_are_told_as_written_beside_them(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(path.parent)  # where they look for what they include
+    _, faults = examine(text_of(path), path.name)
+    assert "".join(f"{f}\n" for f in faults) == path.with_suffix(".txt").read_text("utf-8")
+
+
+def test_bad_files_with_one_mistake_give_one_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(HERE / "bad")
+    several = {"three_mistakes": 3, "everything": 6, "typographic": 2}
+    for path in BAD:
+        _, faults = examine(text_of(path), path.name)
+        assert len(faults) == several.get(path.stem, 1), path.stem
+
+
+def test_every_code_is_shown_by_a_bad_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(HERE / "bad")
+    shown = {f.code for p in BAD for f in examine(text_of(p), p.name)[1]}
+    assert shown | {"E231"} == set(CODES)
+
+
+def test_an_action_that_needs_percepts_which_nothing_gives_is_told() -> None:
+    text = "<dock> ::= depth_difference(arm, satellite) < 10 % coupled(arm, satellite)"
+    assert examine(text)[1] == []
+    _, faults = examine(text, percepts=frozenset({"region", "health"}))
+    assert [f.code for f in faults] == ["E231"]
+    assert "`depth` and `hypothesis`" in faults[0].message
+    mine = {"gripped": Meaning("gripped", ("gripped",), arity=1, needs=frozenset({"gripper"}))}
+    _, faults = examine("<t> ::= gripped(part)", actions=mine)
+    assert [f.code for f in faults] == ["E231"]
+
+
+def test_three_mistakes_are_raised_together() -> None:
+    with pytest.raises(ManyErrors) as caught:
+        load_task(HERE / "bad" / "three_mistakes.task")
+    codes = [e.code for e in caught.value.errors if isinstance(e, TaskFault)]
+    assert codes == ["E102", "E201", "E117"]
+    for error in caught.value.errors:
+        assert isinstance(error.where, Place)
+        assert error.where.caret() in str(caught.value)
+
+
+@pytest.mark.parametrize("name", shipped_tasks())
+def test_shipped_tasks_are_free_of_mistakes_and_named_as_their_file(name: str) -> None:
+    task = load_task(name)
+    assert task.name == name
+    assert read_text(name).startswith(f"# {name}.task: ")
+
+
+def test_there_are_at_least_five_shipped_tasks() -> None:
+    assert len(shipped_tasks()) >= 5
+    assert "dock" in shipped_tasks()
+
+
+def test_a_task_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(TaskError, match=r"no such task file[\s\S]*dock[\s\S]*did you mean"):
+        load_task("docks")
+    with pytest.raises(TaskError, match="cannot be read"):
+        load_task(tmp_path)
+    (tmp_path / "x.task").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(TaskError, match="not UTF-8"):
+        load_task(tmp_path / "x.task")
+
+
+def test_a_bad_rule_hides_neither_the_others_nor_what_it_defines() -> None:
+    text = (
+        "<dock> ::= <a> <b> <c>\n"
+        "<a> ::= converging(arm satellite)\n"
+        "<b> ::= cupled(arm, satellite)\n"
+        "<c> ::= coupled(arm)\n"
+    )
+    _, faults = examine(text)
+    assert [(f.code, f.place.line) for f in faults] == [("E117", 2), ("E201", 3), ("E205", 4)]
+
+
+def test_the_nearest_word_is_named_whatever_its_case() -> None:
+    assert closest("Convergin", ["converging", "diverging"]) == "converging"
+    assert closest("zzz", ["converging"]) is None
+
+
+def test_whatever_stands_in_a_file_is_read_or_told_with_its_place() -> None:
+    found = fuzz(400, seed=7)
+    assert (found.raised, found.placeless, found.unstable, found.slow) == ([], [], [], [])
+    assert found.good > 0
+    assert len(found.codes) > 30
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(max_size=60))
+def test_any_text_at_all_is_read_or_told(text: str) -> None:
+    _, faults = examine(text)
+    assert all(isinstance(f, TaskFault) for f in faults)
+
+
+@pytest.mark.parametrize(("name", "text"), list(long_files(2000)))
+def test_long_files_are_read_in_good_time(name: str, text: str) -> None:
+    start = time.perf_counter()
+    _, faults = examine(text)
+    assert time.perf_counter() - start < 5.0  # the bar is 2.5 s for 10,000; others may work beside
+    assert len(faults) == (1999 if name == "mistaken" else 0)
+
+
+def test_a_usual_file_is_read_at_once() -> None:
+    assert seconds(read_text("inspect"), 20) < 0.05  # the bar is 10 ms
+
+
+def test_many_stages_that_double_each_other_are_no_trap() -> None:
+    doubled = [f"<s{i}> ::= (<s{i + 1}> | gone(x)) <s{i + 1}>" for i in range(60)]
+    start = time.perf_counter()
+    assert examine("\n".join([*doubled, "<s60> ::= seen(a)"]))[1] == []
+    assert time.perf_counter() - start < 1.0
+
+
+def test_the_grammar_is_read_from_its_file() -> None:
+    grammar = files("visup.tasks.grammar").joinpath("tasks.lark").read_text("utf-8")
+    assert '"within"' in grammar

@@ -1,0 +1,96 @@
+"""Every shipped task, lived through on a clear day and on a bad one."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.tasks.scripted import Script, Spell, play
+from visup.agent import Verdict
+from visup.tasks import load_task, shipped_tasks
+from visup.tasks.grammar.structure import task_actors
+from visup.tasks.supervision.supervise import finish, task_thinker
+
+Days = dict[str, list[tuple[str, float, float, tuple[int, int]]]]
+A, B, C = (1, 2), (2, 3), (1, 3)
+
+GOOD: Days = {
+    "dock": [("converging", 0, 5, A), ("touching", 5, 9, A), ("coupled", 6, 9, A)],
+    "dock_with_retry": [
+        ("converging", 0, 5, A),
+        ("diverging", 5, 8, A),
+        ("converging", 9, 12, A),
+        ("touching", 12, 16, A),
+        ("coupled", 13, 16, A),
+    ],
+    "undock": [("coupled", 0, 5, A), ("touching", 0, 6, A), ("diverging", 6, 12, A)],
+    "inspect": [
+        ("converging", 0, 5, A),
+        ("keeping_distance", 5, 27, A),
+        ("diverging", 27, 32, A),
+    ],
+    "station_keeping": [("converging", 0, 20, A), ("keeping_distance", 20, 55, A)],
+    # gripper 1, part 2, fixture 3
+    "pick_and_place": [
+        ("converging", 0, 5, A),
+        ("touching", 5, 20, A),
+        ("coupled", 6, 18, A),
+        ("converging", 8, 14, B),
+        ("touching", 14, 30, B),
+        ("diverging", 20, 25, A),
+    ],
+    # giver 1, payload 2, receiver 3
+    "handover": [
+        ("coupled", 0, 12, A),
+        ("touching", 0, 13, A),
+        ("converging", 0, 6, B),
+        ("touching", 6, 20, B),
+        ("coupled", 7, 20, B),
+        ("diverging", 13, 18, A),
+    ],
+}
+BAD: Days = {
+    "dock": [("converging", 0, 5, A), ("touching", 5, 6, A), ("diverging", 6, 12, A)],
+    "dock_with_retry": [("converging", 0, 5, A), ("touching", 5, 8, A), ("diverging", 8, 20, A)],
+    "undock": [("coupled", 0, 5, A), ("diverging", 6, 8, A), ("converging", 8, 12, A)],
+    "inspect": [("converging", 0, 5, A), ("touching", 5, 9, A)],
+    "station_keeping": [("converging", 0, 20, A), ("diverging", 20, 40, A)],
+    "pick_and_place": [
+        ("converging", 0, 5, A),
+        ("touching", 5, 10, A),
+        ("coupled", 6, 10, A),
+        ("converging", 8, 10, B),
+        ("diverging", 10, 20, A),
+    ],
+    "handover": [
+        ("coupled", 0, 5, A),
+        ("converging", 0, 5, B),
+        ("diverging", 5, 15, A),
+    ],
+}
+
+
+def lived(name: str, days: Days) -> Verdict:
+    task = load_task(name)
+    numbers = {a: i for i, a in enumerate(task_actors(task), 1)}
+    if name == "handover":
+        numbers = {"giver": 1, "payload": 2, "receiver": 3}
+    identities = {i: {task.models(a)[0]: 0.9} for a, i in numbers.items()}
+    spells = tuple(Spell(n, a, b, pair) for n, a, b, pair in days[name])
+    objects = dict.fromkeys(numbers.values(), (0.0, 1e9))
+    until = max(s.to_s for s in spells)
+    script = Script(spells, objects, identities=identities)
+    return finish(play(task_thinker([task]), script, until, fps=5.0).last.tasks[0])
+
+
+@pytest.mark.parametrize("name", shipped_tasks())
+def test_a_good_day_succeeds(name: str) -> None:
+    assert lived(name, GOOD) is Verdict.SUCCEEDED
+
+
+@pytest.mark.parametrize("name", shipped_tasks())
+def test_a_bad_day_does_not(name: str) -> None:
+    wanted = {
+        "inspect": Verdict.INTERRUPTED,
+        "dock_with_retry": Verdict.IN_PROGRESS,  # it may always try again
+    }
+    assert lived(name, BAD) is wanted.get(name, Verdict.FAILED)

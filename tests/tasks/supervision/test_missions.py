@@ -1,0 +1,134 @@
+"""The missions of the paper's kind, from percepts made of their truth, through rules to verdicts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from types import MappingProxyType
+
+import pytest
+
+from tests.rules.percepts_from_truth import MISSIONS, Noise, actors_of, observations, truth_of
+from visup.agent import Alert, Concern, Event, Mind, Severity, Status, TaskBelief, Verdict
+from visup.rules.reasoners import default_thinkers
+from visup.tasks import load_task
+from visup.tasks.supervision.supervise import finish, task_thinker
+
+NAMES = (
+    "approach_aborted",
+    "capture_fails",
+    "capture_fails_over_earth",
+    "capture_succeeds",
+    "intruder_on_collision_course",
+    "occlusion_by_intruder",
+)
+pytestmark = pytest.mark.skipif(
+    not (MISSIONS / NAMES[0]).exists(), reason="the shared missions are not beside the repo"
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    beliefs: tuple[tuple[float, TaskBelief], ...]
+    events: tuple[Event, ...]
+    alerts: tuple[Concern, ...]
+
+
+@cache
+def run(name: str) -> Run:
+    """All thinkers on one mission, with alerts opened and closed as the act phase does."""
+    shipped = default_thinkers()
+    chain = (*shipped.update, *shipped.cogitate, task_thinker([load_task("dock")]))
+    mind = Mind(actors=MappingProxyType(actors_of(name)))
+    beliefs: list[tuple[float, TaskBelief]] = []
+    events: list[Event] = []
+    alerts: list[Concern] = []
+    for seen, _ in observations(name, Noise(every=3)):
+        mind = replace(
+            mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+        )
+        concerns: list[Concern] = []
+        for thinker in chain:
+            outcome = thinker(mind, seen)
+            mind = outcome.mind
+            events += outcome.events
+            concerns += outcome.concerns
+        open_now = {(a.kind, a.objects, a.key) for a in mind.alerts}
+        alerts += [c for c in concerns if (c.kind, c.objects, c.key) not in open_now]
+        mind = replace(mind, alerts=tuple(_alert(c, seen.time) for c in concerns))
+        beliefs.append((seen.time, mind.tasks[0]))
+    return Run(tuple(beliefs), tuple(events), tuple(alerts))
+
+
+def _alert(concern: Concern, now: float) -> Alert:
+    c = concern
+    return Alert(1, c.kind, c.severity, now, now, c.objects, c.cause, key=c.key)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_verdict_is_right(name: str) -> None:
+    assert finish(run(name).beliefs[-1][1]) is Verdict(truth_of(name)["verdict"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_stage_and_outcome_are_right_nearly_all_the_time(name: str) -> None:
+    truth = truth_of(name)
+    right = [
+        _stage_and_outcome(belief) == wanted
+        for time, belief in run(name).beliefs
+        if (wanted := _wanted(truth, time)) is not None
+    ]
+    assert sum(right) >= 0.9 * len(right)
+
+
+def _wanted(truth: dict[str, list[dict[str, object]]], time: float) -> tuple[str, str] | None:
+    """The true stage and outcome so far, or None within a second of a change."""
+    opened = [float(str(a["from_s"])) for a in truth["alerts"]]
+    for stage in truth["stages"]:
+        begins, ends = float(str(stage["from_s"])), float(str(stage["to_s"]))
+        if not begins <= time < ends:
+            continue
+        if any(abs(time - t) <= 1.0 for t in (begins, ends, *opened)):
+            return None
+        bad = stage["outcome"] != "complete" and any(time >= t for t in opened)
+        return str(stage["stage"]), str(stage["outcome"]) if bad else "progressing"
+    return None
+
+
+def _stage_and_outcome(belief: TaskBelief) -> tuple[str, str]:
+    stage = belief.current or belief.stages[-1].stage
+    status = next(s.status for s in belief.stages if s.stage == stage)
+    if belief.verdict is Verdict.INTERRUPTED:
+        return stage, "unsafe"
+    return stage, "failing" if status in (Status.FAILING, Status.FAILED) else "progressing"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_failing_stage_is_told_soon(name: str) -> None:
+    wanted = [a["from_s"] for a in truth_of(name)["alerts"] if a["kind"] == "stage_failing"]
+    told = [e.time for e in run(name).events if e.kind == "stage_failing"]
+    if wanted:
+        assert -0.5 <= told[0] - wanted[0] <= 2.0
+    else:
+        assert not [e for e in run(name).events if e.kind == "stage_failing" and e.severity]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_alert_is_false(name: str) -> None:
+    expected = {a["kind"] for a in truth_of(name)["alerts"]}
+    warned = {c.kind for c in run(name).alerts if c.severity >= Severity.WARNING}
+    assert warned <= expected
+
+
+def test_the_narrative_is_that_of_the_paper() -> None:
+    told = [e.text for e in run("capture_fails").events if e.kind.startswith(("stage", "verdict"))]
+    assert told[0] == (
+        "Stage `approach` of task `dock` has begun, with an object, believed to be the arm, "
+        "and a second object, believed to be the satellite."
+    )
+    assert told[1].startswith("Stage `approach` is progressing satisfactorily: ")
+    assert told[2].startswith("Stage `approach` is complete")
+    assert told[3].startswith("Stage `captured` of task `dock` has begun")
+    failing = next(t for t in told if t.startswith("Stage `captured` is failing: "))
+    assert failing.endswith("s; `captured` asks for coupled.")
+    assert told[-1].startswith("Task `dock` has failed: ")

@@ -1,0 +1,138 @@
+"""Several tasks: which of them is going on, and that the others are not told about."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from tests.tasks.scripted import Played, Script, Spell, play
+from visup.agent import Status, TaskBelief, Verdict
+from visup.runs.wiring import final_verdict
+from visup.tasks import parse_task
+from visup.tasks.supervision.inference import AUDIBLE
+from visup.tasks.supervision.supervise import SILENT_S, task_thinker
+
+DOCK = parse_task("""<dock> ::= <approach> <captured>
+<approach> ::= converging(arm, satellite)
+<captured> ::= coupled(arm, satellite)
+""")
+INSPECT = parse_task("""<inspect> ::= <near> <look>
+<near> ::= converging(arm, satellite)
+<look> ::= keeping_distance(arm, satellite) for 3 s fails when touching(arm, satellite)
+""")
+LEAVE = parse_task("""<leave> ::= <away> <clear>
+<away> ::= diverging(arm, satellite)
+<clear> ::= keeping_distance(arm, satellite) for 2 s
+""")
+DOCKS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 30),
+    Spell("moving_together", 12.6, 30),
+    Spell("coupled", 13.0, 30),
+)
+FAILS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 12.8),
+    Spell("diverging", 12.8, 30),
+)
+INSPECTS = (Spell("converging", 0.5, 10.0), Spell("keeping_distance", 10.2, 30))
+PARTS = (
+    Spell("touching", 0.0, 8.0),
+    Spell("moving_together", 0.0, 8.0),
+    Spell("coupled", 0.0, 8.0),
+    Spell("diverging", 8.2, 16),
+    Spell("keeping_distance", 16.2, 18.8),
+)
+
+
+def watch(spells: tuple[Spell, ...], until: float = 26.0) -> Played:
+    return play(task_thinker([DOCK, INSPECT, LEAVE]), Script(spells), until)
+
+
+def belief(played: Played, task: str, time: float | None = None) -> TaskBelief:
+    mind = played.last if time is None else played.at(time)
+    return next(t for t in mind.tasks if t.task == task)
+
+
+@pytest.mark.parametrize(
+    ("spells", "task", "verdict"),
+    [
+        (DOCKS, "dock", Verdict.SUCCEEDED),
+        (FAILS, "dock", Verdict.FAILED),
+        (INSPECTS, "inspect", Verdict.SUCCEEDED),
+        (PARTS, "leave", Verdict.SUCCEEDED),
+    ],
+)
+def test_the_task_that_is_going_on_decides(
+    spells: tuple[Spell, ...], task: str, verdict: Verdict
+) -> None:
+    played = watch(spells)
+    assert final_verdict(played.last) is verdict
+    ends = {(e.data["task"], e.data["verdict"]) for e in played.events if e.kind == "verdict"}
+    assert ends == {(task, str(verdict))}
+
+
+def test_tasks_with_the_same_beginning_are_both_told_of_until_they_differ() -> None:
+    played = watch(DOCKS)
+    early = {t.task: t.active for t in played.at(8.0).tasks}
+    assert early["dock"] == pytest.approx(early["inspect"], abs=0.02)
+    assert early["dock"] > 0.4
+    assert early["leave"] < 0.05
+    assert belief(played, "inspect").active < AUDIBLE
+
+
+def test_a_task_that_is_not_going_on_is_not_told_to_fail() -> None:
+    for spells in (DOCKS, INSPECTS, PARTS):
+        played = watch(spells)
+        failing = [e.text for e in played.events if e.kind in ("stage_failing", "stage_failed")]
+        assert failing == []
+        assert not any(o.concerns for o in played.outcomes)
+
+
+def test_what_was_told_to_fail_stays_told_though_another_task_begins() -> None:
+    played = watch(FAILS)
+    assert belief(played, "leave").active > 0.9
+    assert belief(played, "dock").verdict is Verdict.FAILED
+    told = [e.data["stage"] for e in played.events if e.kind == "stage_failing"]
+    assert told == ["captured"]
+
+
+def test_before_anything_is_seen_no_task_is_told_of() -> None:
+    played = watch((), 10.0)
+    assert {t.verdict for t in played.last.tasks} == {Verdict.UNKNOWN}
+    assert {s.status for t in played.last.tasks for s in t.stages} == {Status.PENDING}
+    assert played.events == ()
+
+
+def test_what_may_be_asked_for_is_expected_and_what_is_out_of_the_question_is_not() -> None:
+    played = watch(DOCKS)
+    expected = {e.relation for t in played.at(8.0).tasks for e in t.expected}
+    assert "converging" in expected
+    assert "diverging" not in expected
+
+
+def test_that_a_task_is_recognised_and_set_aside_is_told() -> None:
+    played = watch(DOCKS)
+    told = [(e.kind, e.data["task"]) for e in played.events if e.kind.startswith("task_")]
+    assert ("task_active", "dock") in told
+    assert ("task_inactive", "inspect") in told
+    assert told.index(("task_active", "inspect")) < told.index(("task_inactive", "inspect"))
+
+
+def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own_pace() -> None:
+    minds = play(task_thinker([DOCK, INSPECT, LEAVE]), Script(DOCKS), 26.0, 25.0).minds
+    paces = set()
+    for before, mind in pairwise(minds):
+        for old, new in zip(before.memory["tasks"], mind.memory["tasks"], strict=True):
+            if old.activity.audible:
+                assert new.time == mind.time
+            else:
+                assert mind.time - new.time < SILENT_S
+                paces |= {round(new.time - old.time, 6)} - {0.0}
+    assert paces == {SILENT_S}
+
+
+def test_one_task_alone_is_followed_in_each_step() -> None:
+    for mind in play(task_thinker([DOCK]), Script(DOCKS), 15.0, 25.0).minds:
+        assert mind.memory["tasks"][0].time == mind.time

@@ -1,0 +1,425 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, Played, Script, Spell, play
+from visup.agent import Expectation, Severity, Status, TaskBelief, Truth, Verdict
+from visup.tasks import load_task, parse_task
+from visup.tasks.supervision.supervise import finish, task_thinker
+
+DOCK = load_task("dock")
+FAILS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 12.8),
+    Spell("diverging", 12.8, 30),
+)
+SUCCEEDS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 30),
+    Spell("moving_together", 12.6, 30),
+    Spell("coupled", 13.0, 30),
+)
+ABORTED = (Spell("converging", 0.5, 11.5), Spell("diverging", 12.5, 20))
+CROWDED = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (6.5, 1e9)}
+
+
+def watch(script: Script, until: float, text: str = "", fps: float = 10.0) -> Played:
+    task = parse_task(text) if text else DOCK
+    return play(task_thinker([task]), script, until, fps)
+
+
+def task_of(played: Played, time: float | None = None) -> TaskBelief:
+    return (played.last if time is None else played.at(time)).tasks[0]
+
+
+def status(played: Played, stage: str, time: float | None = None) -> Status:
+    return next(s.status for s in task_of(played, time).stages if s.stage == stage)
+
+
+def test_capture_fails_as_in_the_paper() -> None:
+    played = watch(Script(FAILS), 30.0)
+    told = [(k, s) for k, s in played.told() if k not in ("stage_progressing", "stage_failed")]
+    assert told == [
+        ("stage_started", "approach"),
+        ("stage_done", "approach"),
+        ("stage_started", "captured"),
+        ("stage_failing", "captured"),
+        ("verdict", ""),
+    ]
+    assert task_of(played, 8.0).current == "approach"
+    assert status(played, "approach", 8.0) is Status.PROGRESSING
+    assert task_of(played, 12.5).current == "captured"
+    failing = next(e for e in played.events if e.kind == "stage_failing")
+    assert 12.8 <= failing.time <= 14.3
+    assert failing.severity is Severity.WARNING
+    assert failing.text == (
+        "Stage `captured` is failing: the arm and the satellite have been diverging since 12.8 s; "
+        "`captured` asks for coupled."
+    )
+    assert status(played, "captured", 25.0) in (Status.FAILING, Status.FAILED)
+    assert finish(task_of(played)) is Verdict.FAILED
+
+
+def test_capture_succeeds() -> None:
+    played = watch(Script(SUCCEEDS), 26.0)
+    assert task_of(played).verdict is Verdict.SUCCEEDED
+    assert [s.status for s in task_of(played).stages] == [Status.DONE, Status.DONE]
+    assert not [c for o in played.outcomes for c in o.concerns]
+    assert task_of(played, 10.0).verdict is Verdict.IN_PROGRESS
+
+
+def test_an_aborted_approach_fails_and_never_comes_to_capture() -> None:
+    played = watch(Script(ABORTED), 24.0)
+    assert status(played, "captured") is Status.PENDING
+    assert finish(task_of(played, 14.0)) is Verdict.FAILED
+    assert task_of(played, 14.0).verdict is Verdict.IN_PROGRESS
+    assert finish(task_of(played)) is Verdict.FAILED
+    assert status(played, "approach", 22.0) in (Status.FAILING, Status.FAILED)
+    concern = played.outcomes[150].concerns[0]
+    assert (concern.kind, concern.severity, concern.key) == (
+        "stage_failing",
+        Severity.WARNING,
+        "dock/approach",
+    )
+
+
+def test_what_is_unsafe_interrupts_for_good() -> None:
+    script = Script(SUCCEEDS, objects=CROWDED, alerts=[("unexpected_object", 7.0, 9.0)])
+    played = watch(script, 26.0)
+    assert task_of(played, 6.9).verdict is Verdict.IN_PROGRESS
+    assert task_of(played, 7.0).verdict is Verdict.INTERRUPTED
+    assert status(played, "captured") is Status.DONE
+    assert finish(task_of(played)) is Verdict.INTERRUPTED
+    assert task_of(played, 7.0).unexplained == (INTRUDER,)
+    assert task_of(played, 6.0).unexplained == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "about", "ends"),
+    [
+        ("unexpected_object", ARM, True),  # it was the arm all the time
+        ("unexpected_object", INTRUDER, False),
+        ("collision_course", ARM, False),  # whoever it was, it was unsafe
+    ],
+)
+def test_a_stranger_that_proves_to_be_an_actor_interrupts_no_longer(
+    kind: str, about: int, ends: bool
+) -> None:
+    script = Script(SUCCEEDS, objects=CROWDED, alerts=[(kind, 7.0, 9.0)], about=(about,))
+    played = watch(script, 26.0)
+    assert task_of(played, 8.0).verdict is Verdict.INTERRUPTED
+    after = Verdict.IN_PROGRESS if ends else Verdict.INTERRUPTED
+    assert task_of(played, 10.0).verdict is after
+    assert finish(task_of(played)) is (Verdict.SUCCEEDED if ends else Verdict.INTERRUPTED)
+
+
+@pytest.mark.parametrize("kind", ["stage_failing", "contact"])
+def test_other_alerts_do_not_interrupt(kind: str) -> None:
+    played = watch(Script(SUCCEEDS, alerts=[(kind, 7.0, 9.0)]), 26.0)
+    assert task_of(played).verdict is Verdict.SUCCEEDED
+
+
+def test_a_task_of_which_nothing_is_seen_is_unknown() -> None:
+    alone = Script(objects={INTRUDER: (0.0, 1e9)})
+    played = watch(alone, 10.0)
+    assert finish(task_of(played)) is Verdict.UNKNOWN
+    assert task_of(played).current is None
+    still = watch(Script(), 10.0)
+    assert finish(task_of(still)) is Verdict.UNKNOWN
+
+
+def test_a_task_that_still_goes_on_at_the_end_is_in_progress() -> None:
+    played = watch(Script(FAILS), 10.0)
+    assert finish(task_of(played)) is Verdict.IN_PROGRESS
+
+
+def test_what_is_not_seen_is_unknown_and_never_a_failure() -> None:
+    hidden = Script(SUCCEEDS, hidden={SATELLITE: (4.0, 9.0)})
+    played = watch(hidden, 26.0)
+    assert status(played, "approach", 5.0) is Status.PROGRESSING
+    assert status(played, "approach", 8.0) is Status.UNKNOWN
+    assert status(played, "approach", 9.5) is Status.PROGRESSING
+    assert [b.object_id for b in task_of(played, 8.0).bindings] == [ARM, SATELLITE]
+    assert task_of(played).verdict is Verdict.SUCCEEDED
+
+
+def test_an_approach_without_progress_is_stalled_and_goes_on() -> None:
+    spells = (Spell("converging", 0, 5), Spell("converging", 11, 15), Spell("touching", 15, 30))
+    played = watch(Script(spells), 16.0)
+    assert status(played, "approach", 10.0) is Status.STALLED
+    assert status(played, "approach", 12.0) is Status.PROGRESSING
+    assert status(played, "approach") is Status.DONE
+
+
+def test_a_short_contrary_is_no_failure_and_a_recovery_ends_one() -> None:
+    brief = (Spell("converging", 0, 5), Spell("diverging", 5, 5.4), Spell("converging", 5.4, 9))
+    assert "stage_failing" not in dict(watch(Script(brief), 9.0).told())
+    longer = (Spell("converging", 0, 5), Spell("diverging", 5, 7), Spell("converging", 7, 12))
+    played = watch(Script(longer), 12.0)
+    assert status(played, "approach", 6.5) is Status.FAILING
+    assert status(played, "approach") is Status.PROGRESSING
+    assert finish(task_of(played)) is Verdict.IN_PROGRESS
+
+
+def test_what_has_failed_goes_on_only_when_it_went_well_for_as_long() -> None:
+    spells = (Spell("converging", 0, 5), Spell("diverging", 5, 15), Spell("converging", 15, 30))
+    played = watch(Script(spells), 25.0)
+    assert task_of(played, 14.5).verdict is Verdict.FAILED
+    assert task_of(played, 22.0).verdict is Verdict.FAILED
+    assert status(played, "approach") is Status.PROGRESSING
+    assert task_of(played).verdict is Verdict.IN_PROGRESS
+
+
+def test_a_capture_that_is_lost_at_once_is_no_success() -> None:
+    lost = (
+        Spell("converging", 0, 12),
+        Spell("touching", 12, 14.5),
+        Spell("coupled", 12.2, 14.0),
+        Spell("diverging", 14.5, 30),
+    )
+    played = watch(Script(lost), 30.0)
+    assert task_of(played, 13.8).verdict is Verdict.SUCCEEDED
+    assert finish(task_of(played)) is Verdict.FAILED
+    assert status(played, "captured", 16.0) is Status.FAILING
+
+
+def test_what_the_stage_asks_for_is_expected_and_so_is_the_entry_to_the_next() -> None:
+    played = watch(Script(SUCCEEDS), 20.0)
+    pair = (ARM, SATELLITE)
+    early = set(task_of(played, 5.0).expected)
+    assert {Expectation("converging", pair), Expectation("touching", pair)} <= early
+    late = set(task_of(played, 12.6).expected)
+    assert {Expectation(n, pair) for n in ("coupled", "converging", "touching")} <= late
+
+
+RETRY = load_task("dock_with_retry")
+TWICE = (
+    Spell("converging", 0, 5),
+    Spell("diverging", 6, 10),
+    Spell("converging", 11, 15),
+    Spell("diverging", 16, 18),
+    Spell("converging", 19, 25),
+    Spell("touching", 25, 40),
+    Spell("coupled", 26, 40),
+)
+
+
+def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
+    played = play(task_thinker([RETRY]), Script(TWICE), 30.0)
+    assert task_of(played).verdict is Verdict.SUCCEEDED
+    assert "stage_failing" not in dict(played.told())
+    assert task_of(played, 8.0).current == "back_off"
+    assert task_of(played, 14.0).current == "approach"
+    assert finish(task_of(watch(Script(TWICE), 20.0))) is not Verdict.SUCCEEDED
+
+
+def spells(*named: tuple[str, float, float]) -> Script:
+    return Script(tuple(Spell(*n) for n in named))
+
+
+HOLD = ("keeping_distance", 5, 12)
+CASES = {
+    "an alternative, the first": (
+        "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
+        spells(("converging", 0, 5), ("touching", 5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "an alternative, the second": (
+        "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
+        spells(("converging", 0, 5), ("diverging", 5.5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "what may be left out, left out": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
+        "touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "what may be left out, there": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
+        "touching(arm, satellite)",
+        spells(("converging", 0, 5), HOLD, ("converging", 12, 13), ("touching", 13, 16)),
+        Verdict.SUCCEEDED,
+    ),
+    "what must be there, left out": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 5 s "
+        "touching(arm, satellite)",
+        spells(("converging", 0, 5), ("keeping_distance", 5, 7), ("diverging", 7, 15)),
+        Verdict.FAILED,
+    ),
+    "a repetition, none": (
+        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
+        spells(("touching", 3, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "a repetition, two": (
+        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
+        spells(
+            ("converging", 0, 4),
+            ("diverging", 4, 8),
+            ("converging", 8, 12),
+            ("diverging", 12, 15),
+            ("touching", 16, 20),
+        ),
+        Verdict.SUCCEEDED,
+    ),
+    "a repetition, at least once": (
+        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))+ coupled(arm, satellite)",
+        spells(
+            ("converging", 0, 4),
+            ("diverging", 4, 8),
+            ("converging", 8, 12),
+            ("diverging", 12, 15),
+            ("coupled", 16, 20),
+        ),
+        Verdict.SUCCEEDED,
+    ),
+    "at the same time": (
+        "<t> ::= converging(arm, satellite) & present(arm) touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 8)),
+        Verdict.SUCCEEDED,
+    ),
+    "held for long enough": (
+        "<t> ::= keeping_distance(arm, satellite) for 5 s",
+        spells(HOLD),
+        Verdict.SUCCEEDED,
+    ),
+    "not held for long enough": (
+        "<t> ::= keeping_distance(arm, satellite) for 8 s",
+        spells(HOLD, ("diverging", 12, 20)),
+        Verdict.FAILED,
+    ),
+    "in time": (
+        "<t> ::= converging(arm, satellite) within 8 s touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 8)),
+        Verdict.SUCCEEDED,
+    ),
+    "too late": (
+        "<t> ::= converging(arm, satellite) within 4 s touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 8)),
+        Verdict.FAILED,
+    ),
+    "too late in all": (
+        "<t> ::= (converging(arm, satellite) coupled(arm, satellite)) within 10 s",
+        spells(("converging", 0, 8), ("touching", 8, 30), ("coupled", 12, 30)),
+        Verdict.FAILED,
+    ),
+    "something that must never be": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)\n"
+        "never touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 7), ("keeping_distance", 7, 12)),
+        Verdict.INTERRUPTED,
+    ),
+    "something that must never be in another stage": (
+        "<t> ::= <a> <b>\n<a> ::= converging(arm, satellite)\n<b> ::= touching(arm, satellite)\n"
+        "never moving_together(arm, satellite) during <a>",
+        spells(("converging", 0, 5), ("touching", 5, 9), ("moving_together", 5.5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "something that must always be": (
+        "<t> ::= converging(arm, satellite) touching(arm, satellite)\nalways present(arm)",
+        spells(("converging", 0, 5), ("touching", 5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_verdicts_of_the_language(name: str) -> None:
+    text, script, verdict = CASES[name]
+    until = max(s.to_s for s in script.spells)
+    assert finish(task_of(watch(script, until, text))) is verdict
+
+
+def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
+    text, script, _ = CASES["something that must never be"]
+    played = watch(script, 12.0, text)
+    event = next(e for e in played.events if e.kind == "invariant_broken")
+    assert event.severity is Severity.CRITICAL
+    assert "`never touching(arm, satellite)` has not held since 5.0 s" in event.text
+    assert [c.kind for c in played.outcomes[60].concerns] == ["invariant_broken"]
+    assert not played.outcomes[80].concerns
+
+
+def test_an_actor_does_not_change_hands_in_a_moment() -> None:
+    thinker = task_thinker([DOCK])
+    played = play(thinker, Script(SUCCEEDS), 5.0)
+    swapped = Script(SUCCEEDS, identities={ARM: {"satellite": 0.9}, SATELLITE: {"arm": 0.9}})
+    from tests.tasks.scripted import mind_at
+    from visup.agent import Observation
+
+    mind = played.last
+    for i in range(1, 40):
+        mind = mind_at(swapped, 5.0 + i / 10, 50 + i, mind)
+        mind = thinker(mind, Observation(50 + i, mind.time, (640, 480))).mind
+        bound = [b.object_id for b in mind.tasks[0].bindings]
+        assert bound == ([ARM, SATELLITE] if mind.time < 7.1 - 1e-9 else [SATELLITE, ARM])
+
+
+SCENES = {"fails": (FAILS, 24.0), "succeeds": (SUCCEEDS, 24.0), "aborted": (ABORTED, 24.0)}
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.sampled_from(sorted(SCENES)), st.floats(0.0, 20.0))
+def test_shifting_a_scene_in_time_shifts_its_story(name: str, shift: float) -> None:
+    spells, until = SCENES[name]
+    shift = round(shift, 1)
+    moved = tuple(replace(s, from_s=s.from_s + shift, to_s=s.to_s + shift) for s in spells)
+    objects = {ARM: (shift, 1e9), SATELLITE: (shift, 1e9)}
+    one = watch(Script(spells), until)
+    other = watch(Script(moved, objects=objects), until + shift)
+    assert other.told() == one.told()
+    for a, b in zip(one.events, other.events, strict=True):
+        assert b.time - a.time == pytest.approx(shift, abs=0.11)
+
+
+@pytest.mark.parametrize("fps", [4.0, 10.0, 25.0])
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_the_story_does_not_hang_on_the_frame_rate(name: str, fps: float) -> None:
+    spells, until = SCENES[name]
+    assert watch(Script(spells), until, fps=fps).told() == watch(Script(spells), until).told()
+
+
+def test_a_thinker_is_a_pure_function_and_keeps_nothing_to_itself() -> None:
+    thinker = task_thinker([DOCK])
+    played = play(thinker, Script(FAILS), 20.0)
+    again = play(thinker, Script(FAILS), 20.0)
+    assert [m.tasks for m in again.minds] == [m.tasks for m in played.minds]
+    assert again.events == played.events
+    hash(played.last.memory["tasks"][0].readings[0].state)
+
+
+def test_several_tasks_are_supervised_side_by_side() -> None:
+    played = play(task_thinker([DOCK, RETRY]), Script(TWICE), 30.0)
+    assert [t.task for t in played.last.tasks] == ["dock", "dock_with_retry"]
+    assert played.last.tasks[1].verdict is Verdict.SUCCEEDED
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1])
+def test_now_and_then_wrong_relations_do_not_change_the_verdict(share: float) -> None:
+    for seed in range(4):
+        for name, (spells, until) in SCENES.items():
+            noisy = _with_noise(spells, until, share, seed)
+            verdict = finish(task_of(watch(Script(noisy), until)))
+            wanted = Verdict.SUCCEEDED if name == "succeeds" else Verdict.FAILED
+            assert verdict is wanted, (name, seed)
+
+
+def _with_noise(
+    spells: tuple[Spell, ...], until: float, share: float, seed: int
+) -> tuple[Spell, ...]:
+    """Single frames in which something false is seen or nothing is known."""
+    import random
+
+    rng = random.Random(seed)
+    wrong = []
+    for i in range(round(until * 10)):
+        if rng.random() < share:
+            name = rng.choice(["converging", "diverging", "keeping_distance", "touching"])
+            truth = rng.choice([Truth.TRUE, Truth.UNKNOWN, Truth.FALSE])
+            wrong.append(Spell(name, i / 10, (i + 1) / 10 - 1e-6, truth=truth))
+    return (*wrong, *spells)

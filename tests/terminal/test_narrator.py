@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from visup.agent import Event, Severity, Verdict
+from visup.terminal.narrator import Narrator, verdict_line
+from visup.wording import worded_once
+
+
+def event(text: str, severity: Severity = Severity.INFO, kind: str = "entry") -> Event:
+    return Event(kind, 12.34, 308, text, severity=severity)
+
+
+def printed(*events: Event) -> str:
+    out = io.StringIO()
+    for it in events:
+        Narrator(Console(file=out, width=80)).tell(it)
+    return out.getvalue()
+
+
+def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:
+    told = worded_once(
+        [event("It fails."), event("It rains."), event("It fails.", Severity.WARNING)]
+    )
+    assert [(e.text, e.severity) for e in told] == [
+        ("It fails.", Severity.WARNING),
+        ("It rains.", Severity.INFO),
+    ]
+
+
+def test_long_sentences_go_on_below_themselves_within_80_columns() -> None:
+    lines = printed(event("word " * 40)).splitlines()
+    assert len(lines) > 2
+    assert all(len(line.rstrip()) <= 80 for line in lines)
+    assert lines[0].startswith("  12.3 s   word")
+    assert lines[1].startswith(" " * 11 + "word")
+
+
+def test_words_that_look_like_markup_are_printed_as_they_are() -> None:
+    assert "[bold]x[/bold] [nonsense]" in printed(event("[bold]x[/bold] [nonsense]"))
+
+
+def test_every_verdict_has_words() -> None:
+    words = {verdict_line(v) for v in (*Verdict, None)}
+    assert len(words) == len(Verdict) + 1

@@ -1,0 +1,179 @@
+"""The language server for task files: what `tasks/tools/editing.py` says, in the words of the protocol."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lsprotocol import types as lsp
+from pygls.lsp.server import LanguageServer
+from pygls.uris import from_fs_path, to_fs_path
+from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
+
+from visup import __version__
+from visup.agent.model.errors import Place, VisupError
+from visup.commands.task.task import laid_out
+from visup.tasks.checks.examine import examine
+from visup.tasks.checks.files import read_beside
+from visup.tasks.diagnostics.diagnostic import TaskFault
+from visup.tasks.diagnostics.explain import explain
+from visup.tasks.grammar.nodes import Span
+from visup.tasks.tools.editing import Word, definition, meaning, proposals, same_names, word_at
+
+KINDS = {
+    "stage": lsp.CompletionItemKind.Class,
+    "action": lsp.CompletionItemKind.Function,
+    "actor": lsp.CompletionItemKind.Variable,
+    "keyword": lsp.CompletionItemKind.Keyword,
+    "unit": lsp.CompletionItemKind.Unit,
+    "file": lsp.CompletionItemKind.File,
+}
+
+
+def serve() -> None:
+    """Serve one editor over stdin and stdout until it says that it is done."""
+    make_server().start_io()
+
+
+def make_server() -> LanguageServer:
+    """A language server with diagnostics, completion, hover, definition, format and rename."""
+    server = LanguageServer("visup-task", __version__)
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
+    def opened(ls: LanguageServer, params: lsp.DidOpenTextDocumentParams) -> None:
+        _publish(ls, params.text_document.uri)
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
+    def changed(ls: LanguageServer, params: lsp.DidChangeTextDocumentParams) -> None:
+        _publish(ls, params.text_document.uri)
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
+    def closed(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
+        none = lsp.PublishDiagnosticsParams(params.text_document.uri, [])
+        ls.text_document_publish_diagnostics(none)
+
+    options = lsp.CompletionOptions(trigger_characters=["<", "(", '"'])
+
+    @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, options)
+    def complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
+        document = ls.workspace.get_text_document(params.text_document.uri)
+        line, column = _from(document, params.position)
+        found = proposals(document.source, _file(document), line, column)
+        return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
+
+    @server.feature(lsp.TEXT_DOCUMENT_HOVER)
+    def hover(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
+        document, word = _word(ls, params)
+        said = meaning(document.source, _file(document), word) if word else None
+        if word is None or said is None:
+            return None
+        content = lsp.MarkupContent(lsp.MarkupKind.Markdown, said)
+        return lsp.Hover(content, _range(document, word.span))
+
+    @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
+    def define(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | None:
+        document, word = _word(ls, params)
+        return _location(ls, document, word) if word else None
+
+    @server.feature(lsp.TEXT_DOCUMENT_FORMATTING)
+    def lay_out(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
+        document = ls.workspace.get_text_document(params.text_document.uri)
+        try:
+            new = laid_out(document.source, _file(document))
+        except VisupError:
+            return []  # the mistakes that hinder it are shown already
+        if new == document.source:
+            return []
+        end = lsp.Position(len(document.lines), 0)
+        return [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), new)]
+
+    @server.feature(lsp.TEXT_DOCUMENT_RENAME)
+    def rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
+        document, word = _word(ls, params)
+        new = params.new_name.strip("<> ")
+        if word is None or not new.isidentifier():
+            return None
+        places = same_names(document.source, word)
+        edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
+        return lsp.WorkspaceEdit({document.uri: edits}) if edits else None
+
+    return server
+
+
+def _publish(server: LanguageServer, uri: str) -> None:
+    document = server.workspace.get_text_document(uri)
+    _, faults = examine(document.source, _file(document), read=_Reader(server).read)
+    shown = [_diagnostic(document, f) for f in faults]
+    server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, shown))
+
+
+class _Reader:
+    """Reads included files as they stand in the editor, else from the disk."""
+
+    def __init__(self, server: LanguageServer) -> None:
+        self._open = {to_fs_path(u): d for u, d in server.workspace.text_documents.items()}
+
+    def read(self, path: str, including: str) -> tuple[str, str]:
+        beside = str((Path(including).parent / path).resolve())
+        if beside in self._open:
+            return beside, self._open[beside].source
+        return read_beside(path, including)
+
+
+def _diagnostic(document: TextDocument, fault: TaskFault) -> lsp.Diagnostic:
+    said = [fault.message]
+    said += [f"expected: {fault.expected}"] if fault.expected else []
+    said += [f"hint: {fault.hint}"] if fault.hint else []
+    place = fault.place
+    if place.file != _file(document):
+        said.insert(0, f"in {place}")
+        place = Place(_file(document), 1, 1)
+    span = Span(place.line, place.column, place.line, place.column + place.length)
+    return lsp.Diagnostic(
+        _range(document, span),
+        "\n".join(said),
+        severity=lsp.DiagnosticSeverity.Error,
+        code=fault.code,
+        source=f"visup: {explain(fault.code).title}",
+    )
+
+
+def _word(
+    server: LanguageServer, params: lsp.HoverParams | lsp.DefinitionParams | lsp.RenameParams
+) -> tuple[TextDocument, Word | None]:
+    document = server.workspace.get_text_document(params.text_document.uri)
+    return document, word_at(document.source, *_from(document, params.position))
+
+
+def _location(server: LanguageServer, document: TextDocument, word: Word) -> lsp.Location | None:
+    if word.kind == "include":
+        try:
+            path, _ = _Reader(server).read(word.name, _file(document))
+        except VisupError:
+            return None
+        uri = from_fs_path(str(Path(path).resolve())) if Path(path).exists() else None
+        start = lsp.Position(0, 0)
+        return lsp.Location(uri, lsp.Range(start, start)) if uri else None
+    span = definition(document.source, _file(document), word)
+    if span is None:
+        return None
+    if not span.file:
+        return lsp.Location(document.uri, _range(document, span))
+    uri = from_fs_path(str(Path(span.file).resolve()))
+    other = server.workspace.get_text_document(uri) if uri and Path(span.file).exists() else None
+    return lsp.Location(other.uri, _range(other, span)) if other else None
+
+
+def _file(document: TextDocument) -> str:
+    return to_fs_path(document.uri) or document.uri
+
+
+def _from(document: TextDocument, position: lsp.Position) -> tuple[int, int]:
+    """Line and column counted from 1, in characters."""
+    here = document.position_from_client_units(position)
+    return here.line + 1, here.character + 1
+
+
+def _range(document: TextDocument, span: Span) -> lsp.Range:
+    start = ServerTextPosition(span.line - 1, span.column - 1)
+    end = ServerTextPosition(max(span.line, span.end_line) - 1, span.end_column - 1)
+    return document.range_to_client_units(ServerTextRange(start, end))

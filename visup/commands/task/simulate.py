@@ -1,0 +1,103 @@
+"""`visup task simulate`: walk through the legal courses of a task, list them, draw some."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from visup.tasks.grammar.nodes import Task
+    from visup.tasks.tools.simulate import Course, Moment, Place
+
+
+def simulate(
+    file: Annotated[str, typer.Argument(help="A task file, `file.task:NAME`, or a shipped task.")],
+    listed: Annotated[
+        int | None, typer.Option("--list", min=1, help="List so many courses, short ones first.")
+    ] = None,
+    drawn: Annotated[
+        int | None, typer.Option("--sample", min=1, help="Draw so many courses at random.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of what is drawn.")] = 0,
+) -> None:
+    """Walk through a task step by step, or list or draw courses that it may take."""
+    from visup.tasks.checks.load import load_task
+
+    task = load_task(file)
+    if listed is not None:
+        _list(task, listed)
+    if drawn is not None:
+        _sample(task, drawn, seed)
+    if listed is None and drawn is None:
+        _walk(task)
+
+
+def _list(task: Task, count: int) -> None:
+    from itertools import islice
+
+    from visup.tasks.tools.simulate import courses
+
+    found = courses(task)
+    for number, course in enumerate(islice(found, count), 1):
+        typer.echo(f"{number}. {_line(course)}")
+    if next(found, None) is not None:
+        typer.echo("and more")
+
+
+def _sample(task: Task, count: int, seed: int) -> None:
+    from random import Random
+
+    from visup.tasks.tools.simulate import sample
+
+    rng = Random(seed)
+    for number in range(1, count + 1):
+        course, ended = sample(task, rng)
+        typer.echo(f"{number}. {_line(course)}{'' if ended else ', and so on'}")
+
+
+def _walk(task: Task) -> None:
+    """Ask at every step which way to go on, until the task ends or the user does."""
+    from visup.tasks.tools.simulate import beginnings, followings
+
+    typer.echo(f"task {task.name}: choose how it goes on by number; q ends the walk")
+    places = beginnings(task)
+    while True:
+        for number, place in enumerate(places, 1):
+            typer.echo(f"  {number}) {_way(place)}")
+        chosen = _ask(places)
+        if chosen is None:
+            return
+        if chosen.state is None:
+            typer.echo("the task is done")
+            return
+        typer.echo(f"now: {_said(chosen.moment)}")
+        places = followings(task, chosen)
+
+
+def _ask(places: tuple[Place, ...]) -> Place | None:
+    while True:
+        try:
+            answer = input("> ").strip().lower()
+        except (EOFError, KeyboardInterrupt):
+            typer.echo("")
+            return None
+        if answer in ("q", "quit", "exit"):
+            return None
+        if answer.isdecimal() and 1 <= int(answer[:9]) <= len(places):
+            return places[int(answer[:9]) - 1]
+        if not answer and len(places) == 1:
+            return places[0]
+        typer.echo(f"  a number from 1 to {len(places)}, or q")
+
+
+def _way(place: Place) -> str:
+    return _said(place.moment) if place.state is not None else "(the task is done)"
+
+
+def _line(course: Course) -> str:
+    return ", then ".join(map(_said, course)) or "(nothing)"
+
+
+def _said(moment: Moment) -> str:
+    return " & ".join(moment)

@@ -1,0 +1,221 @@
+"""`visup task`: check, lay out, show, explain and walk through task files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from visup.commands.task.simulate import simulate
+
+if TYPE_CHECKING:
+    from visup.agent.model.errors import VisupError
+
+app = typer.Typer(help="Check, show, lay out and try task files.", no_args_is_help=True)
+app.command("simulate")(simulate)
+
+Files = Annotated[list[str], typer.Argument(help="Task files, or names of shipped tasks.")]
+File = Annotated[str, typer.Argument(help="A task file or shipped task.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
+Without = Annotated[
+    list[str] | None,
+    typer.Option(help="A kind of percept that will not be at hand, such as depth; repeatable."),
+]
+
+
+@app.command()
+def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
+    """Tell every mistake of some task files; exit code 2 when there is any."""
+    from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+    from visup.tasks.actions.actions import ALL_PERCEPTS
+    from visup.tasks.checks.examine import examine
+    from visup.tasks.checks.files import read_text
+
+    odd = set(without or ()) - ALL_PERCEPTS
+    if odd:
+        what = f"there is no kind of percept called `{min(odd)}`"
+        raise SettingsError(what, expected=f"one of: {', '.join(sorted(ALL_PERCEPTS))}")
+    found: dict[str, list[VisupError]] = {}
+    for file in files:
+        try:
+            faults = examine(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
+            found[file] = [*faults]
+        except VisupError as e:
+            found[file] = [e]
+    told = [e for errors in found.values() for e in errors]
+    if as_json:
+        typer.echo(json.dumps({f: [_as_data(e) for e in es] for f, es in found.items()}, indent=2))
+        raise typer.Exit(2 if told else 0)
+    for file, errors in found.items():
+        if not errors:
+            typer.echo(f"{file}: ok")
+    if len(told) == 1:
+        raise told[0]
+    if told:
+        raise ManyErrors(told)
+
+
+@app.command("format")
+def format_files(
+    files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
+    only_check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; exit code 1 when a layout differs.")
+    ] = False,
+) -> None:
+    """Give task files one layout; words, comments and meaning stay as they are."""
+    from visup.agent.model.errors import OutputError, TaskError
+    from visup.tasks.checks.files import read_text
+
+    differ = False
+    for file in files:
+        text = sys.stdin.read() if file == "-" else read_text(file)
+        new = laid_out(text, "<stdin>" if file == "-" else file)
+        differ = differ or new != text
+        if file == "-" and not only_check:
+            typer.echo(new, nl=False)
+        elif new != text and only_check:
+            typer.echo(f"{file}: not laid out")
+        elif new != text:
+            if not Path(file).is_file():
+                raise TaskError("it ships with visup and is not changed", where=file)
+            try:
+                Path(file).write_text(new, encoding="utf-8")
+            except OSError as e:
+                what = f"cannot be written: {e.strerror or e}"
+                raise OutputError(what, where=file) from e
+            typer.echo(f"{file}: laid out")
+    raise typer.Exit(1 if only_check and differ else 0)
+
+
+@app.command()
+def show(
+    file: File,
+    form: Annotated[
+        Literal["tree", "mermaid", "dot"],
+        typer.Option("--format", help="A tree for the terminal, or a picture's source."),
+    ] = "tree",
+) -> None:
+    """Draw a task: its tree, or its flow for Mermaid or Graphviz."""
+    from visup.tasks.checks.load import load_tasks
+
+    for task in load_tasks(file):
+        if form == "tree":
+            from rich.console import Console
+
+            from visup.commands.task.tree import task_tree
+
+            Console().print(task_tree(task))
+        else:
+            from visup.tasks.tools.diagram import dot, flow_of, mermaid
+
+            typer.echo(mermaid(flow_of(task)) if form == "mermaid" else dot(flow_of(task)))
+
+
+@app.command("list")
+def list_tasks(as_json: AsJson = False) -> None:
+    """List the tasks that ship with visup, each with the first line of its file."""
+    from visup.tasks.checks.files import read_text, shipped_tasks
+
+    about = {name: _first_comment(read_text(name)) for name in shipped_tasks()}
+    if as_json:
+        typer.echo(json.dumps(about, indent=2))
+        return
+    width = max(map(len, about), default=0)
+    for name, words in about.items():
+        typer.echo(f"{name:{width}}  {words}")
+
+
+@app.command()
+def actions(as_json: AsJson = False) -> None:
+    """List all that a stage may ask for: actions, words and quantities of rules, plug-ins' own."""
+    from visup.tasks.actions.actions import known_actions
+    from visup.tasks.actions.describe import written
+
+    said = {m.name: (written(m), m.about or m.text) for m in known_actions().values()}
+    if as_json:
+        data = {n: {"written": w, "about": a} for n, (w, a) in said.items()}
+        typer.echo(json.dumps(data, indent=2))
+        return
+    width = max(len(w) for w, _ in said.values())
+    for how, about in sorted(said.values()):
+        typer.echo(f"{how:{width}}  {about}")
+
+
+@app.command()
+def explain(
+    code: Annotated[str, typer.Argument(help="A code, as messages show it: E102.")],
+) -> None:
+    """Say what a code means, with a wrong and a right example."""
+    from visup.tasks.diagnostics.explain import explain as explanation
+
+    typer.echo(str(explanation(code)))
+
+
+@app.command()
+def textmate() -> None:
+    """Write the TextMate grammar of task files, for editors that colour text by one."""
+    from visup.tasks.checks.files import textmate_grammar
+
+    typer.echo(textmate_grammar(), nl=False)
+
+
+@app.command()
+def lsp() -> None:
+    """Serve editors over stdin and stdout by the Language Server Protocol (extra `lsp`)."""
+    from visup.agent.model.errors import ExtraMissingError
+
+    try:
+        from visup.commands.task.language_server import serve
+    except ModuleNotFoundError as e:
+        if (e.name or "").split(".")[0] not in ("pygls", "lsprotocol"):
+            raise
+        raise ExtraMissingError("`visup task lsp`", "lsp") from e
+    serve()
+
+
+def laid_out(text: str, file: str) -> str:
+    """A text in the layout of visup.
+
+    Raises:
+        TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
+        ManyErrors: The same, for several reasons.
+    """
+    from visup.tasks.checks.examine import raise_all
+    from visup.tasks.diagnostics.diagnostic import Source
+    from visup.tasks.diagnostics.normalise import clean
+    from visup.tasks.diagnostics.recovery import parse
+    from visup.tasks.tools.formatter import formatted
+
+    source = Source(text, file)
+    code, odd = clean(text, source)
+    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
+    return formatted(text)
+
+
+def _as_data(error: VisupError) -> dict[str, Any]:
+    from visup.agent.model.errors import Place
+
+    where = error.where
+    place: dict[str, Any] = {"file": str(where) if where else None}
+    if isinstance(where, Place):
+        place = {
+            "file": where.file,
+            "line": where.line,
+            "column": where.column,
+            "length": where.length,
+        }
+    return {
+        "code": getattr(error, "code", None),
+        "what": error.what,
+        **place,
+        "expected": error.expected,
+        "hint": error.hint,
+    }
+
+
+def _first_comment(text: str) -> str:
+    first = text.split("\n", 1)[0].lstrip("# ").strip()
+    return first.split(": ", 1)[-1]

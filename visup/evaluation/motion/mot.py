@@ -1,0 +1,94 @@
+"""Scores of MOT folders by the `motmetrics` library: MOTA and IDF1 of region boxes."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import ExtraMissingError, SourceError
+
+Box = tuple[float, float, float, float]
+Boxes = Mapping[int, Box]
+
+
+def read_truth(path: Path) -> dict[int, dict[int, Box]]:
+    """Boxes of a MOT ground truth file.
+
+    Args:
+        path: `gt.txt`, one line for each box: frame (from 1), id, x, y, width, height, active, ...
+
+    Returns:
+        Frame number from 0 -> id -> (x, y, width, height), pixels; boxes not active left out.
+
+    Raises:
+        SourceError: A line is not as it should be.
+    """
+    out: dict[int, dict[int, Box]] = {}
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            values = [float(v) for v in line.split(",")]
+            x, y, w, h = values[2:6]
+        except ValueError as e:
+            raise SourceError(
+                "this is not a line of a MOT ground truth",
+                where=f"{path}:{number}",
+                expected="frame, id, x, y, width, height, ...",
+            ) from e
+        if len(values) < 7 or values[6] != 0:
+            out.setdefault(int(values[0]) - 1, {})[int(values[1])] = (x, y, w, h)
+    return out
+
+
+def box_distance(true: Sequence[Box], seen: Sequence[Box]) -> NDArray[np.float64]:
+    """1 - IoU of boxes (x, y, w, h), (len(true), len(seen)); nan where IoU is below 0.5."""
+    a = np.asarray(true, dtype=np.float64).reshape(-1, 1, 4)
+    b = np.asarray(seen, dtype=np.float64).reshape(1, -1, 4)
+    low = np.maximum(a[..., :2], b[..., :2])
+    high = np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
+    common = np.prod(np.clip(high - low, 0, None), axis=-1)
+    union = np.prod(a[..., 2:], axis=-1) + np.prod(b[..., 2:], axis=-1) - common
+    share = common / np.maximum(union, 1e-9)
+    return np.where(share >= 0.5, 1 - share, np.nan)
+
+
+def mot_scores(true: Mapping[int, Boxes], seen: Mapping[int, Boxes]) -> dict[str, Any]:
+    """MOTA and IDF1 at IoU 0.5.
+
+    Args:
+        true: Frame -> id -> box.
+        seen: Frame -> region id -> box; its frames are the ones that are scored.
+
+    Returns:
+        `mota`, `idf1` and `id_switches`.
+
+    Raises:
+        ExtraMissingError: The library is not installed.
+    """
+    try:
+        import motmetrics
+    except ImportError as e:
+        raise ExtraMissingError("scoring MOT folders", "eval") from e
+    # The library's own use of numpy and pandas warns; that is not the user's concern.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        tally = motmetrics.MOTAccumulator(auto_id=True)
+        for frame in sorted(seen):
+            objects, regions = true.get(frame, {}), seen[frame]
+            distance = box_distance(list(objects.values()), list(regions.values()))
+            tally.update(list(objects), list(regions), distance)
+        table = motmetrics.metrics.create().compute(
+            tally, metrics=["mota", "idf1", "num_switches"], name="all"
+        )
+    row = table.loc["all"]
+    return {
+        "mota": float(row["mota"]),
+        "idf1": float(row["idf1"]),
+        "id_switches": int(row["num_switches"]),
+    }

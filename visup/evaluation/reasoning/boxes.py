@@ -1,0 +1,226 @@
+"""Relations of plain boxes, frame after frame: RCC-8, QTC, direction, distance and approach.
+
+For whoever has boxes and no agent: `watch_boxes` takes the boxes of one frame and what was believed
+so far, and gives what is believed now. It is the same judgement, with the same noise thresholds, as
+an agent makes of its objects, whose motion is measured on outlines instead.
+
+>>> kept = Boxes()
+>>> for t in range(75):
+...     boxes = np.array([[100.0, 100, 40, 40], [300 - 2.5 * t, 100, 40, 40]])
+...     kept = watch_boxes(kept, (1, 2), boxes, t / 25)
+>>> kept.rcc8_of(1, 2), kept.qtc_of(1, 2), kept.approach_of(1, 2)
+('partially_overlapping', '0-', 'converging')
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from visup.rules.geometry._fit_jit import slope_noise, trends
+from visup.rules.geometry.ema import smoothed
+from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Latch, step, unknown_latch
+from visup.rules.geometry.pairs import carried, pairs
+from visup.rules.geometry.regions import RCC8, Floats
+from visup.rules.relations._thresholds_jit import box_gaps, judged, moving_signs
+from visup.rules.relations.direction import CONVERSE as DIRECTION_CONVERSE
+from visup.rules.relations.direction import DIRECTION_NAMES
+from visup.rules.relations.distance import CLASS_NAMES
+from visup.rules.relations.qtc import text
+from visup.rules.relations.rcc8 import CONVERSE, from_signs
+from visup.rules.relations.thresholds import (
+    AWAY,
+    DIRECTION,
+    DISTANCE,
+    JUDGED,
+    ORDER,
+    SIDE,
+    JudgeSettings,
+    least_durations,
+    limits,
+)
+
+APPROACH = JUDGED
+APPROACH_NAMES = ("converging", "keeping_distance", "diverging")
+
+
+@dataclass(frozen=True, slots=True)
+class BoxSettings:
+    """How boxes are watched.
+
+    Attributes:
+        judge: Thresholds.
+        diagonal: Image diagonal, pixels, that lengths in `judge` are shares of.
+        window_s: Length of the window over which lines are fitted.
+        samples: Most samples kept in the window.
+        bins: Most means of neighbouring samples to which lines are fitted.
+        fit_share: How much of a fit's own deviation counts where it exceeds what `noise_px` makes:
+            from so few means it is known to a third or so only. With 5 sigmas to enter, a trend
+            must exceed 5 deviations of the noise and 3 of its own fit.
+    """
+
+    judge: JudgeSettings = field(default_factory=JudgeSettings)
+    diagonal: float = 800.0
+    window_s: float = 1.5
+    samples: int = 64
+    bins: int = 8
+    fit_share: float = 0.6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Boxes:
+    """What is believed of boxes, and what it is judged by; immutable.
+
+    Attributes:
+        ids: (M,) increasing.
+        time: Seconds of the last frame.
+        times: Seconds of the samples.
+        samples: One row for each: gaps of the P pairs, then x and y of the M centres, pixels.
+        smooth: (M, 4) the boxes, smoothed; what states are judged by.
+        latch: (JUDGED + 1, P) states; the last row is the approach.
+        gap: (P,) pixels, negative the depth of overlap.
+        rate: (P,) approach rate: trend of the gap, pixels per second, negative when closing.
+        rate_sigma: (P,) its standard deviation.
+        velocity: (M, 2) pixels per second.
+    """
+
+    ids: tuple[int, ...] = ()
+    time: float = 0.0
+    times: tuple[float, ...] = ()
+    samples: tuple[Floats, ...] = ()
+    smooth: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    latch: Latch = field(default_factory=lambda: unknown_latch((JUDGED + 1, 0), 0.0))
+    gap: Floats = field(default_factory=lambda: np.zeros(0))
+    rate: Floats = field(default_factory=lambda: np.zeros(0))
+    rate_sigma: Floats = field(default_factory=lambda: np.zeros(0))
+    velocity: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+    @property
+    def rcc8(self) -> Codes:
+        """(P,) codes into `RCC8`."""
+        return from_signs(self.latch.state[ORDER])
+
+    def rcc8_of(self, a: int, b: int) -> str | None:
+        """What a is to b in RCC-8, or None while unknown."""
+        k, turned = self._pair(a, b)
+        code = int(self.rcc8[k])
+        return _name(RCC8, CONVERSE[code] if turned else code)
+
+    def qtc_of(self, a: int, b: int, *, sides: bool = False) -> str | None:
+        """QTC-B of the pair, such as '-0', or QTC-C with `sides`, such as '-0+0'."""
+        k, turned = self._pair(a, b)
+        order = slice(None, None, -1) if turned else slice(None)
+        codes = [int(c) for c in self.latch.state[AWAY, k][order]]
+        if sides:
+            codes += [int(c) for c in self.latch.state[SIDE, k][order]]
+        return text(*codes)
+
+    def direction_of(self, a: int, b: int) -> str | None:
+        """Where a lies as seen from b, or None while unknown."""
+        k, turned = self._pair(a, b)
+        code = int(self.latch.state[DIRECTION, k])
+        return _name(DIRECTION_NAMES, DIRECTION_CONVERSE[code] if turned else code)
+
+    def distance_of(self, a: int, b: int) -> str | None:
+        """Class of the distance, or None while unknown."""
+        return _name(CLASS_NAMES, self.latch.state[DISTANCE, self._pair(a, b)[0]])
+
+    def approach_of(self, a: int, b: int) -> str | None:
+        """Whether the two converge, keep their distance or diverge, or None while unknown."""
+        return _name(APPROACH_NAMES, self.latch.state[APPROACH, self._pair(a, b)[0]])
+
+    def _pair(self, a: int, b: int) -> tuple[int, bool]:
+        i, j = self.ids.index(a), self.ids.index(b)
+        low, high, m = min(i, j), max(i, j), len(self.ids)
+        return low * m - low * (low + 1) // 2 + high - low - 1, i > j
+
+
+def watch_boxes(
+    before: Boxes,
+    ids: tuple[int, ...],
+    boxes: Floats,
+    now: float,
+    settings: BoxSettings | None = None,
+) -> Boxes:
+    """One frame.
+
+    Args:
+        before: What was believed so far; `Boxes()` to begin with.
+        ids: (M,) whose boxes these are, increasing.
+        boxes: (M, 4) float: x, y, width, height, pixels; NaN for what is known but not seen now.
+        now: Seconds.
+        settings: How boxes are watched; for an image of 640 x 480 when left out.
+
+    Returns:
+        What is believed now.
+    """
+    s = settings or DEFAULT
+    kept = before if ids == before.ids else _other(before, ids, now)
+    m, p = len(ids), len(pairs(len(ids))[0])
+    boxes = np.ascontiguousarray(boxes, dtype=float)
+    gap = box_gaps(boxes)
+    smooth = smoothed(kept.smooth, boxes, now - kept.time, 6.0 * s.judge.noise_px)
+    places = boxes[:, :2] + 0.5 * boxes[:, 2:]
+    times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
+    seconds = np.array(times)
+    slope, sigma = _fit(seconds, np.stack(samples), s)
+    # What the noise of edges makes of a trend of one coordinate, and of a gap between two edges.
+    noise = slope_noise(seconds, s.judge.noise_px)
+    velocity = slope[p:].reshape(2, m).T.copy()
+    spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
+    judge, state = s.judge, kept.latch.state
+    bounds = limits(judge, s.diagonal)
+    codes = np.empty((JUDGED + 1, p), dtype=np.int8)
+    judged(state, smooth, velocity, spread, bounds, codes)
+    rate, rate_sigma = slope[:p], np.maximum(np.sqrt(2.0) * noise, s.fit_share * sigma[:p])
+    codes[APPROACH] = moving_signs(rate, rate_sigma, state[APPROACH], bounds[-4:])
+    latch = step(kept.latch, codes, now, _lasts(judge))
+    return Boxes(ids, now, times, samples, smooth, latch, gap, rate, rate_sigma, velocity)
+
+
+DEFAULT = BoxSettings()
+
+
+@lru_cache(maxsize=8)
+def _lasts(judge: JudgeSettings) -> Floats:
+    return np.append(least_durations(judge), [[judge.motion_minimum_s]], axis=0)
+
+
+def _window(
+    kept: Boxes, row: Floats, now: float, s: BoxSettings
+) -> tuple[tuple[float, ...], tuple[Floats, ...]]:
+    """Samples of the window with this one; those that come sooner than needed are left out."""
+    begin = next(
+        (k for k, t in enumerate(kept.times) if t > now - s.window_s - 1e-6), len(kept.times)
+    )
+    times, samples = kept.times[begin:], kept.samples[begin:]
+    if times and now - times[-1] < s.window_s / s.samples - 1e-6:
+        return times, samples
+    return (*times, now), (*samples, row)
+
+
+def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats]:
+    """Trends and the deviations of their fits; NaN while the window is too short."""
+    if len(times) < 6 or times[-1] - times[0] < 0.6 * s.window_s:
+        unknown = np.full(samples.shape[1], np.nan)
+        return unknown, unknown
+    return trends(times, samples, s.bins)
+
+
+def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
+    """The same of other objects: what is new has no samples and no states."""
+    rows, numbers = carried(before.ids, ids)
+    p, m = len(before.gap), len(before.ids)
+    at = np.concatenate(
+        [numbers, np.where(rows < 0, -1, p + rows), np.where(rows < 0, -1, p + m + rows)]
+    )
+    samples = tuple(np.where(at < 0, np.nan, np.append(row, np.nan)[at]) for row in before.samples)
+    smooth = np.append(before.smooth, np.full((1, 4), np.nan), axis=0)[rows]
+    latch = before.latch.select(numbers, now)
+    return Boxes(ids, before.time, before.times, samples, smooth, latch)
+
+
+def _name(names: tuple[str, ...], code: int) -> str | None:
+    return None if code == UNKNOWN else names[code]

@@ -1,0 +1,191 @@
+"""How fast an agent thinks: a step without perception, observers, replay, and minds that are kept.
+
+Scripted percepts (`endurance.py`), twenty rules, two tasks, the journal on. Times are processor time of the
+process, and of each figure the median as well as the lowest decile is told: what else a busy machine
+does makes steps slower, never faster.
+"""
+
+from __future__ import annotations
+
+import gc
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from visup.agent import Frame, Mind, Observation
+from visup.agent.cycle.agent import Agent
+from visup.agent.model.errors import SettingsError
+from visup.agent.storage.journal import Journal
+from visup.agent.storage.journal_reader import JOURNAL, Recording
+from visup.agent.storage.jsonable import plain
+from visup.evaluation.runtime.endurance import SIZE, resident_mb, script
+from visup.runs.replay import replay, settings_for
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import reasoning_agent
+from visup.sinks import Sinks
+
+COUNTS = (3, 10)
+"""Objects in the scripts."""
+TASKS = ("dock", "inspect")
+LEAST_STEPS = 300
+WARM = 100
+"""Steps at the beginning that are not measured, while objects enter and windows fill."""
+
+RULES = """
+rule near(a, b): info
+    when gap(a, b) < 20 px for 0.5 s hold 1 s
+    say "{a} is near {b}."
+rule closing_fast(a, b): info
+    when closing_speed(a, b) > 30 px/s leave 20 px/s for 0.3 s
+    say "{a} closes in on {b} fast."
+rule meets_soon(a, b): info
+    when time_to_contact(a, b) < 3 s and converging(a, b)
+    say "{a} meets {b} soon."
+rule bounced(a, b): info
+    when diverging(a, b) and touching(a, b) within 2 s
+    say "{a} bounced off {b}."
+rule stays_at(a, b): info
+    when close_to(a, b) for 5 s
+    say "{a} stays close to {b}."
+rule overlaps(a, b): info
+    when partially_overlapping(a, b) for 1 s and not coupled(a, b)
+    say "{a} overlaps {b}."
+rule side_by_side(a, b): info
+    when moving_together(a, b) for 2 s and relative_speed(a, b) < 5 px/s
+    say "{a} moves along with {b}."
+rule fast(a): info
+    when speed(a) > 60 px/s in 60 % of 2 s hold 1 s
+    say "{a} is fast."
+rule stopped(a): info
+    when not moving(a) for 2 s and moving(a) within 10 s
+    say "{a} has stopped."
+rule gone_long(a): info
+    when hidden(a) and out_of_sight(a) > 5 s
+    say "{a} has been out of sight for long."
+rule crowd(a): info
+    when exists b: gap(a, b) < 60 px for 1 s
+    say "{a} has company."
+rule follows(a, b): info
+    when moving_towards(a, b) and moving_away_from(b, a) for 1 s
+    say "{a} follows {b}."
+rule was_apart(a, b): info
+    when touching(a, b) since disconnected(a, b) within 20 s
+    say "{a} came to {b}."
+"""
+"""Of most operators one; with the seven that ship they are twenty."""
+
+
+def evaluate_pace(
+    steps: int = 2000, *, kept: int = 10_000, progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Measure the pace of reasoning.
+
+    Args:
+        steps: Of each script.
+        kept: Minds that are kept in a row.
+        progress: Told what is done.
+
+    Returns:
+        `items` for '3 objects' and '10 objects' with `ms` and `ms_low` (median and lowest decile of
+        the processor time of a step with its journal), `think_ms` (median without the journal) and
+        `alerts` (open on average); `total` with `observers` (share by which a file and a webhook that
+        answers nobody lengthen a step), `replay_fps` (frames per second of processor time) and
+        `mind_kb` (resident memory of a kept mind, with the regions that it holds).
+
+    Raises:
+        SettingsError: Too few steps to say anything.
+    """
+    if steps < LEAST_STEPS:
+        raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
+    tell = progress or (lambda _: None)
+    items: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        settings = _settings(Path(scratch))
+        for count in COUNTS:
+            tell(f"{count} objects")
+            items[f"{count} objects"] = _stepped(
+                settings, list(script(count, steps, count)), Path(scratch) / str(count)
+            )
+        tell("replay")
+        fps = _replay_fps(Path(scratch) / str(COUNTS[0]))
+        tell("observers")
+        share = _observers(settings, Path(scratch) / "alerts.jsonl")
+    tell(f"{kept} minds")
+    total = {"observers": share, "replay_fps": fps, "mind_kb": _mind_kb(kept)}
+    return {"items": items, "total": total}
+
+
+def _settings(place: Path) -> WatchSettings:
+    rules = place / "twenty.rules"
+    shipped = files("visup.rules.safety").joinpath("safety.rules").read_text(encoding="utf-8")
+    rules.write_text(shipped + RULES, encoding="utf-8")
+    return WatchSettings("scripted", tasks=TASKS, rules=(rules,))
+
+
+def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> dict[str, float]:
+    """Cost of steps and of writing them down; the journal is left in the folder."""
+    folder.mkdir()
+    journal = Journal(folder / JOURNAL)
+    journal.note(settings=plain(settings))
+    agent = reasoning_agent(settings)
+    thought, whole, alerts = [], [], []
+    for one in seen:
+        begin = time.process_time()
+        step = agent.rethink(one)
+        thought.append(time.process_time() - begin)
+        journal.record(step)
+        whole.append(time.process_time() - begin)
+        alerts.append(len(step.mind.alerts))
+    journal.close()
+    ms = 1e3 * np.array(whole[WARM:])
+    return {
+        "ms": float(np.median(ms)),
+        "ms_low": float(np.percentile(ms, 10)),
+        "think_ms": 1e3 * float(np.median(thought[WARM:])),
+        "alerts": float(np.mean(alerts[WARM:])),
+    }
+
+
+def _replay_fps(folder: Path) -> float:
+    """Replay with one task and the rules that ship, as of a recorded mission."""
+    recording = Recording.open(folder)
+    settings = replace(settings_for(recording, tasks=TASKS[:1]), rules=())
+    begin = time.process_time()
+    told = replay(recording, settings)
+    return told.steps / (time.process_time() - begin)
+
+
+def _observers(settings: WatchSettings, place: Path) -> float:
+    """Time of the cycle's own thread in observers, as a share of that of thinking."""
+    sinks = Sinks([f"file:{place}", "webhook:http://127.0.0.1:9/"], "scripted")
+    blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    agent = reasoning_agent(settings)
+    thought, told = [], []
+    for one in script(COUNTS[0], LEAST_STEPS, 2):
+        begin = time.thread_time()
+        step = agent.rethink(one)
+        middle = time.thread_time()
+        sinks(step, blank)
+        thought.append(middle - begin)
+        told.append(time.thread_time() - middle)
+    sinks.close()
+    return float(np.sum(told[WARM:]) / np.sum(thought[WARM:]))
+
+
+def _mind_kb(count: int) -> float:
+    agent: Agent = reasoning_agent(WatchSettings("scripted"))
+    minds: list[Mind] = []
+    for k, one in enumerate(script(COUNTS[0], WARM + count, 1)):
+        if k == WARM:
+            gc.collect()
+            before = resident_mb()
+        mind = agent.rethink(one).mind
+        if k >= WARM:
+            minds.append(mind)
+    return 1024 * (resident_mb() - before) / len(minds)

@@ -1,0 +1,243 @@
+"""Kills runs at random moments, goes on with them, and compares them with an unbroken one.
+
+Each run is a process of its own that gets SIGKILL, so that nothing is tidied up. A quarter of the resumed
+runs are killed again; a third keep no states and look at all frames again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from visup.agent.model.errors import OutputError, SettingsError, VisupError
+from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text
+from visup.runs.resume import past_of
+from visup.runs.runner import RunOptions, supervise
+from visup.runs.settings import WatchSettings
+from visup.terminal.narrator import Narrator
+
+KILLED_AGAIN = 0.25
+STATELESS = 1 / 3
+STATE_EVERY_S = 0.4
+MOST_RESUMES = 20
+LONGEST_START_S = 60.0
+SIZE, FRAMES, FPS = (96, 72), 50, 10.0
+
+
+def evaluate_resume(
+    settings: WatchSettings | None = None,
+    *,
+    kills: int = 200,
+    seed: int = 0,
+    state_every_s: float = STATE_EVERY_S,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Kill runs and resume them.
+
+    Args:
+        settings: What is watched; a synthetic clip of two squares that cross when left out.
+        kills: How many runs are killed.
+        seed: Of the moments.
+        state_every_s: Seconds between states, in the runs that keep them.
+        progress: Told what is done.
+
+    Returns:
+        `items` 'with states' and 'without', each with `kills`, `early` (killed before anything was
+        recorded, and nothing had been printed), `resumed` (times, some more than once), `equal` (runs
+        whose events, verdict and beliefs at each frame equal the unbroken run's), `lost` (printed events
+        that the journal lacks) and `resume_s` (median time until the run went on and ended); `failures`
+        names what differs.
+
+    Raises:
+        SettingsError: This system has no processes that can be forked and killed.
+    """
+    if not hasattr(os, "fork"):
+        raise SettingsError("runs can only be killed where processes can be forked")
+    rng = np.random.default_rng(seed)
+    tally: dict[str, _Tally] = {"with states": _Tally(), "without": _Tally()}
+    failures: list[str] = []
+    with tempfile.TemporaryDirectory() as scratch:
+        place = Path(scratch)
+        settings = settings or WatchSettings(source=str(crossing(place / "clip.avi", seed)))
+        child = _begin(settings, place / "whole", state_every_s)
+        begin = time.perf_counter()
+        _wait(child)
+        whole_s = time.perf_counter() - begin
+        expected = _outcome(place / "whole")
+        for trial in range(kills):
+            if progress:
+                progress(f"{trial} of {kills} runs killed")
+            stateless = rng.random() < STATELESS
+            every = 0.0 if stateless else state_every_s
+            one = tally["without" if stateless else "with states"]
+            said = _trial(settings, place / f"{trial}", every, whole_s, expected, rng, one)
+            failures += [f"run {trial}: {text}" for text in said]
+    items = {name: t.figures() for name, t in tally.items() if t.kills}
+    total = {k: sum(i[k] for i in items.values()) for k in ("kills", "early", "equal", "lost")}
+    return {"items": items, "total": {**total, "whole_s": whole_s}, "failures": failures}
+
+
+def crossing(path: Path, seed: int) -> Path:
+    """A short clip of two textured squares that cross a textured ground, with sensor noise."""
+    import cv2
+
+    rng = np.random.default_rng(seed)
+    width, height = SIZE
+    grain = cv2.GaussianBlur(rng.integers(0, 255, (height, width, 3)).astype(np.uint8), (0, 0), 1.5)
+    squares = [
+        cv2.GaussianBlur(rng.integers(0, 255, (26, 26, 3)).astype(np.uint8), (0, 0), 1.2)
+        for _ in range(2)
+    ]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), FPS, SIZE)
+    for i in range(FRAMES):
+        image = grain + rng.normal(0.0, 1.5, grain.shape)
+        for square, x, y in ((squares[0], int(1.6 * i), 8), (squares[1], 70 - int(1.6 * i), 40)):
+            x = int(np.clip(x, 0, width - 26))
+            image[y : y + 26, x : x + 26] = square
+        writer.write(np.clip(image, 0, 255).astype(np.uint8))
+    writer.release()
+    return path
+
+
+class _Tally:
+    def __init__(self) -> None:
+        self.kills = self.early = self.resumed = self.equal = self.lost = 0
+        self.seconds: list[float] = []
+
+    def figures(self) -> dict[str, Any]:
+        names = ("kills", "early", "resumed", "equal", "lost")
+        figures: dict[str, Any] = {n: getattr(self, n) for n in names}
+        return {**figures, "resume_s": float(np.median(self.seconds or [0.0]))}
+
+
+def _trial(
+    settings: WatchSettings,
+    folder: Path,
+    every: float,
+    whole_s: float,
+    expected: object,
+    rng: np.random.Generator,
+    tally: _Tally,
+) -> Sequence[str]:
+    """Kill one run and go on with it to its end; what is wrong with it."""
+    tally.kills += 1
+    _kill(_begin(settings, folder, every), float(rng.uniform(0.0, whole_s)))
+    try:
+        past_of(folder)
+    except OutputError as nothing:
+        if "is over" not in nothing.what:
+            tally.early += 1
+            tally.equal += not _printed(folder)
+            return [f"{nothing.what}, but events were printed"] if _printed(folder) else []
+    missing = _missing(folder)
+    for _ in range(MOST_RESUMES):
+        begin = time.perf_counter()
+        child = _resume(folder, every)
+        if child is None:
+            break
+        tally.resumed += 1
+        if rng.random() < KILLED_AGAIN:
+            _kill(child, float(rng.uniform(0.0, whole_s)))
+        else:
+            _wait(child)
+            tally.seconds.append(time.perf_counter() - begin)
+        missing += _missing(folder)
+    tally.lost += missing
+    same = _outcome(folder) == expected
+    tally.equal += same
+    said = [] if same else ["another outcome than the unbroken run's"]
+    return [*said, *([f"{missing} printed events are missing"] if missing else [])]
+
+
+def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
+    """A process that begins a run; it has begun to record."""
+    folder.mkdir()
+    child = _forked(folder, lambda console: _supervise(settings, folder, every, console, False))
+    until = time.monotonic() + LONGEST_START_S
+    while not (folder / JOURNAL).exists() and time.monotonic() < until:
+        time.sleep(0.005)
+    return child
+
+
+def _resume(folder: Path, every: float) -> int | None:
+    """A process that goes on with a run, or None when the run is over."""
+    try:
+        past = past_of(folder)
+    except OutputError:
+        return None
+    return _forked(folder, lambda console: _supervise(past.settings, folder, every, console, True))
+
+
+def _supervise(
+    settings: WatchSettings, folder: Path, every: float, console: Console, resume: bool
+) -> None:
+    past = past_of(folder) if resume else None
+    options = RunOptions(video=False, report=False, state_every_s=every)
+    supervise(settings, folder, observers=[Narrator(console, True)], options=options, past=past)
+
+
+def _forked(folder: Path, run: Callable[[Console], None]) -> int:
+    """Run in a child whose standard output goes to a file; its process id."""
+    child = os.fork()
+    if child:
+        return child
+    code = 1
+    try:
+        out = os.open(folder / "printed", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        os.dup2(out, 1)
+        sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115  # of this process only
+        run(Console())
+        sys.stdout.flush()
+        code = 0
+    except VisupError as fault:
+        os.write(2, f"{fault}\n".encode())
+    finally:
+        os._exit(code)
+
+
+def _kill(child: int, after_s: float) -> None:
+    time.sleep(after_s)
+    with suppress(ProcessLookupError):
+        os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+
+
+def _wait(child: int) -> None:
+    _, status = os.waitpid(child, 0)
+    if status:
+        raise OutputError("a run that was not killed failed")
+
+
+def _printed(folder: Path) -> list[str]:
+    """Events that were printed whole."""
+    path = folder / "printed"
+    lines = path.read_text().split("\n")[:-1] if path.exists() else []
+    return [event_text(json.loads(line)) for line in lines]
+
+
+def _missing(folder: Path) -> int:
+    recorded = {event_text(e) for e in Recording.open(folder).events()}
+    return sum(line not in recorded for line in _printed(folder))
+
+
+def _outcome(folder: Path) -> object:
+    """Events, verdict, alerts, and what was seen and believed at each frame."""
+    recording = Recording.open(folder / JOURNAL)
+    facts = recording.facts()
+    return (
+        (folder / "events.jsonl").read_bytes(),
+        (facts["verdict"], facts["steps"], facts["ended"]),
+        recording.alerts(),
+        list(recording.summaries()),
+    )

@@ -1,0 +1,185 @@
+"""`visup eval stepping`: what going back costs, what is kept for it, and whether it leads to the same.
+
+Three bodies that move, meet and part (as of `soak`), all reasoning, one task. Every region owns its mask
+and outline, as regions that were seen do.
+"""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from visup.agent import Mind, Observation, Region
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.step import Step
+from visup.agent.storage.checkpoint import frozen
+from visup.evaluation.runtime.soak import rss_mb, scripted
+from visup.rules.relations.reasoner import RELATIONS
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import reasoning_agent
+from visup.stepping import GivenFeed, Stepper
+
+BACK = 500
+BACK_MS = 200.0
+KEPT_MB = 200.0
+KEPT_STEPS = 10_000
+LEAST_STEPS = 1000
+BLOCK = 50  # steps made in turn with and without a stepper
+BLOCKS = 12
+PLACES = 30
+
+
+def evaluate_stepping(
+    steps: int = KEPT_STEPS, *, seed: int = 0, progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Measure a long course.
+
+    Args:
+        steps: How many are made.
+        seed: Of the places from which one goes back.
+        progress: Told what is done.
+
+    Returns:
+        `items` for going 'back' (by `BACK` steps, from anywhere), for `step` number n told without
+        going there ('look'), and for a 'branch' that is begun `BACK` steps ago: `median_ms` and
+        `most_ms` of processor time; `total` with `steps`, `kept_mb` (by how much the process has grown
+        over all steps, for 10,000 of them), `same` (the share of places at which the steps after
+        going back were byte for byte those before), and `slower` (processor time of a step made by
+        a stepper, by that of the agent alone).
+
+    Raises:
+        SettingsError: Too few steps to say anything.
+    """
+    if steps < LEAST_STEPS:
+        raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
+    tell = progress or (lambda _: None)
+    tell("by itself and stepped, in turn")
+    slower = _slower()
+    it = _stepper(steps + 10)
+    prints: dict[int, bytes] = {}
+    it.step(100)
+    gc.collect()
+    before = rss_mb()
+    while it.at < steps:
+        step = it.step(50).step
+        assert step is not None
+        prints[it.at] = _print(step)
+        if it.at % 1000 == 0:
+            tell(f"{it.at} of {steps} steps")
+    gc.collect()
+    kept = rss_mb() - before
+    tell("going back")
+    places = np.random.default_rng(seed).integers(BACK + 1, steps, PLACES)
+    back, look, branch, same = [], [], [], []
+    for place in map(int, places):
+        it.go(place)
+        back.append(_ms(lambda: it.back(BACK)))
+        near = -(-it.at // 50) * 50
+        step = it.go(max(near, 150))
+        same.append(step is not None and _print(step) == prints[it.at])
+        it.go(place)
+        look.append(_ms(partial(it.at_step, place - BACK)))
+        it.back(BACK)
+        branch.append(_ms(lambda: it.branch().step(1)))
+    items = {"back": _times(back), "look": _times(look), "branch": _times(branch)}
+    total = {
+        "steps": steps,
+        "kept_mb": kept * KEPT_STEPS / (steps - 100),
+        "same": float(np.mean(same)),
+        "slower": slower,
+    }
+    return {"items": items, "total": total}
+
+
+def missed(figures: dict[str, Any]) -> list[str]:
+    """The bars that figures miss, one sentence each."""
+    back, kept = figures["items"]["back"]["most_ms"], figures["total"]["kept_mb"]
+    found = [f"back({BACK}) took {back:.0f} ms, the bar is {BACK_MS:g}"] if back > BACK_MS else []
+    if kept > KEPT_MB:
+        found.append(f"{KEPT_STEPS} steps keep {kept:.0f} MB, the bar is {KEPT_MB:g}")
+    if figures["total"]["same"] < 1.0:
+        found.append("steps after going back differ from those before")
+    return found
+
+
+def _stepper(steps: int) -> Stepper:
+    return Stepper(_agent(), GivenFeed(_own(seen) for seen in scripted(steps)))
+
+
+def _agent() -> Any:
+    return reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
+
+
+def _own(seen: Observation) -> Observation:
+    """The same with masks and outlines that no other frame shares."""
+
+    def owned(value: object) -> object:
+        if not isinstance(value, Region):
+            return value
+        return replace(value, mask=value.mask.copy(), contour=value.contour.copy())
+
+    reports = tuple(
+        replace(r, percepts=tuple(replace(p, value=owned(p.value)) for p in r.percepts))
+        for r in seen.reports
+    )
+    return replace(seen, reports=reports)
+
+
+def _slower() -> float:
+    """Short blocks with and without take turns, so that what else the machine does meets both."""
+    agent, it = _agent(), _stepper((BLOCKS + 1) * BLOCK)
+    frames: Iterator[Observation] = (_own(seen) for seen in scripted((BLOCKS + 1) * BLOCK))
+    alone, stepped = [], []
+    for _ in range(BLOCKS + 1):
+        block = [next(frames) for _ in range(BLOCK)]
+        begin = time.process_time()
+        for seen in block:
+            agent.rethink(seen)
+        middle = time.process_time()
+        it.step(BLOCK)
+        alone.append(middle - begin)
+        stepped.append(time.process_time() - middle)
+    making = _making()
+    return float((np.percentile(stepped[1:], 25) - making) / np.percentile(alone[1:], 25))
+
+
+def _making() -> float:
+    """Processor time that a block of percepts takes to be made, which is not the stepper's."""
+    taken = []
+    for _ in range(5):
+        begin = time.process_time()
+        for seen in scripted(BLOCK):
+            _own(seen)
+        taken.append(time.process_time() - begin)
+    return float(np.percentile(taken, 25))
+
+
+def whole(mind: Mind) -> Mind:
+    """The same mind without where in memory its samples lie, which is no part of what is believed."""
+    kept = mind.memory.get(RELATIONS)
+    if kept is None:
+        return mind
+    return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
+
+
+def _print(step: Step) -> bytes:
+    return hashlib.sha256(
+        frozen((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
+    ).digest()
+
+
+def _ms(work: Callable[[], object]) -> float:
+    begin = time.process_time()
+    work()
+    return (time.process_time() - begin) * 1e3
+
+
+def _times(taken: list[float]) -> dict[str, float]:
+    return {"median_ms": float(np.median(taken)), "most_ms": max(taken)}

@@ -1,0 +1,151 @@
+"""Queries for the recognition of views: silhouettes of meshes, turned, scaled, damaged, cut.
+
+Four conditions, as the data's README names them: `clean`; `noise`, the outline displaced along its normal
+by 2 px (standard deviation) at a size of 200 px; `cut`, 15 % of the area beyond the image border; `both`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from visup.percepts.shape.building.views import render_views
+
+CONDITIONS = ("clean", "noise", "cut", "both")
+"""Names of the conditions."""
+
+SIZES = (60.0, 300.0)
+"""Least and greatest longer side of a query, pixels."""
+
+NOISE = 0.01
+"""Standard deviation of the outline's displacement, as a share of the longer side: 2 px at 200 px."""
+
+NOISE_LENGTH = 0.015
+"""Over how much of the longer side displacements are alike: 3 px at 200 px."""
+
+CUT_SHARE = 0.15
+"""Share of the area that lies beyond the border."""
+
+_DRAWN = 400
+_MARGIN = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """A silhouette whose object and direction are known.
+
+    Attributes:
+        name: The object.
+        direction: (3,) unit vector from the object to the viewer, mesh frame.
+        masks: Condition -> (H, W) bool. Of cut ones, one side of the array is the image border.
+    """
+
+    name: str
+    direction: NDArray[np.float64]
+    masks: dict[str, NDArray[np.bool_]]
+
+
+def draw_queries(name: str, mesh: Any, count: int, seed: int) -> list[Query]:
+    """Silhouettes from random directions over the whole sphere, with random roll and size.
+
+    Args:
+        name: The object.
+        mesh: A ``trimesh.Trimesh``.
+        count: How many.
+        seed: Of all that is drawn; with the name it gives the same queries again.
+
+    Raises:
+        ExtraMissingError: What renders meshes is not installed.
+    """
+    rng = np.random.default_rng([seed, *name.encode()])
+    directions = rng.normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    seen = render_views(mesh, directions, _DRAWN)
+    return [Query(name, v.direction, _conditions(v.mask, rng)) for v in seen]
+
+
+def _conditions(mask: NDArray[np.bool_], rng: np.random.Generator) -> dict[str, NDArray[np.bool_]]:
+    size, roll = rng.uniform(*SIZES), rng.uniform(0.0, 2 * np.pi)
+    side = int(rng.integers(4))
+    clean = turned_and_scaled(mask, roll, size)
+    noisy = with_contour_noise(clean, NOISE * size, NOISE_LENGTH * size, rng)
+    return {
+        "clean": clean,
+        "noise": noisy,
+        "cut": cut_by_border(clean, CUT_SHARE, side),
+        "both": cut_by_border(noisy, CUT_SHARE, side),
+    }
+
+
+def turned_and_scaled(mask: NDArray[np.bool_], roll: float, size: float) -> NDArray[np.bool_]:
+    """A silhouette turned in the image plane and brought to a size.
+
+    Args:
+        mask: (H, W) bool.
+        roll: Radians from x towards y (clockwise in the image).
+        size: Longer side of its box afterwards, pixels.
+
+    Returns:
+        (N, N) bool with a margin on all sides.
+    """
+    rows, columns = np.nonzero(mask)
+    turn = np.array([[np.cos(roll), -np.sin(roll)], [np.sin(roll), np.cos(roll)]])
+    spots = np.stack([columns, rows], axis=1) @ turn.T
+    low, high = spots.min(axis=0), spots.max(axis=0)
+    scale = size / (float((high - low).max()) + 1.0)
+    side = int(np.ceil(size)) + 2 * _MARGIN
+    move = side / 2 - scale * (low + high) / 2
+    sharp = mask.astype(np.float32)
+    tone = cv2.GaussianBlur(sharp, (0, 0), 0.5 / scale) if scale < 1 else sharp
+    warp = np.hstack([scale * turn, move[:, None]])
+    return np.asarray(cv2.warpAffine(tone, warp, (side, side), flags=cv2.INTER_LINEAR) > 0.5)
+
+
+def with_contour_noise(
+    mask: NDArray[np.bool_], sigma: float, length: float, rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """A silhouette whose outline is displaced along its normal at random.
+
+    The level at which the signed distance to the outline is cut is a smooth random field: outlines may
+    meet, parts thinner than the noise may break off or vanish, as they do in segmentation.
+
+    Args:
+        mask: (H, W) bool.
+        sigma: Standard deviation of the displacement, pixels.
+        length: Standard deviation of the Gaussian that smooths the field, pixels.
+        rng: Source of the noise.
+
+    Returns:
+        Bool of the mask's size and a margin; the mask itself when noise would leave nothing.
+    """
+    margin = int(np.ceil(4 * sigma)) + 2
+    padded = np.pad(mask, margin)
+    solid = padded.astype(np.uint8)
+    inside = cv2.distanceTransform(solid, cv2.DIST_L2, 5) - 0.5
+    outside = cv2.distanceTransform(1 - solid, cv2.DIST_L2, 5) - 0.5
+    depth = np.where(padded, inside, -outside)
+    field = gaussian_filter(rng.normal(size=padded.shape), length, mode="wrap")
+    noisy = depth > field * (2 * np.sqrt(np.pi) * length * sigma)
+    return np.asarray(noisy if noisy.any() else padded)
+
+
+def cut_by_border(mask: NDArray[np.bool_], share: float, side: int) -> NDArray[np.bool_]:
+    """A silhouette of which a share lies beyond the image border.
+
+    Args:
+        mask: (H, W) bool.
+        share: Share of its area that is lost.
+        side: 0 to 3: quarter turns that bring the side that is cut to the left.
+
+    Returns:
+        The mask without what is lost; one side of the array is the border.
+    """
+    turned = np.rot90(mask, side)
+    sums = np.cumsum(np.count_nonzero(turned, axis=0))
+    first = int(np.searchsorted(sums, share * sums[-1]))
+    return np.rot90(turned[:, first:], -side).copy()

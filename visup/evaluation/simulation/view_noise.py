@@ -1,0 +1,132 @@
+"""View hypotheses made from true orientations, with the errors that matching makes.
+
+A model is told by views from directions spread over half the sphere, each standing for the opposite one too
+(`half_sphere_directions`). A look offers the views whose directions are nearest to the true one, less
+similar the farther; at random one beside them comes first, or quite another does, or none at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Hypothesis
+from visup.agent.model.orientation import orientations, swing_and_roll
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewNoise:
+    """How hypotheses differ from the truth.
+
+    Attributes:
+        missing: Share of looks that give nothing.
+        wrong: Share of looks whose first hypothesis is wrong: another model, or another view.
+        wrong_run: Looks for which one wrong hypothesis comes again, on average.
+        twin: Share of looks at which the mirror image is taken for the view: the opposite direction.
+        roll_deg: Standard deviation of the turn in the plane.
+        similarity: Similarity of a view seen from its own direction.
+        fall: Loss of similarity at 20 degrees from it; it grows with the square of the angle.
+        similarity_sigma: Standard deviation of each similarity.
+        top: Hypotheses of the right model in a look.
+    """
+
+    missing: float = 0.15
+    wrong: float = 0.3
+    wrong_run: float = 2.0
+    twin: float = 0.05
+    roll_deg: float = 5.0
+    similarity: float = 0.85
+    fall: float = 0.15
+    similarity_sigma: float = 0.03
+    top: int = 3
+
+
+class ToldViews:
+    """Hypotheses for one object, look by look.
+
+    Args:
+        name: The object's model.
+        directions: (V, 3) unit vectors of the model's views, model frame; opposite ones are views too.
+        noise: How hypotheses differ from the truth.
+        rng: Source of chance.
+        others: Models that it may be mistaken for; with none, another view of its own is.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        directions: Floats,
+        noise: ViewNoise,
+        rng: np.random.Generator,
+        others: tuple[str, ...] = (),
+    ) -> None:
+        self.name, self.noise, self.rng, self.others = name, noise, rng, others
+        self._count = len(directions)
+        self._upright = orientations(np.concatenate([directions, -directions]), 0.0)
+        self._mistake: Hypothesis | None = None
+
+    def __call__(self, orientation: Floats, region_id: int) -> tuple[Hypothesis, ...]:
+        """Hypotheses of one look, best first.
+
+        Args:
+            orientation: (3, 3) true orientation, model to camera.
+            region_id: The object's region.
+        """
+        noise, rng = self.noise, self.rng
+        if rng.random() < noise.missing:
+            return ()
+        swing, _ = swing_and_roll(self._upright, orientation)
+        fall = noise.fall * (np.degrees(swing) / 20.0) ** 2
+        similarity = noise.similarity - fall + noise.similarity_sigma * rng.normal(size=len(swing))
+        likeliest = np.argsort(-similarity, kind="stable")[: noise.top]
+        said = [self._seen(int(k), float(similarity[k]), orientation, region_id) for k in likeliest]
+        if rng.random() < noise.twin:
+            said[0] = _twin(said[0])
+        first = self._mistaken(said[0], orientation)
+        return (first, *said) if first is not None else tuple(said)
+
+    def _seen(self, view: int, similarity: float, true: Floats, region_id: int) -> Hypothesis:
+        _, roll = swing_and_roll(self._upright[view], true)
+        turned = float(roll) + np.radians(self.noise.roll_deg) * self.rng.normal()
+        x, y, z = (-self._upright[view][2]).tolist()
+        known = float(np.clip(similarity, 0.0, 1.0))
+        return Hypothesis(
+            region_id, self.name, view % self._count, known, turned, direction=(x, y, z)
+        )
+
+    def _mistaken(self, right: Hypothesis, true: Floats) -> Hypothesis | None:
+        """A wrong hypothesis that is more similar than the right one; runs of them come again."""
+        noise, rng = self.noise, self.rng
+        going_on = self._mistake is not None and rng.random() < 1.0 - 1.0 / noise.wrong_run
+        # As many looks are wrong on average, whatever the length of runs.
+        begin = noise.wrong / (noise.wrong_run * (1.0 - noise.wrong))
+        if not going_on:
+            self._mistake = None
+        if self._mistake is None and not going_on and rng.random() < min(1.0, begin):
+            self._mistake = self._any(right.region_id)
+        if self._mistake is None:
+            return None
+        shown = min(1.0, right.similarity + 0.05 * rng.random())
+        m = self._mistake
+        return Hypothesis(m.region_id, m.name, m.view, shown, m.rotation, direction=m.direction)
+
+    def _any(self, region_id: int) -> Hypothesis:
+        rng = self.rng
+        view = int(rng.integers(len(self._upright)))
+        names = (self.name, *self.others)
+        name = names[int(rng.integers(len(names)))]
+        x, y, z = (-self._upright[view][2]).tolist()
+        roll = float(rng.uniform(-np.pi, np.pi))
+        return Hypothesis(region_id, name, view % self._count, 0.0, roll, direction=(x, y, z))
+
+
+def _twin(h: Hypothesis) -> Hypothesis:
+    """The same silhouette taken for its mirror image: seen from behind."""
+    if h.direction is None:
+        return h
+    x, y, z = h.direction
+    return Hypothesis(h.region_id, h.name, h.view, h.similarity, h.rotation, h.scale, (-x, -y, -z))

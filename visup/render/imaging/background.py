@@ -1,0 +1,168 @@
+"""What is behind everything: stars, a cloudy Earth with its limb, or a patterned surface far away."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from visup.render.imaging.texture import pattern
+from visup.render.scenario.optics import Camera, Earth, Light, Panorama, Stars
+from visup.render.scenario.trajectories import spin_about
+
+Floats = NDArray[np.float32]
+EARTH_RADIUS_KM = 6371.0
+MAP_SIDE = 1536
+"""Pixels along each side of the map of clouds."""
+
+AIR_KM = 60.0
+"""Height of the air that shows as the bright rim of the Earth."""
+
+OCEAN = np.array([0.30, 0.17, 0.08], np.float32)
+CLOUD = np.array([0.95, 0.95, 0.95], np.float32)
+AIR = np.array([0.90, 0.65, 0.45], np.float32)
+
+
+def stars(camera: Camera, rotation: NDArray[np.float64], settings: Stars | Earth) -> Floats:
+    """The starry sky.
+
+    Args:
+        camera: Size and field of view.
+        rotation: (3, 3), camera to world.
+        settings: How many stars and how bright the brightest ones are.
+
+    Returns:
+        (H, W, 3) float32 radiance, BGR.
+    """
+    width, height = camera.size
+    random = np.random.default_rng(settings.seed)
+    directions = random.standard_normal((settings.count, 3))
+    # Three times as many stars per magnitude, which is what the sky has.
+    light = 3.0 ** (-4.0 * random.random(settings.count)) * min(settings.brightness, 1.0)
+    seen = directions @ rotation
+    front = seen[:, 2] > 0
+    x = camera.focal_px * seen[front, 0] / seen[front, 2] + (width - 1) / 2
+    y = camera.focal_px * seen[front, 1] / seen[front, 2] + (height - 1) / 2
+    grey = np.zeros((height, width), np.float32)
+    _splat(grey, x, y, light[front])
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
+def earth(
+    rays: Floats, rotation: NDArray[np.float64], settings: Earth, light: Light
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """The Earth as seen from a low orbit.
+
+    Args:
+        rays: (N, 3) float32 unit directions, world.
+        rotation: (3, 3), turns the world to what the Earth itself is drawn in; see `ground_turn`.
+        settings: Altitude, clouds, brightness.
+        light: Where the Earth and the sun are.
+
+    Returns:
+        (N, 3) float32 radiance, BGR, and (N,) bool, whether the ray meets the Earth or its air.
+    """
+    down = np.asarray(light.earth, float) / np.linalg.norm(light.earth)
+    sun = np.asarray(light.sun, float) / np.linalg.norm(light.sun)
+    far = EARTH_RADIUS_KM + settings.altitude_km
+    along = rays.astype(np.float64) @ (down * far)
+    closest = np.sqrt(np.maximum(far**2 - along**2, 0.0))
+    closest = np.where(along > 0, closest, np.inf)
+    radiance = np.zeros((len(rays), 3), np.float32)
+    air = np.clip(1.0 - (closest - EARTH_RADIUS_KM) / AIR_KM, 0.0, 1.0)
+    glow = (closest >= EARTH_RADIUS_KM) & (air > 0)
+    radiance[glow] = (0.5 * air[glow] ** 2)[:, None] * AIR
+    ground = closest < EARTH_RADIUS_KM
+    distance = along[ground] - np.sqrt(EARTH_RADIUS_KM**2 - closest[ground] ** 2)
+    points = rays[ground] * distance[:, None] - down * far
+    normals = points / EARTH_RADIUS_KM
+    lit = np.clip(normals @ sun, 0.0, None) * 0.85 + 0.15
+    extent = float(np.sqrt(1 - (EARTH_RADIUS_KM / far) ** 2))
+    ground_at = normals @ rotation @ _across(down)
+    cover = clouds(ground_at, extent, settings.clouds, settings.seed)[:, None]
+    surface = OCEAN * (1 - cover) + CLOUD * cover
+    haze = np.clip((closest[ground] / EARTH_RADIUS_KM - 0.97) / 0.03, 0.0, 1.0)[:, None] ** 2 * 0.5
+    radiance[ground] = (surface * (1 - haze) + AIR * haze) * lit[:, None]
+    return radiance * np.float32(settings.brightness), glow | ground
+
+
+def panorama(rays: Floats, settings: Panorama) -> Floats:
+    """A patterned surface far away on all sides, still in the world.
+
+    Args:
+        rays: (N, 3) float32 unit directions, world.
+        settings: Its colours and the size of its blotches.
+
+    Returns:
+        (N, 3) float32 radiance, BGR.
+    """
+    blend = (0.5 + 0.5 * pattern(rays / np.radians(settings.size_deg), settings.seed))[:, None]
+    dark, light = (np.array(c[::-1], np.float32) for c in settings.colours)
+    return np.asarray(dark + np.clip(blend, 0, 1) * (light - dark), np.float32)
+
+
+def ground_turn(settings: Earth, time: float) -> NDArray[np.float64]:
+    """(3, 3): how the ground has turned under the camera at a time."""
+    turn = spin_about(np.asarray(settings.turn_axis, float), settings.turn_deg_per_s * time)
+    return np.asarray(turn.as_matrix())
+
+
+def clouds(ground: NDArray[np.float64], extent: float, amount: float, seed: int) -> Floats:
+    """How much cloud there is over places on the ground.
+
+    Args:
+        ground: (N, 2) places in the plane through the middle of the Earth, across the line of sight to
+            it, in Earth radii; they may lie anywhere, the weather repeats.
+        extent: Half the side of the square that is drawn, Earth radii.
+        amount: 0 for a clear sky to 1 for an overcast one.
+        seed: Chooses the weather.
+
+    Returns:
+        (N,) float32, 0 to 1.
+    """
+    drawn = _cloud_map(extent, amount, seed)
+    at = (ground / extent + 1) * (MAP_SIDE - 1) / 2
+    return np.asarray(map_coordinates(drawn, at.T, order=1, mode="mirror"), np.float32)
+
+
+@lru_cache(maxsize=4)
+def _cloud_map(extent: float, amount: float, seed: int) -> Floats:
+    """(MAP_SIDE, MAP_SIDE): noise of six sizes added up, thresholded to clouds with soft edges."""
+    random = np.random.default_rng(seed)
+    total = np.zeros((MAP_SIDE, MAP_SIDE), np.float32)
+    weight, cells = 0.5, 30.0
+    for _ in range(6):
+        side = max(4, round(2 * extent * cells))
+        grid = random.random((side, side), dtype=np.float32)
+        total += weight * cv2.resize(grid, (MAP_SIDE, MAP_SIDE), interpolation=cv2.INTER_CUBIC)
+        weight, cells = weight * 0.58, cells * 2.1
+    level = float(np.quantile(total, 1 - amount))
+    return np.asarray(np.clip((total - level) / 0.3 + 0.4, 0.0, 1.0), np.float32)
+
+
+def _across(down: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 2): two directions square to one and to each other."""
+    other = np.eye(3)[int(np.argmin(np.abs(down)))]
+    first = np.cross(down, other)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(down, first)], axis=1)
+
+
+def _splat(
+    image: Floats, x: NDArray[np.float64], y: NDArray[np.float64], light: NDArray[np.float64]
+) -> None:
+    """Add points of light, shared bilinearly between four pixels."""
+    height, width = image.shape
+    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = x - x0, y - y0
+    for dx, dy, share in (
+        (0, 0, (1 - fx) * (1 - fy)),
+        (1, 0, fx * (1 - fy)),
+        (0, 1, (1 - fx) * fy),
+        (1, 1, fx * fy),
+    ):
+        inside = (x0 + dx >= 0) & (x0 + dx < width) & (y0 + dy >= 0) & (y0 + dy < height)
+        np.add.at(image, (y0[inside] + dy, x0[inside] + dx), (light * share)[inside])

@@ -1,0 +1,107 @@
+"""Casting rays at the bodies of a scene, in the camera's frame.
+
+Everything here stands in camera coordinates: x right, y down, z forward, metres, the pinhole at the
+origin. Rays are cast by Embree in single precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+from numpy.typing import NDArray
+
+from visup.render.meshes.solids import Solid
+
+Floats = NDArray[np.float32]
+OFFSET = 1e-3
+"""Metres by which a shadow ray starts off its surface, so as not to hit it again."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """A solid placed before the camera.
+
+    Attributes:
+        name: Its name.
+        label: Its value in masks; 0 for scenery.
+        solid: Its mesh.
+        pose: (4, 4), from the solid's frame to the camera's.
+    """
+
+    name: str
+    label: int
+    solid: Solid
+    pose: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hits:
+    """What N rays met.
+
+    Attributes:
+        body: (N,) int32, index of the body, -1 where nothing was met.
+        face: (N,) int32, index of the face in the whole scene, -1 where nothing was met.
+        distance: (N,) float32, along the ray in units of its direction; infinite where nothing was met.
+    """
+
+    body: NDArray[np.int32]
+    face: NDArray[np.int32]
+    distance: Floats
+
+
+class Caster:
+    """All bodies of a frame, ready for rays.
+
+    Args:
+        bodies: At least one.
+    """
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        self.bodies = tuple(bodies)
+        placed = [b.solid.transformed(b.pose) for b in bodies]
+        triangles = np.concatenate([s.vertices[s.faces] for s in placed]).astype(np.float32)
+        self.body = np.repeat(
+            np.arange(len(bodies), dtype=np.int32), [len(s.faces) for s in placed]
+        )
+        self.normals = np.concatenate([s.normals for s in placed]).astype(np.float32)
+        self.albedo = np.concatenate([s.albedo for s in placed]).astype(np.float32)
+        self._scene = rtcore_scene.EmbreeScene()
+        self._mesh = TriangleMesh(self._scene, triangles)
+
+    def cast(self, origins: Floats, directions: Floats) -> Hits:
+        """The nearest face along each ray; both arguments (N, 3) float32."""
+        if len(origins) == 0:
+            nothing = np.zeros(0, np.int32)
+            return Hits(nothing, nothing, np.zeros(0, np.float32))
+        result = self._scene.run(origins, directions, output=1)
+        face = np.asarray(result["primID"], np.int32)
+        met = face >= 0
+        body = np.where(met, self.body[np.where(met, face, 0)], -1).astype(np.int32)
+        distance = np.where(met, result["tfar"], np.inf).astype(np.float32)
+        return Hits(body, np.where(met, face, -1).astype(np.int32), distance)
+
+    def from_pinhole(self, directions: Floats) -> Hits:
+        """`cast` for rays that leave the camera."""
+        return self.cast(np.zeros_like(directions), directions)
+
+    def blocked(self, points: Floats, normals: Floats, direction: Floats) -> NDArray[np.bool_]:
+        """Whether something stands between points and a distant light.
+
+        Args:
+            points: (N, 3) on surfaces.
+            normals: (N, 3) unit, on the side of the surface that is meant.
+            direction: (3,) unit, towards the light.
+
+        Returns:
+            (N,).
+        """
+        if len(points) == 0:
+            return np.zeros(0, bool)
+        scale = OFFSET * np.maximum(1.0, np.linalg.norm(points, axis=1, keepdims=True) * 0.1)
+        origins = (points + normals * scale).astype(np.float32)
+        directions = np.ascontiguousarray(np.broadcast_to(direction, origins.shape), np.float32)
+        return np.asarray(self._scene.run(origins, directions, query="INTERSECT")) >= 0

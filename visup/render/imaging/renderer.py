@@ -1,0 +1,388 @@
+"""The frame loop: from a scenario and a number to a picture, a mask and what is true of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import radians
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from visup.agent.model.errors import SettingsError
+from visup.render.imaging import background as sky
+from visup.render.imaging.raycast import Body, Caster, Hits
+from visup.render.imaging.sensor import expose
+from visup.render.imaging.texture import pattern
+from visup.render.meshes import arm as arm_model
+from visup.render.meshes.solids import Solid
+from visup.render.meshes.spacecraft import mesh
+from visup.render.scenario.optics import Camera, Earth, Light, Panorama
+from visup.render.scenario.scenario import PoseKey, Scenario, SceneObject
+from visup.render.scenario.trajectories import (
+    Matrix,
+    inverse,
+    look_at,
+    pose_of,
+    rotation_at,
+    shake,
+    spin_about,
+    value_at,
+)
+
+Floats = NDArray[np.float32]
+SUBRAYS = 3
+"""Rays along each side of a pixel on an edge; other pixels take one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A rendered frame.
+
+    Attributes:
+        index: Number of the frame.
+        image: (H, W, 3) uint8, BGR.
+        mask: (H, W) uint8, the label of what the ray through the middle of each pixel meets.
+        amodal_px: For each labelled object, pixels it would show with nothing before it.
+        poses: For each labelled rigid object, (4, 4) from its frame to the camera's; arms have none.
+    """
+
+    index: int
+    image: NDArray[np.uint8]
+    mask: NDArray[np.uint8]
+    amodal_px: dict[str, int]
+    poses: dict[str, Matrix]
+
+
+def pixel_rays(camera: Camera, at: NDArray[np.float64] | None = None) -> Floats:
+    """Directions of rays through points of the image.
+
+    Args:
+        camera: Size and field of view; square pixels, the axis through the middle of the image.
+        at: (N, 2) points (x, y) in pixels, the centres of all pixels row by row when None.
+
+    Returns:
+        (N, 3) float32 in the camera's frame, z = 1.
+    """
+    width, height = camera.size
+    if at is None:
+        y, x = np.mgrid[:height, :width]
+        at = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+    flat = (at - [(width - 1) / 2, (height - 1) / 2]) / camera.focal_px
+    return np.column_stack([flat, np.ones(len(flat))]).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """How the scene is seen at a time.
+
+    Attributes:
+        time: Seconds.
+        camera: As zoomed.
+        pose: (4, 4), from the camera's frame to the world's.
+        light: As strong as it is.
+        rays: (H * W, 3) float32 through the pixels, row by row, in the camera's frame.
+    """
+
+    time: float
+    camera: Camera
+    pose: Matrix
+    light: Light
+    rays: Floats
+
+
+class Renderer:
+    """Makes any frame of a scenario, in any order.
+
+    Args:
+        scenario: What to render.
+
+    Raises:
+        SettingsError: A mesh is missing, or an arm cannot reach.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self._solids = {o.name: _solid(o) for o in scenario.object if o.mesh != "arm"}
+        self._objects = {o.name: o for o in scenario.object}
+        self._rays: tuple[float, Floats] | None = None
+        self._sky: tuple[object, Floats] | None = None
+
+    def picture(self, index: int) -> Picture:
+        """Render one frame.
+
+        Args:
+            index: Number of the frame, from 0.
+
+        Returns:
+            The frame; the same for the same scenario and index, whatever was rendered before.
+        """
+        view = self.view(index)
+        bodies = self.bodies(view.time, view.pose)
+        caster = Caster(bodies)
+        width, height = view.camera.size
+        inside = self._window(bodies, view)
+        hits = _spread(caster.from_pinhole(view.rays[inside]), inside)
+        behind = self._background(view).reshape(-1, 3)
+        radiance = self._shade(caster, hits, view.rays, behind, view)
+        self._smooth_edges(radiance, caster, hits, behind, view)
+        sensor = self.scenario.sensor.at(view.time)
+        image = expose(radiance.reshape(height, width, 3), sensor, self.scenario.seed, index)
+        return Picture(
+            index,
+            image,
+            self._labels(bodies, hits),
+            self._amodal(bodies, view),
+            {b.name: b.pose for b in bodies if b.label and b.name in self._solids},
+        )
+
+    def mask(self, index: int) -> NDArray[np.uint8]:
+        """The mask of a frame alone, (H, W) uint8, as in `picture` but in a fraction of its time."""
+        view = self.view(index)
+        bodies = self.bodies(view.time, view.pose)
+        inside = self._window(bodies, view)
+        return self._labels(bodies, _spread(Caster(bodies).from_pinhole(view.rays[inside]), inside))
+
+    def view(self, index: int) -> View:
+        """How the scene is seen in a frame."""
+        time = index / self.scenario.camera.fps
+        camera = self.scenario.camera.at(time)
+        if self._rays is None or self._rays[0] != camera.fov_vertical_deg:
+            self._rays = (camera.fov_vertical_deg, pixel_rays(camera))
+        light = self.scenario.light.at(time)
+        return View(time, camera, self.camera_pose(time), light, self._rays[1])
+
+    def _labels(self, bodies: list[Body], hits: Hits) -> NDArray[np.uint8]:
+        """(H, W): the label of what each ray met."""
+        width, height = self.scenario.camera.size
+        return np.array([*(b.label for b in bodies), 0], np.uint8)[hits.body].reshape(height, width)
+
+    def camera_pose(self, time: float) -> Matrix:
+        """(4, 4) from the camera's frame to the world's."""
+        settings = self.scenario.camera
+        keys = settings.track
+        times = np.array([k.at_s for k in keys])
+        columns = np.array([[*k.position, *k.look_at, *k.up] for k in keys])
+        at = value_at(times, columns, time, settings.smooth)
+        rotation = look_at(at[:3], at[3:6], at[6:])
+        if settings.shake is not None:
+            s = settings.shake
+            rotation = rotation * shake(time, s.amplitude_deg, s.frequency_hz, s.seed)
+        return pose_of(at[:3], rotation)
+
+    def bodies(self, time: float, camera: Matrix) -> list[Body]:
+        """All objects, placed before the camera."""
+        to_camera = inverse(camera)
+        placed = []
+        for item in self.scenario.object:
+            solid = self._solids.get(item.name) or self._arm_solid(item, time)
+            placed.append(
+                Body(item.name, item.label, solid, to_camera @ self.object_pose(item, time))
+            )
+        return placed
+
+    def object_pose(self, item: SceneObject, time: float) -> Matrix:
+        """(4, 4) from an object's frame to the world's; for an arm, of its foot."""
+        if item.attach is not None and time > item.attach.from_s:
+            carrier, since = self._objects[item.attach.to], item.attach.from_s
+            carried = inverse(self.grip(carrier, since)) @ self.object_pose(item, since)
+            return np.asarray(self.grip(carrier, time) @ carried)
+        return track_pose(item, time)
+
+    def grip(self, item: SceneObject, time: float) -> Matrix:
+        """The frame that things attached to an object move with."""
+        pose = self.object_pose(item, time)
+        return pose @ arm_model.tip_pose(self._joints(item, time)) if item.mesh == "arm" else pose
+
+    def _joints(self, item: SceneObject, time: float) -> arm_model.Joints:
+        if item.joints:
+            times = np.array([k.at_s for k in item.joints])
+            angles = np.radians([k.angles_deg for k in item.joints])
+            return arm_model.Joints(*value_at(times, angles, time, item.smooth))
+        times = np.array([k.at_s for k in item.tip])
+        columns = np.array([[*k.position, *k.direction] for k in item.tip])
+        at = value_at(times, columns, time, item.smooth)
+        foot = inverse(track_pose(item, time))
+        tip = foot[:3, :3] @ at[:3] + foot[:3, 3]
+        try:
+            return arm_model.reach(
+                tip, foot[:3, :3] @ at[3:], radians(item.roll_deg), item.elbow_up
+            )
+        except SettingsError as error:
+            raise SettingsError(
+                f"{item.name} at {time:.2f} s: {error.what}", expected=error.expected
+            ) from error
+
+    def _arm_solid(self, item: SceneObject, time: float) -> Solid:
+        return _coloured(arm_model.arm_solid(self._joints(item, time)), item)
+
+    def _window(self, bodies: list[Body], view: View) -> NDArray[np.bool_]:
+        """(H * W,): the pixels inside the boxes that the bodies project to."""
+        width, height = view.camera.size
+        window = np.zeros((height, width), bool)
+        for body in bodies:
+            x0, y0, x1, y1 = _projected_box(body, view.camera)
+            window[y0:y1, x0:x1] = True
+        return window.ravel()
+
+    def _amodal(self, bodies: list[Body], view: View) -> dict[str, int]:
+        """Pixels of each labelled object were it alone."""
+        counts = {}
+        for body in bodies:
+            if not body.label:
+                continue
+            window = self._window([body], view)
+            hits = Caster([body]).from_pinhole(view.rays[window])
+            counts[body.name] = int(np.count_nonzero(hits.body >= 0))
+        return counts
+
+    def _background(self, view: View) -> Floats:
+        """(H, W, 3) radiance; kept from frame to frame while nothing of it changes."""
+        settings = self.scenario.background
+        moving = isinstance(settings, Earth) and settings.turn_deg_per_s != 0
+        lens, light = view.camera.fov_vertical_deg, view.light.strength
+        key = (view.pose[:3, :3].tobytes(), lens, light, view.time if moving else 0.0)
+        if self._sky is None or self._sky[0] != key:
+            self._sky = (key, self._draw_background(view))
+        return self._sky[1]
+
+    def _draw_background(self, view: View) -> Floats:
+        settings, rotation = self.scenario.background, view.pose[:3, :3]
+        width, height = view.camera.size
+        if isinstance(settings, Panorama):
+            drawn = sky.panorama(self._looking(view), settings) * np.float32(view.light.strength)
+            return np.asarray(drawn.reshape(height, width, 3))
+        drawn = sky.stars(view.camera, rotation, settings)
+        if isinstance(settings, Earth):
+            turn = sky.ground_turn(settings, view.time)
+            light, met = sky.earth(self._looking(view), turn, settings, view.light)
+            drawn.reshape(-1, 3)[met] = light[met] * np.float32(view.light.strength)
+        return drawn
+
+    def _looking(self, view: View) -> Floats:
+        """(H * W, 3) unit directions through the pixels, world."""
+        rays = view.rays @ view.pose[:3, :3].T.astype(np.float32)
+        return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+    def _shade(
+        self, caster: Caster, hits: Hits, rays: Floats, behind: Floats, view: View
+    ) -> Floats:
+        """(N, 3) radiance along rays from the pinhole, BGR."""
+        radiance = behind.copy()
+        met = hits.body >= 0
+        face, rays = hits.face[met], rays[met]
+        points = rays * hits.distance[met][:, None]
+        normals = caster.normals[face]
+        # Thin shells are seen from both sides: a surface always shows the side that is turned to us.
+        normals = np.where(np.sum(normals * rays, axis=1, keepdims=True) > 0, -normals, normals)
+        light = view.light
+        sun, earth = (_to_camera(view.pose, d) for d in (light.sun, light.earth))
+        facing = np.clip(normals @ sun, 0.0, None)
+        towards = np.flatnonzero(facing > 0)
+        facing[towards[caster.blocked(points[towards], normals[towards], sun)]] = 0.0
+        # The Earth fills half the sky: its light falls off gently with the angle to it.
+        glow = light.earthshine * np.maximum(0.5 + 0.5 * (normals @ earth), 0.0)
+        strength = np.float32(light.strength) * (facing + glow)
+        albedo = caster.albedo[face] * self._grain(caster, hits.body[met], points)[:, None]
+        radiance[met] = albedo[:, ::-1] * strength[:, None]
+        return radiance
+
+    def _grain(self, caster: Caster, body: NDArray[np.int32], points: Floats) -> Floats:
+        """(N,) factors of reflectance at points on bodies, by the textures of these."""
+        factor = np.ones(len(points), np.float32)
+        for number, placed in enumerate(caster.bodies):
+            texture = self._objects[placed.name].texture
+            mine = body == number
+            if texture is not None and mine.any():
+                back = inverse(placed.pose)
+                own = points[mine] @ back[:3, :3].T + back[:3, 3]
+                grain = pattern(own / texture.size, texture.seed)
+                factor[mine] = np.maximum(1 + texture.contrast * grain, 0)
+        return factor
+
+    def _smooth_edges(
+        self, radiance: Floats, caster: Caster, hits: Hits, behind: Floats, view: View
+    ) -> None:
+        """Replace pixels on edges by the mean over a grid of rays within them."""
+        width, height = view.camera.size
+        edge = np.flatnonzero(
+            _edges(radiance.reshape(height, width, 3), hits.body.reshape(height, width))
+        )
+        if len(edge) == 0:
+            return
+        steps = (np.arange(SUBRAYS) + 0.5) / SUBRAYS - 0.5
+        grid = np.array([(x, y) for y in steps for x in steps])
+        centres = np.column_stack([edge % width, edge // width]).astype(float)
+        points = (centres[:, None] + grid).reshape(-1, 2)
+        rays = pixel_rays(view.camera, points)
+        hidden = np.repeat(behind[edge], len(grid), axis=0)
+        fine = self._shade(caster, caster.from_pinhole(rays), rays, hidden, view)
+        radiance[edge] = fine.reshape(len(edge), len(grid), 3).mean(axis=1)
+
+
+def track_pose(item: SceneObject, time: float) -> Matrix:
+    """(4, 4) of an object by its keyframes and spins alone, world."""
+    keys = item.track
+    times = np.array([k.at_s for k in keys])
+    position = value_at(times, np.array([k.position for k in keys]), time, item.smooth)
+    rotation = rotation_at(times, Rotation.concatenate([_orientation(k) for k in keys]), time)
+    for spin in item.spin:
+        turned = spin.deg_per_s * max(0.0, time - spin.from_s)
+        rotation = spin_about(np.asarray(spin.axis, float), turned) * rotation
+    return pose_of(position, rotation)
+
+
+def _orientation(key: PoseKey) -> Rotation:
+    if key.quat_xyzw is not None:
+        return Rotation.from_quat(key.quat_xyzw)
+    return Rotation.from_euler("xyz", key.euler_deg or (0.0, 0.0, 0.0), degrees=True)
+
+
+def _solid(item: SceneObject) -> Solid:
+    return _coloured(mesh(item.mesh), item)
+
+
+def _coloured(solid: Solid, item: SceneObject) -> Solid:
+    coloured = solid.painted(item.colour) if item.colour is not None else solid
+    return coloured if item.scale == 1.0 else coloured.moved(scale=item.scale)
+
+
+def _to_camera(camera: Matrix, direction: tuple[float, float, float]) -> Floats:
+    d = camera[:3, :3].T @ np.asarray(direction, float)
+    return np.asarray(d / np.linalg.norm(d), np.float32)
+
+
+def _spread(hits: Hits, inside: NDArray[np.bool_]) -> Hits:
+    """Hits of some rays, put in their places among all."""
+    body = np.full(len(inside), -1, np.int32)
+    face = np.full(len(inside), -1, np.int32)
+    distance = np.full(len(inside), np.inf, np.float32)
+    body[inside], face[inside], distance[inside] = hits.body, hits.face, hits.distance
+    return replace(hits, body=body, face=face, distance=distance)
+
+
+def _edges(radiance: Floats, body: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(H, W): pixels next to another body, or to clearly lighter or darker light on the same one."""
+    grey = np.sqrt(radiance.mean(axis=2))
+    kernel = np.ones((3, 3), np.uint8)
+    contrast = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, kernel) > 0.05
+    outline = cv2.morphologyEx((body + 1).astype(np.int16), cv2.MORPH_GRADIENT, kernel) > 0
+    near = cv2.dilate((body >= 0).astype(np.uint8), kernel) > 0
+    return (contrast & near) | outline
+
+
+def _projected_box(body: Body, camera: Camera) -> tuple[int, int, int, int]:
+    """(x0, y0, x1, y1), half open: pixels that a body may touch; all of them if it passes the pinhole."""
+    width, height = camera.size
+    points = body.solid.vertices @ body.pose[:3, :3].T + body.pose[:3, 3]
+    near = 1e-3
+    if (points[:, 2] <= near).all():
+        return 0, 0, 0, 0
+    if (points[:, 2] <= near).any():
+        return 0, 0, width, height
+    xy = points[:, :2] / points[:, 2:] * camera.focal_px + [(width - 1) / 2, (height - 1) / 2]
+    low, high = np.floor(xy.min(axis=0)) - 1, np.ceil(xy.max(axis=0)) + 2
+    x0, y0 = np.clip(low, 0, [width, height]).astype(int)
+    x1, y1 = np.clip(high, 0, [width, height]).astype(int)
+    return int(x0), int(y0), int(x1), int(y1)

@@ -1,0 +1,135 @@
+"""The run in sentences: what the page says before it shows anything."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from visup.agent import Alert, Severity, Verdict
+from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.report.records import KeyFrame, RunData, Span, Subject
+
+VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {
+    Verdict.SUCCEEDED: ("Succeeded", "The task went as it should."),
+    Verdict.FAILED: ("Failed", "The task failed."),
+    Verdict.INTERRUPTED: ("Interrupted", "Something unsafe or unexpected came between."),
+    Verdict.IN_PROGRESS: (
+        "In progress",
+        "The task was still under way at the end, and nothing was wrong.",
+    ),
+    Verdict.UNKNOWN: ("Unknown", "The task could not be followed."),
+    None: ("Nothing to report", "There was no task to judge, and nothing grave was seen."),
+}
+SEVERITY_WORDS = {
+    Severity.INFO: "info",
+    Severity.WARNING: "warning",
+    Severity.CRITICAL: "critical",
+}
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+MOST_NAMED = 4
+
+
+def verdict_words(run: RunData) -> tuple[str, str]:
+    """The verdict in a word, and what it means."""
+    grave = any(a.severity > Severity.INFO for a in run.alerts)
+    if run.verdict is None and (run.tasks or grave or not run.frames):
+        return "No verdict", "The run was not judged."
+    return VERDICT_WORDS[run.verdict]
+
+
+def title_of(run: RunData) -> str:
+    """What the page is about, short: the last two parts of a path, or the source as it is."""
+    parts = PurePath(run.source).parts
+    return "/".join(parts[-2:]) if len(parts) > 2 and "://" not in run.source else run.source
+
+
+def summary(run: RunData) -> str:
+    """One paragraph: what was watched, what was seen, how it ended and why."""
+    sentences = [_watched(run), _followed(run), *_why(run), _alerted(run.alerts)]
+    return " ".join(s for s in sentences if s)
+
+
+def name_of(subject: Subject) -> str:
+    """What an object is called on the page, such as 'Object 2, spartan'."""
+    known = subject.name != UNKNOWN_OBJECT
+    return f"Object {subject.id}, {spoken(subject.name)}" if known else f"Object {subject.id}"
+
+
+def spoken(name: str) -> str:
+    """A model's name as it is said: 'payload_bay' is 'payload bay'."""
+    return name.replace("_", " ")
+
+
+def called(run: RunData, object_id: int) -> str:
+    """What an object is called, by its number."""
+    return next((name_of(s) for s in run.objects if s.id == object_id), f"Object {object_id}")
+
+
+def span_sentence(span: Span) -> str:
+    """'converging from 0.0 to 6.0 s'."""
+    return f"{span.value.replace('_', ' ')} from {span.start:.1f} to {span.end:.1f} s"
+
+
+def picture_words(run: RunData, key: KeyFrame) -> str:
+    """What a key frame shows, for those who cannot see it."""
+    seen = [f"{called(run, k.object_id)}" for k in key.looks if k.object_id is not None]
+    objects = f"in view: {'; '.join(seen)}" if seen else "no object in view"
+    return (
+        f"Frame {key.frame_index} at {key.time:.1f} s, {objects}. {' '.join(key.captions)}".strip()
+    )
+
+
+def count(n: int, what: str) -> str:
+    """'two objects', 'one object', '12 objects'."""
+    number = NUMBERS[n] if n < len(NUMBERS) else str(n)
+    return f"{number} {what}" if n == 1 else f"{number} {what}s"
+
+
+def _watched(run: RunData) -> str:
+    if not run.frames:
+        return "visup saw no frame of this source."
+    width, height = run.frame_size
+    what = f"visup watched {run.duration:.1f} s of video ({run.frames} frames, {width}×{height})"
+    if not run.tasks:
+        return f"{what} without a task."
+    names = ", ".join(f"“{t.task}”" for t in run.tasks)
+    return f"{what} against the task{'s' if len(run.tasks) > 1 else ''} {names}."
+
+
+def _followed(run: RunData) -> str:
+    if not run.frames:
+        return ""
+    if not run.objects:
+        return "It followed no object."
+    named = [s for s in run.objects if s.name != UNKNOWN_OBJECT]
+    text = f"It followed {count(len(run.objects), 'object')}"
+    if not named:
+        return f"{text}."
+    best = sorted(named, key=lambda s: (-s.share, s.id))[:MOST_NAMED]
+    names = [f"{spoken(s.name)} ({s.share:.0%})".replace("%", " %") for s in best]
+    return f"{text}, believed to be {_listed(names)}."
+
+
+def _why(run: RunData) -> list[str]:
+    return [_sentence(t.evidence) for t in run.tasks if t.evidence]
+
+
+def _alerted(alerts: tuple[Alert, ...]) -> str:
+    grave = [a for a in alerts if a.severity > Severity.INFO]
+    if not grave:
+        return "No alert was raised."
+    first = min(grave, key=lambda a: (a.opened, a.id))
+    verb = "was" if len(grave) == 1 else "were"
+    begins = "" if len(grave) == 1 else "the first "
+    text = f"{count(len(grave), 'alert')} {verb} raised, {begins}at {first.opened:.1f} s: "
+    return _sentence(text + first.cause)
+
+
+def _sentence(text: str) -> str:
+    """With a capital and a full stop."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def _listed(names: list[str]) -> str:
+    """'a', 'a and b', 'a, b and c'."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

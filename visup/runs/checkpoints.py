@@ -1,0 +1,119 @@
+"""The state of a run beside its journal: from it a run that was killed goes on within seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import visup
+from visup.agent.model.step import Step
+from visup.agent.cycle.agent import Agent
+from visup.agent.model.errors import OutputError
+from visup.agent.storage.checkpoint import StateError, frozen, thawed
+
+STATE = "state.bin"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A run after one of its steps.
+
+    Attributes:
+        frame_index: Number of the step's frame.
+        agent: For `Agent.load`.
+        kept: What the recorder remembers.
+    """
+
+    frame_index: int
+    agent: Mapping[str, Any]
+    kept: Mapping[str, Any]
+
+
+class StateKeeper:
+    """Keeps the latest state in a file, which is replaced as a whole; the disk is waited for elsewhere.
+
+    Args:
+        folder: The run folder.
+        every_s: Seconds of the source between two states; 0 keeps none.
+
+    Attributes:
+        note: Why none can be kept, or None.
+        largest: Size of the largest state so far, bytes.
+    """
+
+    def __init__(self, folder: Path, every_s: float) -> None:
+        self.note: str | None = None
+        self.largest = 0
+        self._path = folder / STATE
+        self._every_s = every_s
+        self._last: float | None = None
+        self._disk = ThreadPoolExecutor(max_workers=1, thread_name_prefix="state")
+        self._writing: Future[None] | None = None
+
+    def offer(self, agent: Agent, step: Step, kept: Callable[[], Mapping[str, Any]]) -> None:
+        """Keep the state after a step when it is time to.
+
+        Args:
+            agent: After the step.
+            step: The step, which the journal holds already.
+            kept: Tells what the recorder remembers.
+        """
+        self._last = step.time if self._last is None else self._last
+        busy = self._writing is not None and not self._writing.done()
+        if not self._every_s or self.note or busy or step.time - self._last < self._every_s:
+            return
+        self._last = step.time
+        try:
+            data = self._frozen(agent, step, kept())
+        except StateError as fault:
+            self.note = f"no state of this run is kept ({fault}): resuming it looks at all again"
+            return
+        self.largest = max(self.largest, len(data))
+        self._writing = self._disk.submit(_replace, self._path, data)
+
+    def close(self) -> None:
+        """Wait for the disk."""
+        self._disk.shutdown(wait=True)
+
+    def _frozen(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> bytes:
+        state = agent.save()
+        if state["behaviours"] is None:
+            raise StateError("a behaviour has no save and load")
+        return frozen(
+            {
+                "visup": visup.__version__,
+                "frame_index": step.frame_index,
+                "agent": state,
+                "kept": dict(kept),
+            }
+        )
+
+
+def read_state(folder: Path) -> tuple[State | None, str | None]:
+    """The state in a run folder.
+
+    Returns:
+        It, or None when there is none that can be used, and then why, when there is one.
+    """
+    try:
+        told = thawed((folder / STATE).read_bytes())
+        if told["visup"] != visup.__version__:
+            return None, f"its state is of visup {told['visup']}"
+        return State(int(told["frame_index"]), told["agent"], told["kept"]), None
+    except FileNotFoundError:
+        return None, None
+    except (OSError, OutputError, KeyError, TypeError, ValueError) as fault:
+        return None, str(fault)
+
+
+def _replace(path: Path, data: bytes) -> None:
+    draft = path.with_suffix(".new")
+    try:
+        draft.write_bytes(data)
+        draft.replace(path)
+    except OSError:
+        # The older state stays; that the disk is in trouble is told of the journal.
+        draft.unlink(missing_ok=True)

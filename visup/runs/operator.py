@@ -1,0 +1,150 @@
+"""The operator of a run: asked who is who, answers beforehand, from a file, or on the terminal.
+
+Nothing waits for an answer: lines are read in a thread of their own, and what was typed by the end of
+a step is taken up then.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+
+from visup.agent import Frame, Mind
+from visup.agent.model.step import Observer, Step
+from visup.agent.cycle.agent import Agent
+from visup.agent.cycle.answers import model_named
+from visup.agent.model.errors import SettingsError, VisupError
+
+
+def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, str]:
+    """Answers from `ID=NAME`; empty lines and what follows a `#` are left out.
+
+    >>> parse_answers(["2=arm", "", "1 = satellite  # the big one"])
+    {2: 'arm', 1: 'satellite'}
+
+    Args:
+        lines: One answer each.
+        where: Name of the file, for errors.
+
+    Raises:
+        SettingsError: One is not of that form.
+    """
+    answers = {}
+    for line in lines:
+        text = line.split("#")[0].strip()
+        if not text:
+            continue
+        number, equals, name = (part.strip() for part in text.partition("="))
+        if not (number.isdecimal() and equals and name):
+            raise SettingsError(
+                f"the answer {text!r} cannot be read",
+                where=where,
+                expected="ID=NAME, such as 2=arm",
+            )
+        answers[int(number)] = name
+    return answers
+
+
+def read_answers(path: Path) -> dict[int, str]:
+    """Answers from a file.
+
+    Raises:
+        SettingsError: It cannot be read, or a line is not of the form ID=NAME.
+    """
+    try:
+        return parse_answers(path.read_text(encoding="utf-8").splitlines(), str(path))
+    except (OSError, UnicodeDecodeError) as fault:
+        raise SettingsError(f"the answers cannot be read: {fault}", where=str(path)) from fault
+
+
+def typed_lines() -> Callable[[], list[str]] | None:
+    """What is typed on the terminal, without waiting for it; None where there is no terminal."""
+    if not sys.stdin.isatty():
+        return None
+    typed: SimpleQueue[str] = SimpleQueue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            typed.put(line)
+
+    Thread(target=read, name="operator", daemon=True).start()
+    return lambda: _taken(typed)
+
+
+def _taken(queue: SimpleQueue[str]) -> list[str]:
+    lines = []
+    while True:
+        try:
+            lines.append(queue.get_nowait())
+        except Empty:
+            return lines
+
+
+@dataclass(slots=True)
+class Operator:
+    """Hands answers to an agent.
+
+    Attributes:
+        answers: Given beforehand: object id -> name; each waits until its object is known.
+        typed: Gives the lines that were typed since it was last asked, or None.
+        tell: Told what was wrong with a typed line, and how to answer a question.
+    """
+
+    answers: dict[int, str] = field(default_factory=dict)
+    typed: Callable[[], list[str]] | None = None
+    tell: Callable[[str], None] = print
+
+    def attend(self, agent: Agent, *, at_once: bool = False) -> Observer:
+        """An observer that hands answers to an agent after each step.
+
+        Args:
+            agent: The agent.
+            at_once: Whether to hand over now what its mind is ready for; a run that was killed may
+                have been killed before it was.
+
+        Raises:
+            SettingsError: An answer that was given beforehand names what nobody knows.
+        """
+        for name in self.answers.values():
+            model_named(agent.mind, name, agent.models)
+        waiting = dict(self.answers)
+
+        def hand() -> None:
+            for number in [i for i in waiting if _known(agent.mind, i)]:
+                agent.answer(number, waiting.pop(number))
+
+        if at_once:
+            hand()
+
+        def after(step: Step, frame: Frame) -> None:
+            hand()
+            if self.typed is None:
+                return
+            for event in step.events:
+                if event.kind == "question":
+                    name = event.data["names"][0]
+                    self.tell(f"Type an answer such as {event.objects[0]}={name} at any time.")
+            for line in self.typed():
+                self._take(agent, line)
+
+        return after
+
+    def _take(self, agent: Agent, line: str) -> None:
+        """A typed line: ID=NAME, or a name alone while one question waits."""
+        waiting = agent.mind.questions
+        if "=" not in line and line.strip() and len(waiting) == 1:
+            line = f"{waiting[0].object_id}={line}"
+        try:
+            for number, name in parse_answers([line]).items():
+                agent.answer(number, name)
+        except VisupError as fault:
+            self.tell(str(fault))
+
+
+def _known(mind: Mind, object_id: int) -> bool:
+    belief = mind.objects.get(object_id)
+    return belief is not None and belief.confirmed

@@ -1,0 +1,220 @@
+"""Writes the run folder: the journal as the run goes, what is derived from it at the end.
+
+A journal that cannot be written any more (a full disk, a folder that was taken away) does not stop the
+supervision: what is to be written waits in memory, the trouble is told as an alert, and it is tried again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import visup
+from visup.agent import Concern, Frame, Severity, TaskBelief
+from visup.agent.model.step import Step
+from visup.agent.storage.jsonable import plain
+from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.storage.journal import Journal, Limits
+from visup.agent.storage.journal_reader import JOURNAL, export_events
+from visup.percepts.video import Source
+from visup.runs.settings import WatchSettings
+from visup.tasks import load_tasks
+from visup.tasks.tools.outline import outline
+
+if TYPE_CHECKING:
+    from visup.agent import Verdict
+    from visup.report.records import RunData
+
+MOST_WAITING = 1000
+"""Steps that wait while the journal cannot be written; beyond, the oldest are lost."""
+
+TRY_AGAIN = 25
+"""Steps between two attempts to write again."""
+
+
+class Recorder:
+    """Writes the journal, the annotated video and the report of a run; an observer.
+
+    Args:
+        settings: Of the run.
+        source: What is watched.
+        folder: A folder from `fresh_folder`, or that of the run that goes on.
+        video: Whether to write the annotated video.
+        report: Whether to write the report.
+        limits: Of the journal.
+        resume: Whether the run goes on.
+
+    Attributes:
+        folder: As given.
+        journal: The journal.
+        facts: What was noted about the run.
+        notes: What the user should know.
+
+    Raises:
+        OutputError: The journal cannot be begun.
+    """
+
+    def __init__(
+        self,
+        settings: WatchSettings,
+        source: Source,
+        folder: Path,
+        *,
+        video: bool = True,
+        report: bool = True,
+        limits: Limits | None = None,
+        resume: bool = False,
+    ) -> None:
+        from visup.report.collector import Collector
+        from visup.report.video import AnnotatedVideo
+
+        self.folder = folder
+        self.journal = Journal(folder / JOURNAL, limits, resume=resume)
+        self.facts: dict[str, Any] = {
+            "visup": visup.__version__,
+            "source": source.name,
+            "fps": source.fps,
+            "size": source.size,
+            "live": source.live,
+            "settings": plain(settings),
+        }
+        if not resume:
+            self.journal.note(**self.facts)
+        self.notes = source.notes
+        self.collector = Collector()
+        self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
+        path = _free(folder / "annotated.webm")
+        self.video = AnnotatedVideo(path, source.fps / settings.every) if video else None
+        self._wants_report = report
+        self._derived = {"report": self.collector.add} if report else {}
+        if self.video:
+            self._derived["annotated video"] = self.video.add
+        self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
+        self._patience = 0
+        self._lost = 0
+        self._fault = ""
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Record one step."""
+        self._lost += len(self._waiting) == MOST_WAITING
+        self._waiting.append(step)
+        self._patience -= 1
+        if self._patience <= 0:
+            self._write()
+        self._derive(step, frame, list(self._derived))
+
+    def catch_up(self, step: Step, frame: Frame) -> None:
+        """Take note of a step that the journal holds already."""
+        self._derive(step, frame, ["report"])
+
+    def troubles(self) -> Iterable[Concern]:
+        """What is wrong with recording now."""
+        if self._fault:
+            lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
+            yield Concern(
+                "not_recorded",
+                (),
+                Severity.WARNING,
+                "The run is not being recorded; supervision goes on.",
+                (self._fault, lost),
+                needs=(),
+            )
+
+    def close(self) -> None:
+        """Close the journal, whatever came of the run."""
+        try:
+            self.journal.close()
+        except OutputError as fault:
+            self.notes = (*self.notes, fault.what)
+
+    def finish(
+        self,
+        verdict: Verdict | None,
+        steps: int,
+        problem: str | None,
+        ended: str | None,
+        tasks: Sequence[TaskBelief],
+    ) -> tuple[Path | None, tuple[str, ...]]:
+        """Everything that is made once the last frame was seen.
+
+        Returns:
+            The report, or None, and what the user should know.
+        """
+        if self.video:
+            self.video.close()
+        self._write()
+        if self._waiting:
+            left = f"{len(self._waiting) + self._lost} steps could not be recorded: {self._fault}"
+            self.notes = (*self.notes, left)
+        report = None
+        try:
+            said = verdict.value if verdict else None
+            self.journal.note(verdict=said, steps=steps, problem=problem, tasks=tasks)
+            export_events(self.folder / JOURNAL, self.folder / "events.jsonl")
+            report = self._report(verdict, problem)
+            # Last of all: a run that was killed before can be gone on with.
+            self.journal.note(ended=ended)
+        except OutputError as fault:
+            # The verdict must reach the user even when there is no room to write it down.
+            self.notes = (*self.notes, str(fault))
+        return report, self.notes
+
+    def _write(self) -> None:
+        self._patience = TRY_AGAIN if self._fault else 0
+        try:
+            while self._waiting:
+                self.journal.record(self._waiting[0])
+                self._waiting.popleft()
+            self._fault, self._patience = "", 0
+        except OutputError as fault:
+            self._fault, self._patience = fault.what, TRY_AGAIN
+
+    def _derive(self, step: Step, frame: Frame, names: Iterable[str]) -> None:
+        for name in names:
+            try:
+                if name in self._derived:
+                    self._derived[name](step, frame)
+            except Exception as fault:
+                # What is derived may be lost; supervision and the journal go on.
+                del self._derived[name]
+                said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
+                self.notes = (*self.notes, said)
+
+    def _report(self, verdict: Verdict | None, problem: str | None) -> Path | None:
+        from visup.report.html import write_report
+
+        if not self._wants_report:
+            return None
+        path = self.folder / "report.html"
+        try:
+            write_report(self._run_data(verdict, problem), path)
+        except ExtraMissingError as missing:
+            self.notes = (str(missing),)
+            return None
+        except OutputError:
+            raise
+        except Exception as fault:
+            # The run itself is recorded already; a report that cannot be made must not hide it.
+            self.notes = (f"the report was not made: {type(fault).__name__}: {fault}",)
+            return None
+        return path
+
+    def _run_data(self, verdict: Verdict | None, problem: str | None) -> RunData:
+        return self.collector.finish(
+            verdict, self.facts, problem=problem, notes=self.notes, courses=self._courses
+        )
+
+
+def kept_of(recorder: Recorder | None) -> Mapping[str, Any]:
+    """What a recorder remembers besides the journal, for the state of a run."""
+    return recorder.collector.save() if recorder else {}
+
+
+def _free(path: Path) -> Path:
+    """A file beside those that an earlier part of the run wrote."""
+    if not path.exists():
+        return path
+    names = (path.with_name(f"{path.stem}-{n}{path.suffix}") for n in range(2, 10**6))
+    return next(p for p in names if not p.exists())

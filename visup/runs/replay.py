@@ -1,0 +1,204 @@
+"""Reasoning again about a recorded run without seeing again, and what it changes.
+
+Rules and tasks can so be tested on recorded missions: record once, replay in seconds with the new rules
+or task, and look at the difference in events, alerts, stages and verdict.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
+from pathlib import Path
+from typing import Any
+
+import visup
+from visup.agent import Severity, Verdict
+from visup.agent.model.step import Step
+from visup.agent.storage.jsonable import event_line, plain
+from visup.agent.storage.journal import Journal
+from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
+from visup.runs.resume import recorded_settings
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import final_verdict, reasoning_agent
+from visup.tasks import load_tasks
+from visup.tasks.grammar.structure import task_actors
+
+Line = Mapping[str, Any]
+STAGE = "stage_"
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a run told.
+
+    Attributes:
+        events: As lines of `events.jsonl`.
+        verdict: How it ended; None where nothing was to be judged, or it is not over.
+        steps: Frames.
+        seconds: Wall time that reasoning took; 0 for a recorded run.
+    """
+
+    events: tuple[Line, ...]
+    verdict: str | None
+    steps: int
+    seconds: float = 0.0
+
+    def of(self, kinds: Callable[[str], bool]) -> tuple[Line, ...]:
+        """The events of some kinds."""
+        return tuple(e for e in self.events if kinds(str(e.get("kind"))))
+
+    @property
+    def failed(self) -> bool:
+        """Whether the run calls for a person, as the exit code of `visup watch` does."""
+        return self.verdict not in (None, Verdict.SUCCEEDED.value, Verdict.IN_PROGRESS.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What differs between two runs, in the order of time; both are empty when nothing does.
+
+    Attributes:
+        gone: Events that only the first told.
+        new: Events that only the second told.
+        verdicts: Of the first and of the second.
+    """
+
+    gone: tuple[Line, ...] = ()
+    new: tuple[Line, ...] = ()
+    verdicts: tuple[str | None, str | None] = (None, None)
+
+    def __bool__(self) -> bool:
+        return bool(self.gone or self.new or self.verdicts[0] != self.verdicts[1])
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """How many of (alerts, stages, other events) are gone and new."""
+        return {
+            group: (_count(self.gone, group), _count(self.new, group))
+            for group in ("alerts", "stages", "other events")
+        }
+
+
+@dataclass(slots=True)
+class _Listener:
+    """Gathers what a run tells."""
+
+    events: list[Line] = field(default_factory=list)
+    steps: int = 0
+    grave: bool = False
+
+    def __call__(self, step: Step) -> None:
+        self.steps += 1
+        for event in step.events:
+            self.events.append(event_line(event))
+            self.grave |= event.severity >= Severity.WARNING
+
+
+def settings_for(recording: Recording, **changed: Any) -> WatchSettings:
+    """The settings of a recorded run with some of them changed; None and () change nothing.
+
+    Where tasks are changed and actors are not, bindings of actors that the new tasks lack are dropped.
+    """
+    settings = recorded_settings(recording.facts(), str(recording.path))
+    wanted = {k: v for k, v in changed.items() if v}
+    if "tasks" in wanted and "actors" not in wanted:
+        tasks = [t for name in wanted["tasks"] for t in load_tasks(name)]
+        known = {actor for task in tasks for actor in task_actors(task)}
+        wanted["actors"] = {a: m for a, m in settings.actors.items() if a in known}
+    return replace(settings, **wanted)
+
+
+def replay(
+    recording: Recording,
+    settings: WatchSettings,
+    out: Path | None = None,
+    tell: Callable[[Step], None] | None = None,
+) -> Told:
+    """Reason again.
+
+    Args:
+        recording: What was perceived.
+        settings: Tasks, rules and actors to reason with.
+        out: A new run folder to write a journal and `events.jsonl` to, or None.
+        tell: Told of each step.
+
+    Returns:
+        What it told.
+
+    Raises:
+        VisupError: The recording is damaged, or a task or rules file is not as it should be.
+    """
+    agent = reasoning_agent(settings)
+    listener = _Listener()
+    with ExitStack() as stack:
+        journal = _journal(recording, settings, out, stack) if out else None
+        answers = recording.answers()
+        begin = time.perf_counter()
+        for seen in recording.observations():
+            step = agent.rethink(seen, answers.get(seen.frame_index, {}))
+            if journal:
+                journal.record(step)
+            listener(step)
+            if tell:
+                tell(step)
+        seconds = time.perf_counter() - begin
+        verdict = _verdict(final_verdict(agent.mind) if agent.mind.tasks else None, listener.grave)
+        if journal:
+            journal.note(verdict=verdict, steps=listener.steps, tasks=agent.mind.tasks)
+            export_events(journal.path, journal.path.with_name("events.jsonl"))
+            journal.note(ended="complete")
+    return Told(tuple(listener.events), verdict, listener.steps, seconds)
+
+
+def recorded(recording: Recording) -> Told:
+    """What a recorded run told."""
+    verdict = recording.facts().get("verdict")
+    told = verdict if isinstance(verdict, str) else None
+    return Told(tuple(recording.events()), told, recording.count())
+
+
+def difference(first: Told, second: Told) -> Difference:
+    """What the second run tells that the first does not, and the other way round.
+
+    Events are the same when all that is told of them is. `fault` and trouble outside of the agent count
+    like any other: they are part of what was perceived.
+    """
+    a = [event_text(e) for e in first.events]
+    b = [event_text(e) for e in second.events]
+    gone: list[Line] = []
+    new: list[Line] = []
+    for what, i0, i1, j0, j1 in SequenceMatcher(None, a, b, autojunk=False).get_opcodes():
+        if what != "equal":
+            gone += first.events[i0:i1]
+            new += second.events[j0:j1]
+    return Difference(tuple(gone), tuple(new), (first.verdict, second.verdict))
+
+
+def group_of(event: Line) -> str:
+    """What an event is about: 'alerts', 'stages' or 'other events'."""
+    kind = str(event.get("kind"))
+    if kind in ("alert", "alert_closed"):
+        return "alerts"
+    return "stages" if kind.startswith(STAGE) else "other events"
+
+
+def _count(events: Sequence[Line], group: str) -> int:
+    return sum(group_of(e) == group for e in events)
+
+
+def _verdict(of_tasks: Verdict | None, grave: bool) -> str | None:
+    if of_tasks:
+        return of_tasks.value
+    return Verdict.INTERRUPTED.value if grave else None
+
+
+def _journal(recording: Recording, settings: WatchSettings, out: Path, stack: ExitStack) -> Journal:
+    journal = Journal(out / JOURNAL)
+    stack.callback(journal.close)
+    kept = {k: v for k, v in recording.facts().items() if k in ("source", "fps", "size")}
+    journal.note(
+        **kept, visup=visup.__version__, settings=plain(settings), replayed=str(recording.path)
+    )
+    return journal

@@ -1,0 +1,187 @@
+"""Going on with a run that was killed: the agent becomes again what it was after the last recorded step.
+
+What was perceived stands in the journal, so the mind is reasoned anew from it, exactly. Behaviours hold
+state of their own: they take up the latest state that was kept and look again at the frames since; without
+one they look again at all frames. A camera's frames are gone: there behaviours go on from the state.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from visup.agent import Frame, Observation, Severity
+from visup.agent.model.step import Step
+from visup.agent.cycle.agent import Agent
+from visup.agent.storage.codec import packed
+from visup.agent.model.errors import OutputError, SourceError
+from visup.agent.storage.journal_reader import Recording
+from visup.percepts.video import Source
+from visup.runs.settings import WatchSettings
+from visup.runs.checkpoints import State, read_state
+from visup.runs.runtime_faults import Troubles
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """What is known of the run that goes on.
+
+    Attributes:
+        recording: Its journal.
+        settings: As it was begun.
+        state: The latest state, or None.
+        why_none: Why the state that there is cannot be used, or None.
+        steps: How many steps are recorded.
+        grave: Whether anything grave was told.
+        answers: What the operator said beforehand: object id -> name.
+    """
+
+    recording: Recording
+    settings: WatchSettings
+    state: State | None
+    why_none: str | None
+    steps: int
+    grave: bool
+    answers: Mapping[int, str]
+
+
+def past_of(run: Path) -> Past:
+    """The past of a run.
+
+    Args:
+        run: A run folder.
+
+    Raises:
+        OutputError: There is no run, or it is over, or nothing of it was recorded.
+    """
+    recording = Recording.open(run)
+    facts = recording.facts()
+    if "settings" not in facts:
+        raise OutputError("nothing was recorded of this run", where=str(run), hint="begin it anew")
+    if facts.get("ended") == "complete":
+        raise OutputError(
+            "this run is over: its source was seen to the end",
+            where=str(run),
+            hint=f"visup replay {run}",
+        )
+    state, why_none = read_state(recording.path.parent)
+    ends = recording.first_and_last()
+    if state is not None and (ends is None or not ends[0] - 1 <= state.frame_index <= ends[1]):
+        state, why_none = None, "its state is not of this journal"
+    if state is None and facts.get("steps_dropped"):
+        raise OutputError(
+            "the first steps of this run are not kept, nor is a state of later ones",
+            where=str(run),
+            hint="begin a new run",
+        )
+    told = recording.events()
+    grave = any(e.get("severity") != Severity.INFO.name.lower() for e in told)
+    settings = recorded_settings(facts, str(run))
+    answers = _answers(facts, str(run))
+    return Past(recording, settings, state, why_none, recording.count(), grave, answers)
+
+
+def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
+    try:
+        return {int(i): str(name) for i, name in facts.get("answers", {}).items()}
+    except (AttributeError, ValueError) as fault:
+        raise OutputError("the run's answers cannot be read", where=where) from fault
+
+
+def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
+    """The settings of a recorded run.
+
+    Raises:
+        OutputError: They are not there, or not as they should be.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(WatchSettings).validate_python(facts.get("settings"))
+    except ValidationError as fault:
+        said = fault.errors()[0]["msg"]
+        raise OutputError(f"the run's settings cannot be read ({said})", where=where) from fault
+
+
+def caught_up(
+    agent: Agent, source: Source, past: Past, tell: Callable[[Step, Frame], None]
+) -> tuple[Iterator[Frame], tuple[str, ...]]:
+    """Make an agent what it was after the last recorded step.
+
+    Args:
+        agent: New, of the run's settings.
+        source: Just opened.
+        past: The run.
+        tell: Told of the recorded steps whose frames there are.
+
+    Returns:
+        The frames with which the run goes on, and what the user should know.
+
+    Raises:
+        SourceError: The source is not what was recorded.
+    """
+    after = past.state.frame_index if past.state else -1
+    whole = agent.load(past.state.agent) if past.state else False
+    if source.live:
+        return _live(agent, source, past, after), ("What came between was not seen.",)
+    answers = past.recording.answers()
+    differing = 0
+    frames: Iterator[Frame] = iter(source)
+    for seen in past.recording.observations(after):
+        frame = _frame(frames, seen, source)
+        again = agent.look(frame)
+        differing += packed(_without_troubles(again)) != packed(_without_troubles(seen))
+        tell(agent.rethink(seen, answers.get(seen.frame_index, {})), frame)
+    notes = []
+    if not whole and past.steps:
+        why = f" ({past.why_none})" if past.why_none else ""
+        notes.append(f"All {past.steps} frames before were looked at again{why}.")
+    if differing:
+        notes.append(
+            f"{differing} frames look different now than when they were recorded: "
+            "behaviours may not be as they were."
+        )
+    last = past.recording.first_and_last()
+    begin = max(after, last[1] if last else -1)
+    return (f for f in frames if f.index > begin), tuple(notes)
+
+
+def _frame(frames: Iterator[Frame], seen: Observation, source: Source) -> Frame:
+    for frame in frames:
+        if frame.index == seen.frame_index and frame.size == seen.frame_size:
+            return Frame(frame.index, seen.time, frame.image)
+        if frame.index >= seen.frame_index:
+            break
+    raise SourceError(
+        "the source is not what was recorded",
+        where=source.name,
+        expected=f"a frame {seen.frame_index} of {seen.frame_size[0]}x{seen.frame_size[1]} pixels",
+        hint="a run can only go on with its own video",
+    )
+
+
+def _without_troubles(seen: Observation) -> Observation:
+    name = Troubles.contract.name
+    return replace(seen, reports=tuple(r for r in seen.reports if r.behaviour != name))
+
+
+def _live(agent: Agent, source: Source, past: Past, after: int) -> Iterator[Frame]:
+    """Frames of a camera, counted and timed on from the last recorded one."""
+    answers = past.recording.answers()
+    for last in past.recording.observations(after):
+        agent.rethink(last, answers.get(last.frame_index, {}))
+        for behaviour in agent.behaviours:
+            if missed := getattr(behaviour, "missed", None):
+                missed(last)
+    first = next(source, None)
+    if first is None:
+        return iter(())
+    # Only how long nobody looked is taken from the clock of the wall; it may have been set since.
+    away = max(1.0 / source.fps, time.time() - past.recording.written())
+    later = agent.mind.time + away - first.time
+    on = agent.mind.frame_index + 1
+    return (Frame(f.index + on, f.time + later, f.image) for f in chain((first,), source))

@@ -1,0 +1,193 @@
+"""The wiring: an agent that sees, interprets and verifies, made from the settings of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from visup.agent import Behaviour, Contract, Mind, Severity, Verdict
+from visup.agent.model.step import Observer
+from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.model.errors import SettingsError
+from visup.agent.contract.limits import Limits
+from visup.percepts.depth import DepthBehaviour
+from visup.percepts.health import HealthBehaviour
+from visup.percepts.motion.behaviour import MotionBehaviour
+from visup.percepts.shape.behaviour import ShapeBehaviour
+from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.video import Source, open_source
+from visup.runs.plugins import plug_ins
+from visup.rules.activation.attention import Attend
+from visup.rules.language.parser import load_rules, shipped_rules
+from visup.rules.reasoners import default_thinkers
+from visup.rules.activation.waking import Wake, wakeful, waking_rules
+from visup.runs.settings import WatchSettings
+from visup.tasks import load_tasks
+from visup.tasks.grammar.structure import sizes, task_actors, undrawn
+from visup.tasks.supervision.supervise import finish, task_thinker
+from visup.runs.runtime_faults import tell_troubles
+from visup.runs.zones import load_zones
+
+if TYPE_CHECKING:
+    from visup.rules.formula.nodes import Rule
+    from visup.tasks.grammar.nodes import Task
+
+LIVE_HANG_S = 20.0
+"""How long a behaviour may take for a frame of a camera before it is given up: no less than what
+compiling loops takes at the first frames after an installation."""
+
+__all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
+
+
+def open_video(settings: WatchSettings) -> Source:
+    """The source of a run, opened.
+
+    Raises:
+        SourceError: It cannot be opened.
+    """
+    return open_source(
+        settings.source,
+        every=settings.every,
+        fps=settings.fps,
+        patience_s=settings.patience_s,
+    )
+
+
+def build_agent(
+    settings: WatchSettings,
+    observers: Sequence[Observer] = (),
+    also: Sequence[Behaviour] = (),
+    *,
+    live: bool = False,
+) -> Agent:
+    """An agent that supervises as the settings say.
+
+    Args:
+        settings: What to supervise against.
+        observers: Told of each step.
+        also: Behaviours besides those of the settings.
+        live: Whether frames are made while they are read, so that a behaviour that hangs must be told
+            soon.
+
+    Raises:
+        VisupError: A task, rules file, zones file, model database or behaviour is not as it should
+            be, or an actor is bound that no task has or to a model that the database lacks.
+    """
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    zones = load_zones(settings.zones) if settings.zones else ()
+    _check_zones(tasks, {z.name for z in zones})
+    database = ModelDatabase.open(settings.models) if settings.models else None
+    _check_actors(settings, tasks, database)
+    behaviours = [*_behaviours(settings, database, sizes(tasks, settings.actors)), *also]
+    contracts = [b.contract for b in behaviours]
+    return Agent(
+        behaviours=behaviours,
+        thinkers=_thinkers(settings, tasks, contracts),
+        actors=settings.actors,
+        zones=zones,
+        observers=observers,
+        models=database.names() if database is not None else (),
+        limits=replace(_limits(settings, live), wakeful=wakeful(contracts, _rules(settings))),
+    )
+
+
+def reasoning_agent(settings: WatchSettings) -> Agent:
+    """An agent that reasons as the settings say about what was perceived before; it sees nothing.
+
+    Raises:
+        VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
+            task has.
+    """
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    zones = load_zones(settings.zones) if settings.zones else ()
+    _check_zones(tasks, {z.name for z in zones})
+    _check_actors(settings, tasks, None)
+    return Agent(thinkers=_thinkers(settings, tasks), actors=settings.actors, zones=zones)
+
+
+def final_verdict(mind: Mind) -> Verdict:
+    """The verdict of a run that is over.
+
+    With tasks it is the gravest of those that were seen to go on, unknown when none was; without, a
+    warning that is still open interrupts.
+    """
+    if mind.tasks:
+        verdicts = [finish(t) for t in mind.tasks]
+        seen = [v for v in verdicts if v is not Verdict.UNKNOWN]
+        return max(seen or verdicts, key=_GRAVITY.index)
+    grave = any(a.severity >= Severity.WARNING for a in mind.alerts)
+    return Verdict.INTERRUPTED if grave else Verdict.SUCCEEDED
+
+
+_GRAVITY = (
+    Verdict.SUCCEEDED,
+    Verdict.IN_PROGRESS,
+    Verdict.UNKNOWN,
+    Verdict.FAILED,
+    Verdict.INTERRUPTED,
+)
+
+
+def _limits(settings: WatchSettings, live: bool) -> Limits:
+    usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
+    return replace(usual, hang_s=LIVE_HANG_S) if live else usual
+
+
+def _behaviours(
+    settings: WatchSettings, database: ModelDatabase | None, sizes_m: Mapping[str, float]
+) -> list[Behaviour]:
+    seeing: list[Behaviour] = [HealthBehaviour(), MotionBehaviour()]
+    if database is not None:
+        seeing += [
+            ShapeBehaviour(database),
+            DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
+        ]
+    return [*seeing, *plug_ins(settings)]
+
+
+def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
+    return tuple(r for path in settings.rules for r in load_rules(path)) or shipped_rules()
+
+
+def _thinkers(
+    settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
+) -> Thinkers:
+    interpreting = default_thinkers(rules=_rules(settings))
+    following = (task_thinker(tasks),) if tasks else ()
+    attending = (Attend(),) if settings.attention else ()
+    waking = waking_rules(contracts)
+    match = (*following, *attending, *((Wake(waking),) if waking else ()), tell_troubles)
+    return Thinkers(interpreting.update, interpreting.cogitate, match)
+
+
+def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
+    """A zone that nobody has drawn could never be seen to be entered or left."""
+    for task in tasks:
+        for zone in undrawn(task):
+            if zone in drawn:
+                continue
+            raise SettingsError(
+                f"zone `{zone}` of task `{task.name}` is drawn nowhere",
+                where=task.file,
+                expected=f"`zone {zone} is (100, 50) (300, 50) (300, 200)`, or a zones file with it",
+            )
+
+
+def _check_actors(
+    settings: WatchSettings, tasks: Sequence[Task], database: ModelDatabase | None
+) -> None:
+    known = {actor for task in tasks for actor in task_actors(task)}
+    for actor, models in settings.actors.items():
+        if tasks and actor not in known:
+            raise SettingsError(
+                f"no task has an actor called '{actor}'",
+                expected=f"one of: {', '.join(sorted(known))}",
+            )
+        for model in models:
+            if database is not None and model not in database.names():
+                raise SettingsError(
+                    f"the actor '{actor}' stands for '{model}', which is not in the model database",
+                    where=str(settings.models),
+                    expected=f"one of: {', '.join(database.names())}",
+                )

@@ -1,0 +1,136 @@
+"""Settings files with zones: parts of the scene that rules can name, drawn by hand (TOML).
+
+The format is told in ``docs/formats.md``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from visup.agent import VisupError, Zone
+from visup.agent.model.errors import ManyErrors, SettingsError
+
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_KEYS = ("name", "polygon", "depth")
+_EXAMPLE = '[[zone]], name = "dock", polygon = [[100, 80], [300, 80], [300, 240], [100, 240]]'
+
+
+def load_zones(path: Path) -> tuple[Zone, ...]:
+    """The zones of a settings file; every fault of it is told at once.
+
+    Raises:
+        SettingsError: The file cannot be read, or is no such file.
+        ManyErrors: More than one zone is not as it should be.
+    """
+    entries = _entries(path)
+    zones: list[Zone] = []
+    faults: list[VisupError] = []
+    for number, entry in enumerate(entries, start=1):
+        try:
+            zone = _zone(entry, f"{path}, zone {number}")
+            if zone.name in (z.name for z in zones):
+                raise SettingsError(
+                    f"two zones are called '{zone.name}'",
+                    where=f"{path}, zone {number}",
+                    expected="a name of its own for each zone",
+                )
+            zones.append(zone)
+        except SettingsError as fault:
+            faults.append(fault)
+    if len(faults) > 1:
+        raise ManyErrors(faults)
+    if faults:
+        raise faults[0]
+    return tuple(zones)
+
+
+def _entries(path: Path) -> list[Any]:
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise SettingsError(
+            f"the zones cannot be read: {fault.strerror}", where=str(path)
+        ) from fault
+    except UnicodeDecodeError as fault:
+        raise SettingsError("the file is not text", where=str(path), expected="TOML") from fault
+    except tomllib.TOMLDecodeError as fault:
+        raise SettingsError(f"this is not TOML: {fault}", where=str(path)) from fault
+    entries = found.pop("zone", None)
+    if found:
+        raise SettingsError(
+            f"'{next(iter(found))}' means nothing here", where=str(path), expected="[[zone]]"
+        )
+    if not isinstance(entries, list) or not entries:
+        raise SettingsError("there is no zone in it", where=str(path), expected=_EXAMPLE)
+    return entries
+
+
+def _zone(entry: object, where: str) -> Zone:
+    if not isinstance(entry, dict):
+        raise SettingsError("this is no zone", where=where, expected=_EXAMPLE)
+    strange = next((key for key in entry if key not in _KEYS), None)
+    if strange is not None:
+        raise SettingsError(
+            f"'{strange}' means nothing here", where=where, expected=f"one of: {', '.join(_KEYS)}"
+        )
+    name = entry.get("name")
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise SettingsError(
+            f"the name is {name!r}" if "name" in entry else "the zone has no name",
+            where=where,
+            expected='a word of letters, digits and _, such as name = "dock"',
+        )
+    where = f"{where} ('{name}')"
+    return Zone(name, _polygon(entry.get("polygon"), where), _depth(entry.get("depth"), where))
+
+
+def _polygon(given: object, where: str) -> tuple[tuple[float, float], ...]:
+    corners = given if isinstance(given, list) else []
+    points = tuple(_pair(c) for c in corners)
+    if not all(points) or len(corners) < 3:
+        raise SettingsError(
+            f"the polygon has {len(corners)} corners"
+            if corners and all(points)
+            else "the polygon is not a list of corners",
+            where=where,
+            expected="at least three corners [x, y] in pixels, in order",
+        )
+    polygon = tuple(p for p in points if p is not None)
+    if area(polygon) < 1.0:
+        raise SettingsError(
+            "the polygon encloses nothing", where=where, hint="give the corners in their order"
+        )
+    return polygon
+
+
+def area(polygon: tuple[tuple[float, float], ...]) -> float:
+    """Area that a polygon encloses, square pixels; 0 where its corners lie in a line."""
+    turned = (*polygon[1:], polygon[0])
+    double = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(polygon, turned, strict=True))
+    return abs(double) / 2.0
+
+
+def _depth(given: object, where: str) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    depth = _pair(given)
+    if depth is None or not 0.0 <= depth[0] < depth[1]:
+        raise SettingsError(
+            f"the range of depth is {given!r}",
+            where=where,
+            expected="depth = [nearest, farthest] in the models' units, 0 <= nearest < farthest",
+        )
+    return depth
+
+
+def _pair(given: object) -> tuple[float, float] | None:
+    if not isinstance(given, list) or len(given) != 2:
+        return None
+    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in given):
+        return None
+    x, y = (float(v) for v in given)
+    return (x, y) if math.isfinite(x) and math.isfinite(y) else None

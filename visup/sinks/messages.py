@@ -1,0 +1,62 @@
+"""What sinks for alerts are told: one record for each alert that opens or closes, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from visup.agent import Alert, Frame, Verdict
+from visup.agent.model.step import Step
+from visup.agent.storage.jsonable import plain
+from visup.sinks.outbox import Outbox
+
+VERSION = 1
+
+
+def alert_record(alert: Alert, source: str) -> dict[str, Any]:
+    """An alert as it goes to other programs (docs/formats.md)."""
+    state = "opened" if alert.closed is None else "closed"
+    return {"version": VERSION, "record": "alert", "state": state, "source": source, **plain(alert)}
+
+
+def verdict_record(verdict: Verdict | None, steps: int, source: str) -> dict[str, Any]:
+    """The end of a run."""
+    told = verdict.value if verdict else None
+    return {
+        "version": VERSION,
+        "record": "verdict",
+        "source": source,
+        "verdict": told,
+        "steps": steps,
+    }
+
+
+class AlertSender:
+    """An observer that leaves records of alerts in outboxes.
+
+    Args:
+        outboxes: Of the sinks.
+        source: What is watched.
+    """
+
+    def __init__(self, outboxes: Sequence[Outbox], source: str) -> None:
+        self._outboxes = outboxes
+        self._source = source
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Send the alerts that a step opened or closed."""
+        for alert in step.alerts:
+            self._send(alert_record(alert, self._source))
+
+    def notice(self, text: str) -> None:
+        """Send a sentence that cannot wait for a step."""
+        told = {"version": VERSION, "record": "notice", "source": self._source, "text": text}
+        self._send(told)
+
+    def end(self, verdict: Verdict | None, steps: int) -> None:
+        """Send the verdict."""
+        self._send(verdict_record(verdict, steps, self._source))
+
+    def _send(self, record: dict[str, Any]) -> None:
+        for outbox in self._outboxes:
+            outbox.offer(record)

@@ -1,0 +1,135 @@
+"""What `--sink` means, and the observer that serves all sinks of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from visup.agent import Concern, Frame, Verdict
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.step import Observer, Step
+from visup.sinks.builtin import Webhook, to_file, to_stdout
+from visup.sinks.messages import AlertSender
+from visup.sinks.outbox import MOST_WAITING, Outbox, Sink
+
+MOST_STEPS = 64
+"""Whole steps that may wait, with their frames: some tens of megabytes."""
+
+KINDS = (
+    "jsonl:-, file:PATH, webhook:URL, mqtt:HOST[:PORT]/TOPIC, otel:console, otel:otlp, rerun:FILE"
+)
+
+
+def open_sink(wanted: str) -> Sink:
+    """A sink, from `--sink`.
+
+    Args:
+        wanted: `KIND:PLACE`, one of `KINDS`.
+
+    Raises:
+        SettingsError: There is no such kind, or the place is not as it should be.
+        ExtraMissingError: It needs an extra that is not installed.
+        OutputError: Its file cannot be written.
+    """
+    kind, colon, place = wanted.partition(":")
+    if not (colon and place and kind in _MAKERS):
+        raise SettingsError(f"--sink {wanted!r} cannot be read", expected=f"one of: {KINDS}")
+    return _MAKERS[kind](wanted, place)
+
+
+class Sinks:
+    """All sinks of a run, as one observer.
+
+    Args:
+        wanted: As of `--sink`.
+        source: What is watched.
+
+    Attributes:
+        outboxes: One for each.
+    """
+
+    def __init__(self, wanted: Sequence[str], source: str) -> None:
+        made = [open_sink(w) for w in wanted]
+        self.outboxes = [Outbox(s, _room(s)) for s in made]
+        self._alerts = AlertSender([o for o in self.outboxes if _kind(o) not in _OF_STEPS], source)
+        self._observers: list[Observer] = [
+            _sender(o, _OF_STEPS[_kind(o)]) for o in self.outboxes if _kind(o) in _OF_STEPS
+        ]
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Leave what a step tells in the outboxes."""
+        self._alerts(step, frame)
+        for observer in self._observers:
+            observer(step, frame)
+
+    def notice(self, text: str) -> None:
+        """Send a sentence that cannot wait for a step."""
+        self._alerts.notice(text)
+
+    def troubles(self) -> Iterable[Concern]:
+        """What is wrong with sinks now."""
+        return [concern for outbox in self.outboxes for concern in outbox.troubles()]
+
+    def end(self, verdict: Verdict | None, steps: int) -> tuple[str, ...]:
+        """Send the verdict, close everything, and say what was not delivered."""
+        self._alerts.end(verdict, steps)
+        self.close()
+        return tuple(o.note for o in self.outboxes if o.note)
+
+    def close(self) -> None:
+        """Close all sinks; once is enough."""
+        for outbox in self.outboxes:
+            outbox.close()
+
+
+def _jsonl(wanted: str, place: str) -> Sink:
+    if place != "-":
+        raise SettingsError(f"--sink {wanted!r} cannot be read", expected="jsonl:- or file:PATH")
+    return to_stdout()
+
+
+def _mqtt(wanted: str, place: str) -> Sink:
+    from visup.sinks.mqtt import Mqtt
+
+    return Mqtt(place)
+
+
+def _otel(wanted: str, place: str) -> Sink:
+    from visup.sinks.telemetry import Telemetry
+
+    return Telemetry(place)
+
+
+def _rerun(wanted: str, place: str) -> Sink:
+    from visup.sinks.rerun import Rerun
+
+    return Rerun(place)
+
+
+_MAKERS: dict[str, Callable[[str, str], Sink]] = {
+    "jsonl": _jsonl,
+    "file": lambda wanted, place: to_file(wanted, Path(place)),
+    "webhook": lambda wanted, place: Webhook(place),
+    "mqtt": _mqtt,
+    "otel": _otel,
+    "rerun": _rerun,
+}
+_OF_STEPS: dict[str, Callable[[Step, Frame], object]] = {
+    "otel": lambda step, frame: step,
+    "rerun": lambda step, frame: (step, frame),
+}
+
+
+def _kind(outbox: Outbox) -> str:
+    return outbox.sink.name.partition(":")[0]
+
+
+def _room(sink: Sink) -> int:
+    return MOST_STEPS if sink.name.partition(":")[0] in _OF_STEPS else MOST_WAITING
+
+
+def _sender(outbox: Outbox, of: Callable[[Step, Frame], object]) -> Observer:
+    def send(step: Step, frame: Frame) -> None:
+        outbox.offer(of(step, frame))
+
+    return send

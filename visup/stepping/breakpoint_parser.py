@@ -1,0 +1,157 @@
+"""Where to stop, in words: `alert`, `rule collision_course`, `stage captured`, `when gap(1, 2) < 20 px`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
+
+from visup.agent import Mind
+from visup.agent.contract.phases import Phase
+from visup.agent.model.errors import SettingsError
+from visup.rules.safety.expression import expression
+from visup.stepping.breakpoints import (
+    AnyStop,
+    EventStop,
+    FrameStop,
+    ObjectStop,
+    PhaseStop,
+    Predicate,
+    PredicateStop,
+    RuleStop,
+    StageStop,
+    Stop,
+    TimeStop,
+    WhenStop,
+    rules,
+    stages,
+)
+
+EVENT_KINDS = (
+    "entry",
+    "noticed",
+    "exit",
+    "occlusion",
+    "reappearance",
+    "coupled",
+    "decoupled",
+    "relation",
+    "identified",
+    "question",
+    "answer",
+    "alert",
+    "alert_closed",
+    "health",
+    "fault",
+    "invariant_broken",
+    "stage_started",
+    "stage_progressing",
+    "stage_stalled",
+    "stage_failing",
+    "stage_failed",
+    "stage_done",
+    "stage_unknown",
+    "verdict",
+)
+"""What visup itself tells; plug-ins may tell more."""
+
+
+def stop_of(what: str | Phase | Predicate | Stop, mind: Mind) -> Stop:
+    """The condition that is meant.
+
+    Args:
+        what: A phase, a function of the step, a condition, or text: `phase match`, `event alert`,
+            `rule NAME`, `rule NAME changes`, `stage NAME`, `object 2`, `time 12.5`, `frame 300`,
+            `when EXPRESSION`, `change EXPRESSION`; or without its first word, where that is clear.
+        mind: Knows stages and rules.
+
+    Raises:
+        SettingsError: Nothing is meant by it.
+        VisupError: The expression cannot be read.
+    """
+    if isinstance(what, Phase):
+        return PhaseStop(what)
+    if not isinstance(what, str):
+        return what if isinstance(what, Stop) else PredicateStop(what)
+    first, _, rest = what.strip().partition(" ")
+    reader = _READERS.get(first) if rest else None
+    return reader(rest.strip(), mind) if reader else _guessed(what.strip(), mind)
+
+
+def _guessed(word: str, mind: Mind) -> Stop:
+    """What a word means that is told without its kind."""
+    try:
+        return TimeStop(float(word))
+    except ValueError:
+        pass
+    if "(" in word:
+        return WhenStop(expression(word))
+    if word in tuple(Phase):
+        return PhaseStop(Phase(word))
+    found: list[Stop] = [StageStop(word)] if word in stages(mind) else []
+    found += [RuleStop(word)] if word in rules(mind) else []
+    if not found or word in EVENT_KINDS:
+        found.append(_event(word, mind))
+    return found[0] if len(found) == 1 else AnyStop(word, tuple(found))
+
+
+def _event(kind: str, mind: Mind) -> Stop:
+    """Any word may be a plug-in's kind of event; one that is nearly another word is a slip."""
+    known = [*EVENT_KINDS, *stages(mind), *rules(mind), *Phase]
+    close = get_close_matches(kind, known, 1, 0.8)
+    if not kind.isidentifier() or (close and kind not in known):
+        raise SettingsError(
+            f"nothing is meant by '{kind}'",
+            expected="a phase, event, rule, stage, object, time, frame or expression",
+            hint=f"did you mean '{close[0]}'?" if close else None,
+        )
+    return EventStop(kind)
+
+
+def _rule(text: str, mind: Mind) -> Stop:
+    name, _, more = text.partition(" ")
+    known = rules(mind)
+    if known and name not in known:
+        raise _unknown("rule", name, known)
+    return RuleStop(name, more.strip() == "changes")
+
+
+def _stage(name: str, mind: Mind) -> Stop:
+    known = stages(mind)
+    if known and name not in known:
+        raise _unknown("stage", name, known)
+    return StageStop(name)
+
+
+def _phase(name: str, mind: Mind) -> Stop:
+    if name not in tuple(Phase):
+        raise _unknown("phase", name, tuple(Phase))
+    return PhaseStop(Phase(name))
+
+
+def _number(text: str, kind: str) -> float:
+    try:
+        return float(text.removesuffix("s").strip())
+    except ValueError:
+        raise SettingsError(f"'{text}' is no number", expected=f"such as: {kind} 12") from None
+
+
+_READERS: Mapping[str, Callable[[str, Mind], Stop]] = {
+    "phase": _phase,
+    "event": lambda text, mind: EventStop(text),
+    "rule": _rule,
+    "stage": _stage,
+    "object": lambda text, mind: ObjectStop(int(_number(text, "object"))),
+    "time": lambda text, mind: TimeStop(_number(text, "time")),
+    "frame": lambda text, mind: FrameStop(int(_number(text, "frame"))),
+    "when": lambda text, mind: WhenStop(expression(text)),
+    "change": lambda text, mind: WhenStop(expression(text), True),
+}
+
+
+def _unknown(kind: str, name: str, known: tuple[str, ...]) -> SettingsError:
+    close = get_close_matches(name, known, 1, 0.6)
+    return SettingsError(
+        f"there is no {kind} '{name}'",
+        expected=f"one of {', '.join(known)}",
+        hint=f"did you mean '{close[0]}'?" if close else None,
+    )

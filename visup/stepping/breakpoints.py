@@ -1,0 +1,308 @@
+"""Where to stop: at a phase, an event, a rule, a stage, an object, a time, or what a function says.
+
+Each condition looks at a step with the mind before it, and gives a sentence when it is met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+from visup.agent import Mind, ObjectBelief, Truth
+from visup.agent.contract.phases import Phase
+from visup.agent.model.step import Step
+from visup.rules.safety.expression import Expression, Judged
+from visup.rules.safety.queries import verdicts
+from visup.rules.safety.reasoner import kept
+
+Predicate = Callable[[Step], bool]
+
+
+@runtime_checkable
+class Stop(Protocol):
+    """A condition to stop at."""
+
+    @property
+    def text(self) -> str:
+        """What `stop_of` reads back."""
+        ...
+
+    def met(self, before: Mind, step: Step) -> str:
+        """Why to stop after a step, or an empty text."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseStop:
+    """Stops inside each cycle, after a phase."""
+
+    phase: Phase
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"phase {self.phase.value}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`; earlier phases are met inside the cycle."""
+        return "after act" if self.phase is Phase.ACT else ""
+
+
+@dataclass(frozen=True, slots=True)
+class EventStop:
+    """Stops when an event of a kind is told."""
+
+    kind: str
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"event {self.kind}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        return next((f"{e.kind}: {e.text}" for e in step.events if e.kind == self.kind), "")
+
+
+@dataclass(frozen=True, slots=True)
+class RuleStop:
+    """Stops when a rule becomes true of some objects, or changes in any way.
+
+    Attributes:
+        name: The rule.
+        changes: Whether to stop at every change of its verdict.
+    """
+
+    name: str
+    changes: bool = False
+    _last: _Memo = field(default_factory=lambda: _Memo(), compare=False, repr=False)
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"rule {self.name}" + (" changes" if self.changes else "")
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        was = self._last.of(before, self.name)
+        now = self._last.of(step.mind, self.name)
+        return _turned(self.name, was, now, self.changes)
+
+
+@dataclass(slots=True)
+class _Memo:
+    """The verdicts of the last two minds: the mind after a step is that before the next one."""
+
+    _known: list[tuple[Mind, Mapping[tuple[int, ...], Truth]]] = field(default_factory=list)
+
+    def of(self, mind: Mind, rule: str) -> Mapping[tuple[int, ...], Truth]:
+        for known, found in self._known:
+            if known is mind:
+                return found
+        self._known = [*self._known[-1:], (mind, judged(mind, rule))]
+        return self._known[-1][1]
+
+
+@dataclass(frozen=True, slots=True)
+class StageStop:
+    """Stops when a stage becomes the current one or its status changes."""
+
+    stage: str
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"stage {self.stage}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        was, now = _standing(before, self.stage), _standing(step.mind, self.stage)
+        changed = [task for task in now if now[task] != was.get(task, ("pending", False))]
+        return "; ".join(_told_stage(self.stage, *now[task]) for task in changed)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectStop:
+    """Stops when the presence or the identity of an object changes."""
+
+    object_id: int
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"object {self.object_id}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        was = _as_told(before.objects.get(self.object_id))
+        now = _as_told(step.mind.objects.get(self.object_id))
+        return f"object {self.object_id}: {was} -> {now}" if was != now else ""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeStop:
+    """Stops at the first frame that is not before a time, in seconds."""
+
+    time: float
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"time {self.time:g}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        reached = step.time >= self.time and (before.frame_index < 0 or before.time < self.time)
+        return f"{step.time:.2f} s" if reached else ""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameStop:
+    """Stops at the first frame whose number is not below this."""
+
+    frame: int
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"frame {self.frame}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        reached = before.frame_index < self.frame <= step.frame_index
+        return f"frame {step.frame_index}" if reached else ""
+
+
+@dataclass(frozen=True, slots=True)
+class WhenStop:
+    """Stops when an expression becomes true; of a quantity, or with `changes`, when it changes.
+
+    An expression with windows knows the past only since the condition was first looked at, or since
+    the stepper last went back.
+    """
+
+    expression: Expression
+    changes: bool = False
+    _follow: Following = field(default_factory=lambda: Following(), compare=False, repr=False)
+
+    @property
+    def text(self) -> str:
+        """See `Stop`."""
+        return f"{'change' if self.changes else 'when'} {self.expression.text}"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        was, now = self._follow(self.expression, before, step.mind)
+        changes = self.changes or self.expression.quantity
+        if not changes:
+            truths = {k: v for k, v in now.truths.items() if isinstance(v, Truth)}
+            old = {k: v for k, v in was.truths.items() if isinstance(v, Truth)} if was else {}
+            return _turned(self.expression.text, old, truths, False)
+        if was is None:
+            return ""
+        told = {r.objects: str(r) for r in now.readings}
+        old_told = {r.objects: str(r) for r in was.readings}
+        return next(
+            (
+                f"{self.expression.text} {_of(ids)}: {old_told.get(ids, 'nothing')} -> {text}"
+                for ids, text in told.items()
+                if text != old_told.get(ids)
+            ),
+            "",
+        )
+
+
+@dataclass(slots=True)
+class Following:
+    """Judges an expression from mind to mind; begins anew at a mind that it did not see coming."""
+
+    mind: Mind | None = None
+    judged: Judged | None = None
+
+    def __call__(
+        self, wanted: Expression, before: Mind, after: Mind
+    ) -> tuple[Judged | None, Judged]:
+        """What it came to before, and what it comes to after."""
+        if before is not self.mind:
+            self.judged = wanted.judge(before) if before.frame_index >= 0 else None
+        was = self.judged
+        self.mind, self.judged = after, wanted.judge(after, was)
+        return was, self.judged
+
+
+@dataclass(frozen=True, slots=True)
+class PredicateStop:
+    """Stops when a function of the step says so."""
+
+    predicate: Predicate
+    text: str = "predicate"
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        return self.text if self.predicate(step) else ""
+
+
+@dataclass(frozen=True, slots=True)
+class AnyStop:
+    """Stops when any of several conditions is met, for words that may mean several."""
+
+    text: str
+    stops: tuple[Stop, ...]
+
+    def met(self, before: Mind, step: Step) -> str:
+        """See `Stop`."""
+        return "; ".join(filter(None, (s.met(before, step) for s in self.stops)))
+
+
+def stages(mind: Mind) -> tuple[str, ...]:
+    """The stages of all tasks."""
+    return tuple(dict.fromkeys(s.stage for t in mind.tasks for s in t.stages))
+
+
+def rules(mind: Mind) -> tuple[str, ...]:
+    """The rules that judge a mind; none before its first step."""
+    return tuple(rule.name for rule in kept(mind).rules)
+
+
+def judged(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
+    """What a rule says of every choice of objects; nothing before the first step."""
+    return verdicts(mind, name) if kept(mind).now is not None else {}
+
+
+def _turned(
+    name: str,
+    was: Mapping[tuple[int, ...], Truth],
+    now: Mapping[tuple[int, ...], Truth],
+    changes: bool,
+) -> str:
+    """The first choice of objects of which something has become true, or has changed."""
+    for ids in sorted({*was, *now}):
+        # Of who is not there any more nothing is true; who is new was not judged before.
+        old, new = was.get(ids, Truth.UNKNOWN), now.get(ids, Truth.UNKNOWN)
+        if old is not new and (changes or new is Truth.TRUE):
+            return f"{name}{_of(ids)} is {new.value} (was {old.value})"
+    return ""
+
+
+def _of(ids: tuple[int, ...]) -> str:
+    return f"({', '.join(map(str, ids))})" if ids else ""
+
+
+def _standing(mind: Mind, stage: str) -> dict[str, tuple[str, bool]]:
+    return {
+        task.task: (s.status.value, task.current == stage)
+        for task in mind.tasks
+        for s in task.stages
+        if s.stage == stage
+    }
+
+
+def _told_stage(stage: str, status: str, current: bool) -> str:
+    return f"stage {stage} is {status}" + (", and current" if current else "")
+
+
+def _as_told(belief: ObjectBelief | None) -> str:
+    if belief is None:
+        return "not known"
+    return f"{belief.name}, {belief.presence.value}"

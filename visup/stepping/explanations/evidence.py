@@ -1,0 +1,107 @@
+"""Trees of reasons, down to what was perceived of which frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from visup.agent import Depth, Hypothesis, Observation, Percept, Region
+from visup.agent.model.notebook import showing
+from visup.rules.safety.explain import Explanation
+
+
+@dataclass(frozen=True, slots=True)
+class Why:
+    """A reason and the reasons for it.
+
+    Attributes:
+        text: One clause.
+        parts: What it rests on.
+        frame_index: The frame that it speaks of, or None.
+        time: Its time, seconds.
+        percept: The percept that it is, or None.
+    """
+
+    text: str
+    parts: tuple[Why, ...] = ()
+    frame_index: int | None = None
+    time: float | None = None
+    percept: Percept | None = None
+
+    def lines(self, indent: int = 0) -> Iterator[str]:
+        """The tree as indented lines of text."""
+        yield "  " * indent + self.line()
+        for part in self.parts:
+            yield from part.lines(indent + 1)
+
+    def line(self) -> str:
+        """This node alone."""
+        if self.frame_index is None or self.time is None:
+            return self.text
+        return f"{self.text} [frame {self.frame_index}, {self.time:.2f} s]"
+
+    def walk(self) -> Iterator[Why]:
+        """This node and all below it."""
+        yield self
+        for part in self.parts:
+            yield from part.walk()
+
+    @property
+    def percepts(self) -> tuple[Percept, ...]:
+        """All percepts that it rests on."""
+        return tuple(w.percept for w in self.walk() if w.percept is not None)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+
+def because(explained: Explanation) -> Why:
+    """What the rule language explains, as a tree of reasons."""
+    return Why(explained.line(), tuple(because(p) for p in explained.parts))
+
+
+def of_region(seen: Observation, region_id: int, *, names: bool = False) -> tuple[Why, ...]:
+    """The percepts of a frame about one region.
+
+    Args:
+        seen: What was perceived.
+        region_id: The region.
+        names: Whether those that say what it is count too.
+    """
+    kinds = (Region, Hypothesis, Depth) if names else (Region,)
+    return tuple(
+        told(percept, seen)
+        for report in seen.reports
+        for percept in report.percepts
+        if isinstance(percept.value, kinds) and _about(percept.value) == region_id
+    )
+
+
+def _about(value: Region | Hypothesis | Depth) -> int:
+    return value.id if isinstance(value, Region) else value.region_id
+
+
+def told(percept: Percept, seen: Observation) -> Why:
+    """A percept as the last of reasons."""
+    text = f"{percept.source} reported {worded(percept.value)}"
+    return Why(text, (), seen.frame_index, seen.time, percept)
+
+
+def worded(value: object) -> str:
+    """What was perceived, in a few words."""
+    match value:
+        case Region():
+            x, y, w, h = value.bbox
+            box = f"{w}x{h} at {x},{y}"
+            return f"region {value.id}, {box}, confidence {value.confidence:.2f}"
+        case Hypothesis():
+            looks = f"view {value.view} of {value.name}, similarity {value.similarity:.2f}"
+            return f"that region {value.region_id} looks like {looks}"
+        case Depth():
+            far = f"{value.depth:.1f} ± {value.sigma:.1f}"
+            return f"that region {value.region_id} as {value.name} is {far} away"
+    text = str(value)
+    return text if len(text) <= 70 else f"{text[:67]}..."
+
+
+showing(Why)

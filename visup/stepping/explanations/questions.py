@@ -1,0 +1,130 @@
+"""Questions in words: `why alert 2`, `why touching 1 2`, `why not coupled 1 2`, `why not stage captured`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from visup.agent import Mind, Presence, Thinker
+from visup.agent.model.errors import SettingsError
+from visup.rules.predicates.snapshot import RELATION_NAMES
+from visup.stepping.breakpoints import rules, stages
+from visup.stepping.explanations import why_not as whynot
+from visup.stepping.explanations.evidence import Why
+from visup.stepping.explanations.why import Reasons
+
+ABOUT = ("alert", "object", "identity", "relation", "rule", "stage", "verdict")
+"""What reasons can be asked for, by the first word."""
+NOT_YET = ("entry", "exit", "occlusion", "reappearance", "identified", "coupled", "rule", "stage")
+"""What can be asked why it is not, besides relations and the names of rules and stages."""
+_PRESENCE = {
+    "exit": Presence.LEFT,
+    "occlusion": Presence.HIDDEN,
+    "reappearance": Presence.SEEN,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A question taken apart.
+
+    Attributes:
+        about: One of `ABOUT` or `NOT_YET`.
+        name: Of a rule, relation, stage or task; may be empty.
+        ids: Numbers of an alert or of objects.
+    """
+
+    about: str
+    name: str
+    ids: tuple[int, ...]
+
+
+def why(reasons: Reasons, text: str) -> Why:
+    """The answer to `why TEXT`.
+
+    Raises:
+        VisupError: The question cannot be understood, or nothing is known of what it is about.
+    """
+    asked = _taken_apart(text, reasons.mind, ABOUT)
+    answers: dict[str, Callable[[], Why]] = {
+        "alert": lambda: reasons.alert(_one(asked, reasons.mind)),
+        "object": lambda: reasons.object(_one(asked, reasons.mind)),
+        "identity": lambda: reasons.identity(_one(asked, reasons.mind)),
+        "relation": lambda: reasons.relation(asked.name, asked.ids),
+        "rule": lambda: reasons.rule(asked.name, asked.ids),
+        "stage": lambda: reasons.stage(asked.name),
+        "verdict": lambda: reasons.verdict(asked.name or None),
+    }
+    return answers[asked.about]()
+
+
+def why_not(mind: Mind, thinkers: Sequence[Thinker], text: str) -> Why:
+    """The answer to `why not TEXT`.
+
+    Raises:
+        VisupError: The question cannot be understood, or nothing is known of what it is about.
+    """
+    asked = _taken_apart(text, mind, (*NOT_YET, "relation"))
+    if asked.about in _PRESENCE:
+        wanted = _PRESENCE[asked.about]
+        return whynot.presence_unmet(mind, _one(asked, mind), wanted, thinkers)
+    answers: dict[str, Callable[[], Why]] = {
+        "entry": lambda: whynot.entry_unmet(mind, _one(asked, mind), thinkers),
+        "identified": lambda: whynot.identity_unmet(mind, _one(asked, mind), thinkers),
+        "coupled": lambda: whynot.coupling_unmet(mind, *_two(asked), thinkers),
+        "rule": lambda: whynot.alert_unmet(mind, asked.name, asked.ids),
+        "stage": lambda: whynot.stage_unmet(mind, asked.name),
+        "relation": lambda: whynot.relation_unmet(mind, asked.name, asked.ids),
+    }
+    return answers[asked.about]()
+
+
+def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> Asked:
+    """`alert 2`, `relation touching 1 2`, `touching(1, 2)`, `captured`, ..."""
+    words = re.findall(r"[^\s,()?]+", text)
+    ids = tuple(int(w) for w in words if w.isdecimal())
+    names = [w for w in words if not w.isdecimal()]
+    about = names[0] if names else ""
+    if about in known:
+        return _complete(Asked(about, names[1] if len(names) > 1 else "", ids), text)
+    for kind, table in (
+        ("stage", stages(mind)),
+        ("rule", rules(mind)),
+        ("relation", RELATION_NAMES),
+    ):
+        if about in table:
+            return Asked(kind, about, ids)
+    tables = (*known, *stages(mind), *rules(mind), *RELATION_NAMES)
+    close = get_close_matches(about, tables, 1, 0.6)
+    raise SettingsError(
+        f"nothing is asked by '{text}'",
+        expected=f"{', '.join(known)}, or the name of a stage, rule or relation with ids of objects",
+        hint=f"did you mean '{close[0]}'?" if close else None,
+    )
+
+
+def _complete(asked: Asked, text: str) -> Asked:
+    if asked.about in ("relation", "rule", "stage") and not asked.name:
+        raise SettingsError(f"'{text}' names no {asked.about}", expected=f"{asked.about} NAME ...")
+    return asked
+
+
+def _one(asked: Asked, mind: Mind) -> int:
+    """The number that is asked about; where there is only one alert or object, that one."""
+    if asked.ids:
+        return asked.ids[0]
+    there = [a.id for a in mind.alerts] if asked.about == "alert" else sorted(mind.objects)
+    if len(there) == 1:
+        return there[0]
+    numbers = ", ".join(map(str, there)) or "there is none"
+    raise SettingsError(f"which {asked.about}?", expected=numbers)
+
+
+def _two(asked: Asked) -> tuple[int, int]:
+    if len(asked.ids) != 2:
+        raise SettingsError(
+            f"'{asked.about}' is about two objects", expected="such as: coupled 1 2"
+        )
+    return asked.ids[0], asked.ids[1]

@@ -1,0 +1,369 @@
+"""Why an alert is open, a belief is held, a stage or verdict is what it is: down to the percepts."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Any, Protocol
+
+from visup.agent import (
+    Alert,
+    Coupling,
+    Event,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Relation,
+    ReportState,
+    StageBelief,
+    TaskBelief,
+    Truth,
+)
+from visup.agent.model.errors import SettingsError
+from visup.rules.coupling.coupling import COUPLING
+from visup.rules.safety.queries import explain
+from visup.rules.safety.reasoner import kept
+from visup.rules.wording.sentences import short
+from visup.stepping.explanations.evidence import Why, because, of_region, told
+
+LOOK_BACK = 250
+"""How many steps back the latest percepts that name an object are looked for."""
+
+
+class Course(Protocol):
+    """What reasons are looked up in: a stepper."""
+
+    @property
+    def at(self) -> int: ...  # noqa: D102
+    @property
+    def begin(self) -> int: ...  # noqa: D102
+    @property
+    def mind(self) -> Mind: ...  # noqa: D102
+
+    def mind_at(self, number: int) -> Mind: ...  # noqa: D102
+    def seen_at(self, number: int) -> Observation: ...  # noqa: D102
+    def told(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Reasons:
+    """Gives reasons as they were after one step.
+
+    Attributes:
+        course: Where past steps are found.
+        number: The step.
+        mind: What was believed after it.
+    """
+
+    course: Course
+    number: int
+    mind: Mind
+
+    def after(self, number: int) -> Reasons:
+        """The reasons as they were after another step."""
+        if number == self.number:
+            return self
+        return Reasons(self.course, number, self.course.mind_at(number))
+
+    def of(self, what: object) -> Why:
+        """Why something is so.
+
+        Raises:
+            SettingsError: Nothing is known of it.
+        """
+        match what:
+            case Alert():
+                return self.alert(what.id)
+            case Event():
+                return self.event(what)
+            case Relation():
+                return self.relation(what.name, what.objects)
+            case Coupling():
+                return self.relation("coupled", what.objects)
+            case ObjectBelief():
+                return self.object(what.id)
+            case TaskBelief():
+                return self.verdict(what.task)
+            case StageBelief():
+                return self.stage(what.stage)
+        raise SettingsError(f"why of a {type(what).__name__} cannot be told")
+
+    def alert(self, alert_id: int) -> Why:
+        """Why an alert was opened, and why it stays open; those that are over are found too."""
+        number, event = self._opening(alert_id)
+        then = self.after(number)
+        now = next((a for a in self.mind.alerts if a.id == alert_id), None)
+        text = f"alert {alert_id}, {event.data['alert_kind']}: {event.text}"
+        parts = [then._cause(str(event.data["alert_kind"]), event)]
+        if now is None:
+            parts.append(Why("it is closed"))
+        elif now.updated < self.mind.time:
+            parts.append(Why(f"it last held at {now.updated:.2f} s, and is not over yet"))
+        return Why(text, tuple(parts), event.frame_index, event.time)
+
+    def _opening(self, alert_id: int) -> tuple[int, Event]:
+        for number, event in self.course.told(last=self.number):
+            if event.kind == "alert" and event.data.get("alert") == alert_id:
+                return number, event
+        known = ", ".join(str(a.id) for a in self.mind.alerts) or "none is open"
+        raise SettingsError(f"there was no alert {alert_id}", expected=known)
+
+    def _cause(self, kind: str, event: Event) -> Why:
+        """Why a concern of some kind held after this step."""
+        if kind in {rule.name for rule in kept(self.mind).rules}:
+            return self.rule(kind, event.objects)
+        stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
+        if kind == "stage_failing":
+            bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
+            failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
+            if failing:  # which tell of their actors
+                return Why("because", (*stated, *failing))
+        if kind == "behaviour_failed":
+            stated += self._failed()
+        return Why("because", (*stated, *self._objects(event.objects)))
+
+    def _failed(self) -> tuple[Why, ...]:
+        seen = self.course.seen_at(self.number)
+        bad = (r for r in seen.reports if r.state not in (ReportState.RAN, ReportState.RESTED))
+        return tuple(
+            Why(f"{r.behaviour} {r.state.value}: {r.error}", (), seen.frame_index, seen.time)
+            for r in bad
+        )
+
+    def rule(self, name: str, objects: tuple[int, ...]) -> Why:
+        """Why a rule is true, false or unknown of some objects, and what is known of these.
+
+        Raises:
+            RuleError: There is no such rule, or the objects are not those of a choice for it.
+        """
+        orders = list(permutations(objects))
+        found = [explain(self.mind, name, *ids) for ids in orders[: 6 if len(objects) < 4 else 1]]
+        best = next((e for e in found if e.verdict is Truth.TRUE), found[0])
+        reason = because(best)
+        return Why(
+            reason.text,
+            (*reason.parts, *self._objects(objects)),
+            self.mind.frame_index,
+            self.mind.time,
+        )
+
+    def relation(self, name: str, objects: tuple[int, ...], *, deep: bool = True) -> Why:
+        """Why a relation has its truth: its quantity, since when, and the regions of its objects.
+
+        Args:
+            name: The relation.
+            objects: Ids.
+            deep: Whether to tell the regions.
+
+        Raises:
+            SettingsError: It is not judged.
+        """
+        r = self.mind.relation(name, *objects)
+        if r is None:
+            named = f"{name}({', '.join(map(str, objects))})"
+            raise SettingsError(f"{named} is not judged", expected="a relation of objects in view")
+        who = ", ".join(short(self.mind, i) for i in objects)
+        text = (
+            f"{name}({who}) is {r.truth.value} since {r.since:.2f} s, confidence {r.confidence:.2f}"
+        )
+        parts = self._measured(r) + (self._coupled(objects) if name == "coupled" else ())
+        sights = tuple(self._sight(i) for i in objects) if deep else ()
+        return Why(text, (*parts, *sights), *self._here)
+
+    def _measured(self, r: Relation) -> tuple[Why, ...]:
+        if r.value is None:
+            return ()
+        about = "" if r.sigma is None else f" ± {r.sigma:.3g}"
+        return (Why(f"its quantity is {r.value:.3g}{about}"),)
+
+    def _coupled(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
+        low, high = sorted(objects)
+        pending: Any = self.mind.memory.get(COUPLING, {}).get((low, high))
+        since = {
+            "they last converged at": getattr(pending, "converged_at", None),
+            "apart since": getattr(pending, "apart_since", None),
+        }
+        told = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        if pending is not None:
+            told.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
+        return (
+            *told,
+            *(
+                self.relation(n, (low, high), deep=False)
+                for n in self._judged("touching", low, high)
+            ),
+        )
+
+    def _judged(self, name: str, *objects: int) -> tuple[str, ...]:
+        return (name,) if self.mind.relation(name, *objects) is not None else ()
+
+    def object(self, object_id: int) -> Why:
+        """Why an object is believed to be there and to be what it is."""
+        b = self._belief(object_id)
+        return Why(
+            f"object {b.id} is believed to be {b.presence.value}, {_named(b)}",
+            (self._sight(object_id), self.identity(object_id)),
+            *self._here,
+        )
+
+    def identity(self, object_id: int) -> Why:
+        """Why an object is believed to be what it is: answer, votes, and what it looked like last."""
+        b = self._belief(object_id)
+        answer = self.mind.answers.get(object_id)
+        stated = (Why(f"the operator said that it is {answer}"),) if answer else ()
+        votes = tuple(
+            Why(
+                f"{c.name}: {c.votes:.2f} votes, share {c.share:.2f}, likelihood {c.confidence:.2f}"
+            )
+            for c in b.candidates
+        )
+        nobody = Why(f"none of the models: likelihood {b.unknown:.2f}")
+        looks = self._looks(b)
+        return Why(f"object {b.id} is {_named(b)}", (*stated, *votes, nobody, *looks), *self._here)
+
+    def _looks(self, b: ObjectBelief) -> tuple[Why, ...]:
+        """The latest percepts that say what it looks like."""
+        number = self._step_of(b.last_seen)
+        for back in range(number, max(self.course.begin, number - LOOK_BACK), -1):
+            seen = self.course.seen_at(back)
+            found = of_region(seen, b.region.id, names=True)
+            named = tuple(w for w in found if w.percept and w.percept.kind != "region")
+            if named:
+                return named
+        return (Why("nothing was said of what it looks like"),)
+
+    def _sight(self, object_id: int) -> Why:
+        """When an object was seen last, and as which region."""
+        b = self._belief(object_id)
+        seen = self.course.seen_at(self._step_of(b.last_seen))
+        who = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
+        text = f"{who}, first seen at {b.first_seen:.2f} s, was last seen at {b.last_seen:.2f} s"
+        return Why(text, of_region(seen, b.region.id))
+
+    def _objects(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
+        return tuple(self.object(i) for i in objects if i in self.mind.objects)
+
+    def stage(self, stage: str) -> Why:
+        """Why a stage stands as it does: what verification says, what it asks for, who plays in it.
+
+        Raises:
+            SettingsError: There is no such stage.
+        """
+        for task in self.mind.tasks:
+            for s in task.stages:
+                if s.stage == stage:
+                    return self._stage(task, s)
+        known = ", ".join(s.stage for t in self.mind.tasks for s in t.stages) or "no task was given"
+        raise SettingsError(f"there is no stage '{stage}'", expected=known)
+
+    def _stage(self, task: TaskBelief, s: StageBelief) -> Why:
+        since = [
+            Why(e.text, (), e.frame_index, e.time)
+            for _, e in self.course.told(last=self.number)
+            if e.kind.startswith("stage_") and e.data.get("stage") == s.stage
+        ]
+        parts = [Why(s.evidence)] if s.evidence else []
+        parts += [Why("it was told", tuple(since[-3:]))] if since else []
+        parts += self._asked(task) if task.current == s.stage else []
+        text = f"stage {s.stage} is {s.status.value} since {s.since:.2f} s"
+        return Why(f"{text}, confidence {s.confidence:.2f}", (*parts, *self._actors(task)))
+
+    def _asked(self, task: TaskBelief) -> list[Why]:
+        found = [(e.relation, e.objects) for e in task.expected]
+        return [
+            self.relation(n, o, deep=False)
+            for n, o in found
+            if self.mind.relation(n, *o) is not None
+        ]
+
+    def _actors(self, task: TaskBelief) -> tuple[Why, ...]:
+        return tuple(
+            Why(f"{b.actor} ({', '.join(b.models)}) is played by nobody yet")
+            if b.object_id is None
+            else Why(
+                f"{b.actor} is played by object {b.object_id}, strength {b.strength:.2f}",
+                (self.object(b.object_id),) if b.object_id in self.mind.objects else (),
+            )
+            for b in task.bindings
+        )
+
+    def verdict(self, name: str | None = None) -> Why:
+        """Why the verdict of a task is what it is; of the only task when no name is given.
+
+        Raises:
+            SettingsError: There is no such task.
+        """
+        tasks = [t for t in self.mind.tasks if name in (None, t.task)]
+        if not tasks:
+            known = ", ".join(t.task for t in self.mind.tasks) or "no task was given"
+            raise SettingsError(
+                f"there is no task '{name}'" if name else "there is no verdict", expected=known
+            )
+        return self._verdict(tasks[0])
+
+    def _verdict(self, task: TaskBelief) -> Why:
+        stages = tuple(
+            self._stage(task, s)
+            if s.stage == task.current or s.status.value in ("failing", "failed")
+            else Why(f"stage {s.stage} is {s.status.value} since {s.since:.2f} s")
+            for s in task.stages
+        )
+        alerts = tuple(
+            self.alert(a.id) for a in self.mind.alerts if a.cause.rstrip(".") == task.evidence
+        )
+        text = f"the verdict on {task.task} is {task.verdict.value}"
+        stated = (Why(task.evidence),) if task.evidence else ()
+        return Why(text, (*stated, *alerts, *stages), *self._here)
+
+    def event(self, event: Event) -> Why:
+        """Why an event was told, as things were when it was."""
+        number = self._step_of(event.time)
+        then = self.after(number)
+        return Why(event.text, then._behind(event), event.frame_index, event.time)
+
+    def _behind(self, event: Event) -> tuple[Why, ...]:
+        data: Mapping[str, Any] = event.data
+        if event.kind in ("alert", "alert_closed"):
+            return (self.alert(int(data["alert"])),)
+        if event.kind.startswith("stage_") and "stage" in data:
+            return (self.stage(str(data["stage"])),)
+        if event.kind == "verdict":
+            return (self.verdict(data.get("task")),)
+        if event.kind in ("coupled", "decoupled"):
+            return (self.relation("coupled", event.objects),)
+        if event.kind == "relation" and "relation" in data:
+            return (self.relation(str(data["relation"]), event.objects),)
+        if event.kind in ("identified", "question", "answer"):
+            return tuple(self.identity(i) for i in event.objects)
+        seen = self.course.seen_at(self.number)
+        other = (
+            ()
+            if event.objects
+            else tuple(
+                told(p, seen) for r in seen.reports for p in r.percepts if p.kind == event.kind
+            )
+        )
+        return (*self._objects(event.objects), *other)
+
+    def _belief(self, object_id: int) -> ObjectBelief:
+        belief = self.mind.objects.get(object_id)
+        if belief is None:
+            known = ", ".join(map(str, sorted(self.mind.objects))) or "none yet"
+            raise SettingsError(f"there is no object {object_id}", expected=known)
+        return belief
+
+    def _step_of(self, time: float) -> int:
+        """The step of the frame at a time, or the first after it that is known."""
+        numbers = range(self.course.begin + 1, self.number + 1)
+        place = bisect_left(numbers, time, key=lambda n: self.course.seen_at(n).time)
+        return numbers[min(place, len(numbers) - 1)]
+
+    @property
+    def _here(self) -> tuple[int, float]:
+        return self.mind.frame_index, self.mind.time
+
+
+def _named(b: ObjectBelief) -> str:
+    return f"{b.name}, likelihood {b.confidence:.2f}"

@@ -1,0 +1,230 @@
+"""One course of an agent that can be walked forth and back: new steps, old steps, half steps."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator
+
+from visup.agent import Event, Frame, Mind, Observation, Outcome
+from visup.agent.contract.phases import Phase
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.step import Step
+from visup.stepping.cursor import Mark, Midway
+from visup.stepping.history import History
+from visup.stepping.observation_sources import Feed
+
+
+class Course:
+    """An agent with its history, a place in it, and what gives it more.
+
+    Args:
+        history: Of its agent.
+        source: Gives observations; of a branch, the course that it left.
+
+    Attributes:
+        agent: The agent; its mind is that of the place.
+        parent: The course that this one branched off, or None.
+    """
+
+    def __init__(self, history: History, source: Feed | Course) -> None:
+        self.agent = history.agent
+        self.parent = source if isinstance(source, Course) else None
+        self._feed = source if not isinstance(source, Course) else None
+        self._history = history
+        self._frame: Frame | None = None
+        self._midway: Midway | None = None
+        self._rest: Iterator[tuple[Phase, Outcome]] = iter(())
+        self._last: Step | None = None
+
+    # Where it is
+
+    @property
+    def mind(self) -> Mind:
+        """What is believed here; half-made when stopped inside a step."""
+        thought = self._midway.thought if self._midway else None
+        return self.agent.mind if thought is None else thought.mind
+
+    @property
+    def at(self) -> int:
+        """How many steps led here."""
+        return self._history.at
+
+    @property
+    def made(self) -> int:
+        """How many steps were ever made."""
+        return self._history.made
+
+    @property
+    def begin(self) -> int:
+        """How many steps there were before this course: 0 but for branches."""
+        return self._history.begin
+
+    @property
+    def midway(self) -> Midway | None:
+        """The step inside which it is stopped, or None."""
+        return self._midway
+
+    @property
+    def last(self) -> Step | None:
+        """The last completed step, or None where the course begins."""
+        return self._last
+
+    # Forth
+
+    def _cycle(self, phases: frozenset[Phase]) -> Step | None:
+        """On to the end of a step, or None: stopped inside it, or nothing more is perceived."""
+        before = self.agent.mind
+        if self._midway is None:
+            seen = self._perceived()
+            if seen is None:
+                return None
+            self._midway, self._rest = Midway(Phase.PERCEIVE, seen), self._history.phases(seen)
+            if Phase.PERCEIVE in phases:
+                return None
+        midway = self._midway
+        for phase, thought in self._rest:
+            self._midway = midway = Midway(phase, midway.seen, thought)
+            if phase in phases:
+                return None
+        assert midway.thought is not None
+        step = self._history.conclude(midway.seen, midway.thought)
+        self._arrive(step)
+        frame, self._frame = self._frame, None
+        for observer in self.agent.observers if frame is not None else ():
+            assert frame is not None
+            observer(step, frame)
+        self._after(before, step)
+        return step
+
+    def _after(self, before: Mind, step: Step) -> None:
+        """Told of each step that is completed here, with the mind before it."""
+
+    def _perceived(self) -> Observation | None:
+        """What the next step begins with: from the tape, or new."""
+        history = self._history
+        if history.at < len(history.tape):
+            return history.tape.seen(history.at)
+        if self.parent is not None:
+            while len(history.tape) <= history.at:
+                if not self.parent._look_ahead():
+                    return None
+            if said := self.parent._history.answers.get(history.at):
+                history.answers[history.at] = said
+            return history.tape.seen(history.at)
+        given = self._feed.next(self.agent) if self._feed else None
+        if given is None:
+            return None
+        history.tape.add(given.seen)
+        if given.answers is not None:
+            history.answers[history.at] = given.answers
+        self._frame = given.frame
+        return given.seen
+
+    def _look_ahead(self) -> bool:
+        """One more step at the end of this course, for a branch; the place stays."""
+        paused = self._midway, self._rest, self._last
+        made = self.made
+        with self._history.elsewhere():
+            self._drop()
+            self._last = self._history.go(made)
+            self._cycle(frozenset())
+        self._midway, self._rest, self._last = paused
+        return self.made > made
+
+    def _look_again(self) -> None:
+        """Told when the place has changed otherwise than by a step."""
+
+    def _arrive(self, step: Step | None) -> None:
+        self._drop()
+        self._last = step
+
+    def _drop(self) -> None:
+        """Forget the half-made step, if there is one; what was perceived stays on the tape."""
+        self._midway, self._rest = None, iter(())
+
+    # Back
+
+    def back(self, n: int = 1) -> Step | None:
+        """Go back by some steps; a step inside which it is stopped is left, and counts as one.
+
+        Returns:
+            The step after which it is now, or None where the course begins.
+        """
+        return self.go(self.at - n + (self._midway is not None))
+
+    def go(self, number: int) -> Step | None:
+        """Be after step `number`; later ones are made if need be, and breakpoints are not looked at.
+
+        Raises:
+            SettingsError: There is no such step.
+        """
+        if number < self.begin:
+            raise SettingsError(
+                f"there is no step {number}", expected=f"at least {self.begin}, where this began"
+            )
+        self._arrive(self._history.go(min(number, self.made)))
+        while self.at < number:
+            if self._cycle(frozenset()) is None:
+                raise SettingsError(f"there is no step {number}", expected=f"at most {self.made}")
+        self._look_again()
+        return self._last
+
+    def go_to_time(self, seconds: float) -> Step | None:
+        """Be after the first step that is not before a time; later ones are made if need be.
+
+        Raises:
+            SettingsError: The source ends before.
+        """
+        made = range(self.begin + 1, self.made + 1)
+        place = bisect_left(made, seconds, key=lambda n: self.seen_at(n).time)
+        step = self.go(made[place] if place < len(made) else self.made)
+        while self.mind.time < seconds or self.at == self.begin:
+            step = self.go(self.at + 1)
+        return step
+
+    def snapshot(self) -> Mark:
+        """This place, to come back to with `restore`; a few references, no copy."""
+        return Mark(self.at, self._history.here, self._history)
+
+    def restore(self, mark: Mark) -> None:
+        """Be again where a snapshot was taken.
+
+        Raises:
+            SettingsError: It is of another course.
+        """
+        if mark.course is not self._history:
+            raise SettingsError(
+                "this snapshot is of another course", expected="one of this stepper"
+            )
+        self._arrive(self._history.step(mark.number) if mark.number > self.begin else None)
+        self._history.jump(mark.number, mark.was)
+        self._look_again()
+
+    # What was
+
+    def at_step(self, number: int) -> Step | None:
+        """A step that was made, without going there; None where the course begins.
+
+        Raises:
+            SettingsError: It was not made.
+        """
+        if not self.begin <= number <= self.made:
+            raise SettingsError(
+                f"there is no step {number}", expected=f"one from {self.begin} to {self.made}"
+            )
+        if number == self.at and self._last is not None:
+            return self._last
+        return self._history.step(number)
+
+    def mind_at(self, number: int) -> Mind:
+        """The mind after a step that was made."""
+        self.at_step(number)
+        return self._history.snapshot(number).mind
+
+    def told(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
+        """Number of the step and event, for all that was told so far, also after this place."""
+        return self._history.told(first, last)
+
+    def seen_at(self, number: int) -> Observation:
+        """What was perceived in a step; numbers begin at 1, with what was seen before any branch."""
+        return self._history.tape.seen(number - 1)

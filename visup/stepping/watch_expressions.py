@@ -1,0 +1,79 @@
+"""Watches: expressions of the rule language whose values are shown after each step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from visup.agent.model.mind import Mind
+from visup.agent.model.step import Step
+from visup.rules.safety.expression import Judged, Reading, expression
+from visup.stepping.breakpoints import Following, Stop, WhenStop
+
+
+@dataclass(slots=True)
+class Breakpoint:
+    """A condition that ends every run of steps.
+
+    Attributes:
+        id: Number, from 1.
+        stop: The condition.
+        enabled: Whether it is looked at.
+        hits: How often it has ended a run.
+    """
+
+    id: int
+    stop: Stop
+    enabled: bool = True
+    hits: int = 0
+
+    def __str__(self) -> str:
+        off = "" if self.enabled else ", disabled"
+        return f"{self.id}  {self.stop.text}  ({self.hits} hits{off})"
+
+
+@dataclass(slots=True)
+class Watch:
+    """An expression that is judged after each step.
+
+    Attributes:
+        id: Number, from 1.
+        stop: The expression; also the condition that it changes.
+        breaks: Whether a change ends a run of steps.
+        judged: What it came to after the latest step, or None.
+    """
+
+    id: int
+    stop: WhenStop
+    breaks: bool = False
+    judged: Judged | None = None
+    _follow: Following = field(default_factory=Following, repr=False)
+
+    @classmethod
+    def of(cls, number: int, text: str, breaks: bool) -> Watch:
+        """A watch on an expression.
+
+        Raises:
+            RuleError: It cannot be read.
+        """
+        return cls(number, WhenStop(expression(text), True), breaks)
+
+    @property
+    def text(self) -> str:
+        """The expression."""
+        return self.stop.expression.text
+
+    @property
+    def readings(self) -> tuple[Reading, ...]:
+        """Its values, one for each choice of objects; what is the same both ways round once."""
+        found: dict[tuple[tuple[int, ...], str], Reading] = {}
+        for reading in self.judged.readings if self.judged else ():
+            found.setdefault((tuple(sorted(reading.objects)), str(reading)), reading)
+        return tuple(found.values())
+
+    def look(self, before: Mind, after: Mind) -> None:
+        """Judge it after a step."""
+        _, self.judged = self._follow(self.stop.expression, before, after)
+
+    def changed(self, before: Mind, step: Step) -> str:
+        """What has changed of it, or an empty text; to be asked after each step."""
+        return self.stop.met(before, step) if self.breaks else ""

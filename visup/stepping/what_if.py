@@ -1,0 +1,206 @@
+"""What if: beliefs that a branch insists upon, and other rules or tasks to reason with.
+
+A belief is made again after every thinker, in every step: what is measured goes on saying otherwise,
+and whatever comes later in the step reasons from the belief.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from visup.agent import (
+    Candidate,
+    Coupling,
+    Event,
+    Mind,
+    Observation,
+    Outcome,
+    Presence,
+    Relation,
+    RelationTable,
+    Thinker,
+    Truth,
+)
+from visup.agent.cycle.agent import Thinkers
+from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
+from visup.rules.formula.nodes import Rule
+from visup.rules.safety.reasoner import RuleThinker
+from visup.tasks.supervision.supervise import MEMORY, task_thinker
+
+if TYPE_CHECKING:
+    from visup.tasks.grammar.nodes import Task
+
+Belief = Callable[[Mind], Mind]
+"""Gives a mind in which it is so; what it is about may not be there."""
+
+
+@dataclass(frozen=True, slots=True)
+class RelationIs:
+    """A relation is true, false or unknown, since a time in seconds.
+
+    Where one answer of several excludes the others (converging, keeping their distance, diverging),
+    a false one makes the next one true.
+    """
+
+    name: str
+    objects: tuple[int, ...]
+    truth: Truth
+    since: float
+
+    def __call__(self, mind: Mind) -> Mind:
+        """See `Belief`."""
+        if not all(i in mind.objects for i in self.objects):
+            return mind
+        found = mind.relation(self.name, *self.objects)
+        if found is None or found.truth is not self.truth:
+            told = Relation(self.name, self.objects, self.truth, self.since)
+            mind = replace(mind, relations=with_relation(mind.relations, told))
+        return self._coupled(mind) if self.name == "coupled" else mind
+
+    def _coupled(self, mind: Mind) -> Mind:
+        """What is coupled is also kept apart from the relations."""
+        low, high = sorted(self.objects)
+        others = tuple(c for c in mind.couplings if c.objects != (low, high))
+        if self.truth is not Truth.TRUE:
+            return replace(mind, couplings=others)
+        if len(others) < len(mind.couplings):
+            return mind
+        return replace(mind, couplings=(*others, Coupling((low, high), self.since)))
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityIs:
+    """An object is of a model; 'unknown object' for none of them."""
+
+    object_id: int
+    name: str
+
+    def __call__(self, mind: Mind) -> Mind:
+        """See `Belief`."""
+        belief = mind.objects.get(self.object_id)
+        if belief is None or (belief.name == self.name and belief.confidence == 1.0):
+            return mind
+        nobody = self.name == UNKNOWN_OBJECT
+        names = () if nobody else (Candidate(self.name, 0.0, 1.0, 1.0),)
+        return mind.with_objects(replace(belief, candidates=names, unknown=float(nobody)))
+
+
+@dataclass(frozen=True, slots=True)
+class PresenceIs:
+    """An object is seen, hidden, or has left."""
+
+    object_id: int
+    presence: Presence
+
+    def __call__(self, mind: Mind) -> Mind:
+        """See `Belief`."""
+        belief = mind.objects.get(self.object_id)
+        if belief is None or belief.presence is self.presence:
+            return mind
+        return mind.with_objects(replace(belief, presence=self.presence))
+
+
+@dataclass(frozen=True, slots=True)
+class Insisting:
+    """A thinker after which some beliefs are made so again."""
+
+    thinker: Thinker
+    beliefs: tuple[Belief, ...]
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """See `Thinker`."""
+        outcome = self.thinker(mind, observation)
+        told = tuple(e for e in outcome.events if not any(_denied(b, e) for b in self.beliefs))
+        return replace(outcome, mind=insisted(outcome.mind, self.beliefs), events=told)
+
+
+def _denied(belief: Belief, event: Event) -> bool:
+    """Whether an event tells of what is insisted not to happen."""
+    if not isinstance(belief, RelationIs) or belief.name != "coupled":
+        return False
+    other = "decoupled" if belief.truth is Truth.TRUE else "coupled"
+    return event.kind == other and set(event.objects) == set(belief.objects)
+
+
+def insisted(mind: Mind, beliefs: Iterable[Belief]) -> Mind:
+    """The mind with some beliefs."""
+    for belief in beliefs:
+        mind = belief(mind)
+    return mind
+
+
+def insisting(thinkers: Thinkers, beliefs: Sequence[Belief]) -> Thinkers:
+    """Thinkers that hold to some beliefs."""
+    if not beliefs:
+        return thinkers
+
+    def wrapped(some: tuple[Thinker, ...]) -> tuple[Thinker, ...]:
+        return tuple(Insisting(t, tuple(beliefs)) for t in some)
+
+    return Thinkers(wrapped(thinkers.update), wrapped(thinkers.cogitate), wrapped(thinkers.match))
+
+
+def with_rules(thinkers: Thinkers, rules: Sequence[Rule]) -> Thinkers:
+    """Thinkers that watch other rules."""
+    kept = tuple(t for t in thinkers.cogitate if not isinstance(t, RuleThinker))
+    return replace(thinkers, cogitate=(*kept, RuleThinker(tuple(rules))))
+
+
+def with_tasks(thinkers: Thinkers, tasks: Sequence[Task]) -> Thinkers:
+    """Thinkers that supervise other tasks, from their beginnings."""
+    kept = tuple(
+        t for t in thinkers.match if getattr(t, "__module__", "") != task_thinker.__module__
+    )
+    return replace(thinkers, match=(*((task_thinker(tasks),) if tasks else ()), *kept))
+
+
+def without_tasks(mind: Mind) -> Mind:
+    """The mind as if no task had been supervised yet."""
+    memory = {k: v for k, v in mind.memory.items() if k != MEMORY}
+    return replace(mind, tasks=(), memory=MappingProxyType(memory))
+
+
+def with_relation(
+    relations: RelationTable | tuple[Relation, ...], told: Relation
+) -> RelationTable | tuple[Relation, ...]:
+    """Relations of which one is as told."""
+    if not isinstance(relations, RelationTable):
+        return (*_others(relations, told), told)
+    for number, cells in enumerate(relations.parts):
+        if told.name in cells.columns.named:
+            k, row = relations.pair(*told.objects) if len(told.objects) == 2 else (-1, 0)
+            if k < 0:
+                return relations
+            parts = list(relations.parts)
+            parts[number] = _with_cell(cells, told, row, k)
+            return replace(relations, parts=tuple(parts))
+    return replace(relations, extra=(*_others(relations.extra, told), told))
+
+
+def _others(relations: Iterable[Relation], told: Relation) -> tuple[Relation, ...]:
+    who = frozenset(told.objects)
+    return tuple(r for r in relations if r.name != told.name or frozenset(r.objects) != who)
+
+
+def _with_cell(cells: Cells, told: Relation, row: int, k: int) -> Cells:
+    column, code = cells.columns.named[told.name]
+    if told.truth is Truth.UNKNOWN:
+        code = UNKNOWN_CODE
+    elif told.truth is Truth.FALSE:
+        others = [c for c in range(len(column.names)) if c != code]
+        # A code without a name says nothing else; else what is next to it.
+        code = min(others, key=lambda c: (column.names[c] != "", abs(c - code)))
+    state, since, at = cells.state.copy(), cells.since.copy(), column.rows[row]
+    state[at, k], since[at, k] = code, told.since
+    # Other columns may be as sure as this one was: it has a row of its own from now on.
+    numbers = np.concatenate([cells.numbers, cells.numbers[column.confidence][None]])
+    numbers[-1, k] = told.confidence
+    own = replace(column, confidence=len(numbers) - 1)
+    each = tuple(own if c is column else c for c in cells.columns.each)
+    return Cells(Columns(each), state, since, numbers)

@@ -1,0 +1,137 @@
+"""The prompt of `visup step`: completion of commands, ids, stages, rules and events; history; help."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from visup.agent import Presence, Truth
+from visup.agent.contract.phases import Phase
+from visup.rules.predicates.snapshot import RELATION_NAMES
+from visup.rules.predicates.vocabulary import RULES
+from visup.stepping.breakpoint_parser import EVENT_KINDS
+from visup.stepping.breakpoints import rules, stages
+from visup.stepping.explanations import questions as asking
+from visup.terminal.session import Session
+from visup.terminal.session_commands import COMMANDS
+
+if TYPE_CHECKING:
+    from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+    from prompt_toolkit.document import Document
+
+Words = Callable[[Session], Iterable[str]]
+
+
+def _objects(session: Session) -> list[str]:
+    return [str(i) for i in sorted(session.stepper.mind.objects)]
+
+
+def _names(session: Session) -> list[str]:
+    mind = session.stepper.mind
+    return [*stages(mind), *rules(mind)]
+
+
+_WORDS: Mapping[str, Words] = {
+    "stop": lambda s: [
+        *("until", "event", "rule", "stage", "object", "frame", "when", "change"),
+        *(p.value for p in Phase),
+        *EVENT_KINDS,
+        *_names(s),
+    ],
+    "why": lambda s: [
+        *("not", *asking.ABOUT, *asking.NOT_YET),
+        *_names(s),
+        *RELATION_NAMES,
+        *_objects(s),
+        *(str(a.id) for a in s.stepper.mind.alerts),
+    ],
+    "object": lambda s: [
+        *("object", "unknown", *_objects(s), *s.stepper.mind.actors, *s.agent.models),
+        *(p.value for p in Presence),
+    ],
+    "relation": lambda s: [*RELATION_NAMES, *(t.value for t in Truth)],
+    "break": lambda s: [str(n) for n in s.stepper.breakpoints],
+    "mark": lambda s: ["start", "end", *s.marks],
+    "file": lambda s: ["rules", "task"],
+    "command": lambda s: list(COMMANDS),
+    "expression": lambda s: [*RULES.words, *RULES.quantities],
+}
+
+
+def completions(session: Session, line: str) -> list[str]:
+    """What the last word of a line may become.
+
+    Args:
+        session: Knows who is there, which stages and rules there are, and what is set.
+        line: What was typed so far.
+    """
+    *before, last = line.split(" ")
+    if not before:
+        return [w for w in session.words() if w.startswith(last) and w != "until"]
+    command = COMMANDS.get(before[0].removesuffix("!"))
+    found = [w for kind in (command.completes if command else ()) for w in _WORDS[kind](session)]
+    return list(dict.fromkeys(w for w in found if w.startswith(last)))
+
+
+def read_commands(session: Session) -> Iterator[str]:
+    """Lines that the user enters: with history and completion on a terminal, plain from a pipe."""
+    if not sys.stdin.isatty():
+        yield from sys.stdin
+        return
+    from prompt_toolkit import PromptSession
+    from prompt_toolkit.auto_suggest import AutoSuggestFromHistory
+    from prompt_toolkit.history import FileHistory, InMemoryHistory
+
+    place = history_file()
+    prompt: PromptSession[str] = PromptSession(
+        completer=_completer(session),
+        history=FileHistory(str(place)) if place else InMemoryHistory(),
+        auto_suggest=AutoSuggestFromHistory(),
+        bottom_toolbar=lambda: toolbar(session),
+    )
+    while True:
+        try:
+            yield prompt.prompt("visup> ")
+        except (EOFError, KeyboardInterrupt):
+            return
+
+
+def toolbar(session: Session) -> str:
+    """Where the session is, in one line of at most 80 characters."""
+    stepper = session.stepper
+    branch = f"  branch from {stepper.begin}" if len(session.courses) > 1 else ""
+    inside = f"  after {stepper.midway.phase.value}" if stepper.midway else ""
+    place = f" step {stepper.at} of {stepper.made}{inside}{branch}  {stepper.mind.time:.2f} s"
+    return f"{place}  Tab completes, 'help step' explains"[:80]
+
+
+def history_file() -> Path | None:
+    """Where commands are remembered from session to session; None where nothing can be written."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    try:
+        (base / "visup").mkdir(parents=True, exist_ok=True)
+        place = base / "visup" / "step-history"
+        place.touch()
+    except OSError:
+        return None
+    return place
+
+
+def _completer(session: Session) -> Completer:
+    from prompt_toolkit.completion import Completer, Completion
+
+    class Completing(Completer):
+        """Completes the last word of the line."""
+
+        def get_completions(
+            self, document: Document, complete_event: CompleteEvent
+        ) -> Iterator[Completion]:
+            line = document.text_before_cursor
+            last = line.split(" ")[-1]
+            for word in completions(session, line):
+                yield Completion(word, start_position=-len(last))
+
+    return Completing()

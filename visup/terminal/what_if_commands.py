@@ -1,0 +1,104 @@
+"""What if, in words: `touching 1 2 true`, `object 1 arm`, `object 2 hidden`, `rules FILE`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+
+from visup.agent import Mind, Presence, Truth
+from visup.agent.cycle.agent import Thinkers
+from visup.agent.cycle.answers import understood
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.rules.language.parser import load_rules
+from visup.rules.predicates.snapshot import RELATION_NAMES
+from visup.stepping.what_if import (
+    Belief,
+    IdentityIs,
+    PresenceIs,
+    RelationIs,
+    with_rules,
+    with_tasks,
+)
+from visup.tasks import load_tasks
+
+_TRUTHS = tuple(t.value for t in Truth)
+_PRESENCES = tuple(p.value for p in Presence)
+
+
+def supposed(
+    mind: Mind, words: Sequence[str], models: Iterable[str] = (), *, retract: bool = False
+) -> Belief:
+    """The belief that some words tell.
+
+    Args:
+        mind: Where it is to be held.
+        words: `[relation] NAME IDS [TRUTH]`, `object ID NAME`, or `object ID seen|hidden|left`.
+        models: Models that are known besides those spoken of.
+        retract: Whether it shall not be known: an unknown relation, an unknown object.
+
+    Raises:
+        SettingsError: They tell none.
+    """
+    said = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
+    if not said:
+        raise SettingsError("nothing is supposed", expected=_EXPECTED)
+    if said[0] in ("object", "identity", "presence"):
+        return _of_object(mind, said[1:], models, retract)
+    return _relation(mind, said, retract)
+
+
+_EXPECTED = "such as: touching 1 2 true, object 1 arm, object 2 hidden"
+
+
+def _relation(mind: Mind, words: list[str], retract: bool) -> Belief:
+    name, *rest = words
+    ids = tuple(int(w) for w in rest if w.isdecimal())
+    known = {*RELATION_NAMES, *(r.name for r in mind.relations)}
+    if name not in known:
+        close = get_close_matches(name, known, 1, 0.6)
+        hint = f"did you mean '{close[0]}'?" if close else None
+        raise SettingsError(f"there is no relation '{name}'", expected=_EXPECTED, hint=hint)
+    for object_id in ids:
+        _known(mind, object_id)
+    truth = rest[-1] if rest and rest[-1] in _TRUTHS else "unknown" if retract else "true"
+    if len(ids) != 2 or (rest[-1] not in _TRUTHS and not rest[-1].isdecimal()):
+        what = f"'{' '.join(words)}' is no relation of two objects"
+        raise SettingsError(what, expected=_EXPECTED)
+    return RelationIs(name, ids, Truth(truth), mind.time)
+
+
+def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: bool) -> Belief:
+    if not words or not words[0].isdecimal() or (len(words) < 2 and not retract):
+        raise SettingsError("what of which object?", expected=_EXPECTED)
+    object_id = int(words[0])
+    _known(mind, object_id)
+    if retract:
+        return IdentityIs(object_id, UNKNOWN_OBJECT)
+    said = " ".join(words[1:])
+    if said in _PRESENCES:
+        return PresenceIs(object_id, Presence(said))
+    return IdentityIs(object_id, understood(mind, object_id, said, models))
+
+
+def _known(mind: Mind, object_id: int) -> None:
+    if object_id not in mind.objects:
+        known = ", ".join(map(str, sorted(mind.objects))) or "none yet"
+        raise SettingsError(f"there is no object {object_id}", expected=known)
+
+
+def swapped(thinkers: Thinkers, kind: str, place: str) -> Thinkers:
+    """Thinkers with other rules or another task.
+
+    Args:
+        thinkers: Those that there are.
+        kind: 'rules' or 'task'.
+        place: A file, or the name of a shipped task.
+
+    Raises:
+        VisupError: The file is not as it should be.
+    """
+    if kind == "rules":
+        return with_rules(thinkers, load_rules(place))
+    return with_tasks(thinkers, load_tasks(place))
