@@ -6,7 +6,7 @@ may be plugged in), `agent.py` (the cycle on one screen), `perceive.py`, `slot.p
 behaviours are contained), `registry.py`, `journal.py`.
 """
 
-from visup.agent.contract.behaviour import Behaviour, Contract, Outcome, Thinker
+from visup.agent.contract.behaviour import Behaviour, Contract, Outcome, Reasoner
 from visup.agent.contract.limits import Limits
 from visup.agent.model.errors import VisupError
 from visup.agent.model.mind import (
@@ -88,7 +88,7 @@ __all__ = [
     "StageBelief",
     "Status",
     "TaskBelief",
-    "Thinker",
+    "Reasoner",
     "Truth",
     "Verdict",
     "VisupError",

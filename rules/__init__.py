@@ -1,6 +1,6 @@
 """Interpreting: from what was seen to what is going on (paper, section 5 and part of 7.4).
 
-Read in this order: `thinkers.py` (everything, in the order in which it runs), `objects.py` and
+Read in this order: `reasoners.py` (everything, in the order in which it runs), `objects.py` and
 `presence.py` (who is there; one idea each in `adoption.py`, `merging.py`, `fragments.py`,
 `entering.py` and `vanishing.py`), `votes.py` (who is who), `pose.py` with
 `interpretation.py` and `spin.py` (which way it faces, how it turns), `relations.py` and `coupling.py` (what

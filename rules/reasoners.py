@@ -1,10 +1,10 @@
-"""The thinkers of rules/, in the order in which an agent runs them."""
+"""The reasoners of rules/, in the order in which an agent runs them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from visup.agent import Thinker
+from visup.agent import Reasoner
 from visup.rules.coupling.coupling import Couple, CouplingSettings
 from visup.rules.formula.nodes import Rule
 from visup.rules.identity.depth import BelieveDepth, DepthSettings
@@ -17,13 +17,13 @@ from visup.rules.presence.lifecycle import PresenceSettings, SeePresence
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import Relations
 from visup.rules.relations.zones import SeeZones, ZoneSettings
-from visup.rules.safety.reasoner import RuleThinker
+from visup.rules.safety.reasoner import RuleReasoner
 from visup.rules.wording.relation_events import NarrativeSettings, TellRelations
 
 
 @dataclass(frozen=True, slots=True)
 class RuleSettings:
-    """Settings of all thinkers of rules/, one group for each."""
+    """Settings of all reasoners of rules/, one group for each."""
 
     objects: ObjectSettings = field(default_factory=ObjectSettings)
     votes: VoteSettings = field(default_factory=VoteSettings)
@@ -39,28 +39,28 @@ class RuleSettings:
 
 @dataclass(frozen=True, slots=True)
 class RuleSet:
-    """Thinkers by phase, in order.
+    """Reasoners by phase, in order.
 
     Attributes:
         update: Percepts enter the mind.
         cogitate: Presence, votes, questions, poses, depth, relations, zones, couplings, narrative, rules.
     """
 
-    update: tuple[Thinker, ...]
-    cogitate: tuple[Thinker, ...]
+    update: tuple[Reasoner, ...]
+    cogitate: tuple[Reasoner, ...]
 
 
-def default_thinkers(
+def default_reasoners(
     settings: RuleSettings | None = None, rules: tuple[Rule, ...] | None = None
 ) -> RuleSet:
-    """The thinkers that ship with visup.
+    """The reasoners that ship with visup.
 
     Args:
         settings: Their settings; the defaults when left out.
         rules: Rules to watch; those of `safety.rules` when left out.
 
     Returns:
-        The thinkers of the update and cogitate phases. Each is a pure function of mind and
+        The reasoners of the update and cogitate phases. Each is a pure function of mind and
         observation, so that one set may serve many agents.
     """
     s = settings or RuleSettings()
@@ -76,6 +76,6 @@ def default_thinkers(
             SeeZones(s.zones),
             Couple(replace(s.coupling, relations=s.relations)),
             TellRelations(s.narrative),
-            RuleThinker(shipped_rules() if rules is None else rules),
+            RuleReasoner(shipped_rules() if rules is None else rules),
         ),
     )

@@ -3,7 +3,7 @@
 Read in this order: `tasks.lark` (the language), `tree.py` and `read.py` (text to tree),
 `diagnostics.py` (mistakes: `syntax.py`, `mistakes.py`, `check.py`), `actions.py` (what actions
 mean), `course.py` (where one can be in a task), `verify.py` (how a step stands), `readings.py`
-(which courses fit what is seen), `matching.py` (who plays whom), `supervise.py` (the thinker that
+(which courses fit what is seen), `matching.py` (who plays whom), `supervise.py` (the reasoner that
 joins them).
 """
 

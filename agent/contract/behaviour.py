@@ -1,4 +1,4 @@
-"""The contracts of what runs inside the cycle: behaviours perceive, thinkers reason."""
+"""The contracts of what runs inside the cycle: behaviours perceive, reasoners reason."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from visup.agent.contract.contract import Contract
 from visup.agent.model.mind import Mind
 from visup.agent.model.records import Concern, Directive, Event, Frame, Observation, Percept
 
-__all__ = ["Behaviour", "Contract", "Outcome", "Thinker"]
+__all__ = ["Behaviour", "Contract", "Outcome", "Reasoner"]
 
 
 @runtime_checkable
@@ -43,7 +43,7 @@ class Behaviour(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a thinker concludes.
+    """What a reasoner concludes.
 
     Attributes:
         mind: The mind after it.
@@ -58,6 +58,6 @@ class Outcome:
     directives: tuple[Directive, ...] = ()
 
 
-Thinker = Callable[[Mind, Observation], Outcome]
+Reasoner = Callable[[Mind, Observation], Outcome]
 """A pure function of the mind and of what was observed. It keeps nothing to itself: what it must
 remember goes into `Mind.memory` under its own name, so that minds can be kept and restored."""

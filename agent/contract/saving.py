@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 
 @runtime_checkable
-class Keeps(Protocol):
+class Saveable(Protocol):
     """A behaviour whose state can be kept, so that a run that was killed can go on from it."""
 
     def save(self) -> Mapping[str, Any]:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from visup.agent.contract.behaviour import Behaviour, Outcome, Thinker
+from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.limits import Limits
 from visup.agent.contract.phases import Phase, Snapshot
-from visup.agent.contract.saving import Keeps
+from visup.agent.contract.saving import Saveable
 from visup.agent.cycle.alerts import alert_events, faults, update_alerts
 from visup.agent.cycle.answers import understood, with_answers
 from visup.agent.cycle.outcomes import joined
@@ -31,7 +31,7 @@ from visup.agent.model.step import Observer, Step
 
 
 @dataclass(frozen=True, slots=True)
-class Thinkers:
+class Reasoners:
     """What reasons in an agent, by phase; within a phase in this order.
 
     Attributes:
@@ -40,12 +40,12 @@ class Thinkers:
         match: Stages of tasks are matched and verified.
     """
 
-    update: tuple[Thinker, ...] = ()
-    cogitate: tuple[Thinker, ...] = ()
-    match: tuple[Thinker, ...] = ()
+    update: tuple[Reasoner, ...] = ()
+    cogitate: tuple[Reasoner, ...] = ()
+    match: tuple[Reasoner, ...] = ()
 
-    def by_phase(self) -> tuple[tuple[Phase, tuple[Thinker, ...]], ...]:
-        """The phases that reason, in order, each with its thinkers."""
+    def by_phase(self) -> tuple[tuple[Phase, tuple[Reasoner, ...]], ...]:
+        """The phases that reason, in order, each with its reasoners."""
         return (
             (Phase.UPDATE, self.update),
             (Phase.COGITATE, self.cogitate),
@@ -65,7 +65,7 @@ class Agent:
 
     Attributes:
         behaviours: What perceives.
-        thinkers: What reasons.
+        reasoners: What reasons.
         actors: Actor name -> model names, known before the first frame.
         zones: Parts of the scene that rules can name.
         observers: Told of each step.
@@ -75,7 +75,7 @@ class Agent:
     """
 
     behaviours: Sequence[Behaviour] = ()
-    thinkers: Thinkers = field(default_factory=Thinkers)
+    reasoners: Reasoners = field(default_factory=Reasoners)
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     observers: Sequence[Observer] = ()
     zones: Sequence[Zone] = ()
@@ -100,16 +100,16 @@ class Agent:
         Returns:
             The whole record of the step; `mind` has become `Step.mind`.
         """
-        step = self.rethink(self.look(frame))
+        step = self.reason(self.perceive(frame))
         for observer in self.observers:
             observer(step, frame)
         return step
 
-    def look(self, frame: Frame) -> Observation:
+    def perceive(self, frame: Frame) -> Observation:
         """Perceive only: behaviours see the frame, the mind stays as it is."""
         return perceive(self._slots, frame, self.directives)
 
-    def rethink(self, seen: Observation, answers: Mapping[int, str] | None = None) -> Step:
+    def reason(self, seen: Observation, answers: Mapping[int, str] | None = None) -> Step:
         """Reason about what was perceived, now or in a recorded run; observers are not told.
 
         Args:
@@ -130,7 +130,7 @@ class Agent:
 
         Args:
             seen: What was perceived of the next frame.
-            answers: As of `rethink`.
+            answers: As of `reason`.
 
         Yields:
             Each phase that is over, with all that was concluded up to there; the last one is for `act`.
@@ -141,13 +141,13 @@ class Agent:
         begin, told = with_answers(begin, self._answers if answers is None else answers)
         self._answers = {}
         outcome = Outcome(begin, told)
-        for phase, thinkers in self.thinkers.by_phase():
-            for thinker in thinkers:
+        for phase, reasoners in self.reasoners.by_phase():
+            for reasoner in reasoners:
                 try:
-                    outcome = joined(outcome, thinker(outcome.mind, seen), seen)
+                    outcome = joined(outcome, reasoner(outcome.mind, seen), seen)
                 except (Exception, SystemExit) as fault:
                     # The half-made mind is dropped: beliefs stay as they were and count as unknown.
-                    yield phase, replace(_fault(begin, seen, thinker, fault), events=told)
+                    yield phase, replace(_fault(begin, seen, reasoner, fault), events=told)
                     return
             yield phase, outcome
 
@@ -250,14 +250,14 @@ class Agent:
 
 
 def _saved(behaviour: Behaviour) -> Mapping[str, Any]:
-    assert isinstance(behaviour, Keeps)
+    assert isinstance(behaviour, Saveable)
     return behaviour.save()
 
 
-def _fault(mind: Mind, seen: Observation, thinker: Thinker, fault: BaseException) -> Outcome:
-    name = getattr(thinker, "__name__", type(thinker).__name__)
+def _fault(mind: Mind, seen: Observation, reasoner: Reasoner, fault: BaseException) -> Outcome:
+    name = getattr(reasoner, "__name__", type(reasoner).__name__)
     concern = Concern(
-        "thinking_failed",
+        "reasoning_failed",
         (),
         Severity.CRITICAL,
         f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",

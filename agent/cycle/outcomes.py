@@ -1,4 +1,4 @@
-"""What a thinker concludes is taken over only if it makes sense: phases are all or nothing."""
+"""What a reasoner concludes is taken over only if it makes sense: phases are all or nothing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from visup.agent.model.records import Concern, Directive, Event, Observation
 
 
 def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
-    """What thinkers before concluded, and one more.
+    """What reasoners before concluded, and one more.
 
     Args:
         so_far: Of those before.
@@ -21,7 +21,7 @@ def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
         TypeError: It is no outcome, or holds what is none of its parts.
         ValueError: Its mind is of another moment, or a confidence or time is no number.
     """
-    _expect(more, Outcome, "the thinker returned")
+    _expect(more, Outcome, "the reasoner returned")
     _expect(more.mind, Mind, "the mind is")
     if (more.mind.time, more.mind.frame_index) != (seen.time, seen.frame_index):
         raise ValueError(

@@ -15,7 +15,7 @@ from typing import Any
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
-from visup.agent.contract.saving import Keeps
+from visup.agent.contract.saving import Saveable
 from visup.agent.execution.runners import (
     Direct,
     GrowthError,
@@ -82,7 +82,7 @@ class Slot:
     @property
     def keeps(self) -> bool:
         """Whether the behaviour can tell its state; that of another process is out of reach."""
-        return isinstance(self.behaviour, Keeps) and not self.limits.isolated(self.contract)
+        return isinstance(self.behaviour, Saveable) and not self.limits.isolated(self.contract)
 
     def conduct(self) -> dict[str, Any]:
         """What the agent knows of its behaviour's conduct, for a checkpoint."""

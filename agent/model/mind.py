@@ -1,6 +1,6 @@
 """The mental model: what is believed about objects, their identity, motion, presence and tasks.
 
-A mind is an immutable value; a step makes a new one. All that thinkers remember from step to step
+A mind is an immutable value; a step makes a new one. All that reasoners remember from step to step
 stands in it too (`memory`), so that a snapshot of a mind is a snapshot of everything that reasons.
 """
 
@@ -322,7 +322,7 @@ class Mind:
         zones: Parts of the scene that rules can name.
         questions: Those that wait for the operator's answer.
         answers: Object id -> what the operator said it is.
-        memory: What thinkers remember, by thinker; immutable values only.
+        memory: What reasoners remember, by reasoner; immutable values only.
     """
 
     time: float = 0.0
@@ -342,15 +342,15 @@ class Mind:
     answers: Mapping[int, str] = field(default_factory=lambda: NO_ANSWERS)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
-    def remember(self, thinker: str, value: object, **changes: Any) -> Mind:
-        """The same mind with one thinker's memory replaced, and other fields with it.
+    def remember(self, reasoner: str, value: object, **changes: Any) -> Mind:
+        """The same mind with one reasoner's memory replaced, and other fields with it.
 
         Args:
-            thinker: Its name.
+            reasoner: Its name.
             value: What it remembers; must be immutable.
             changes: Field -> value.
         """
-        memory = MappingProxyType({**self.memory, thinker: value})
+        memory = MappingProxyType({**self.memory, reasoner: value})
         return replace(self, memory=memory, **changes)
 
     def with_objects(self, *beliefs: ObjectBelief) -> Mind:

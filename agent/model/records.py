@@ -242,7 +242,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """All that was perceived of one frame: what thinkers see instead of the frame itself.
+    """All that was perceived of one frame: what reasoners see instead of the frame itself.
 
     Attributes:
         frame_index: Number of the frame.

@@ -1,4 +1,4 @@
-"""What an agent has become, as bytes and back: minds, what thinkers remember, what behaviours hold.
+"""What an agent has become, as bytes and back: minds, what reasoners remember, what behaviours hold.
 
 A state is a tree of plain values, NumPy arrays and objects of visup's own classes, in which what was
 one object stays one. Reading it runs no code of the file's choosing: nothing is imported, only classes

@@ -38,12 +38,12 @@ class AttentionSettings:
 
 @dataclass(frozen=True, slots=True)
 class Attend:
-    """Thinker of the match phase, after the tasks: says which regions need not be matched now."""
+    """Reasoner of the match phase, after the tasks: says which regions need not be matched now."""
 
     settings: AttentionSettings = field(default_factory=AttentionSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         old: Mapping[int, tuple[str, float]] = mind.memory.get(ATTENTION, MappingProxyType({}))
         since = {b.id: self._since(b, old, mind.time) for b in mind.objects.values()}
         wanted = {i for t in mind.tasks for e in t.expected for i in e.objects}

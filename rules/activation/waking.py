@@ -19,7 +19,7 @@ from visup.agent.model.records import WAKE
 from visup.rules.formula.nodes import Rule, calls
 from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.inputs_missing import inputs
-from visup.rules.safety.reasoner import SAFETY, Kept, RuleThinker
+from visup.rules.safety.reasoner import SAFETY, Kept, RuleReasoner
 
 WAKING = "rules.waking"
 _PREFIX = "awake_"
@@ -71,23 +71,23 @@ def wakeful(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[s
 
 @dataclass(frozen=True, slots=True)
 class Wake:
-    """Thinker of the match phase, after the tasks: calls behaviours that are asleep else.
+    """Reasoner of the match phase, after the tasks: calls behaviours that are asleep else.
 
     Attributes:
         rules: From `waking_rules`.
     """
 
     rules: tuple[Rule, ...]
-    _thinker: RuleThinker = field(init=False, repr=False, compare=False)
+    _reasoner: RuleReasoner = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_thinker", RuleThinker(self.rules))
+        object.__setattr__(self, "_reasoner", RuleReasoner(self.rules))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         # What these rules remember stands, while they look, where rules look for it.
         own = mind.remember(SAFETY, mind.memory.get(WAKING, Kept()))
-        asked = self._thinker(own, observation)
+        asked = self._reasoner(own, observation)
         mind = mind.remember(WAKING, asked.mind.memory[SAFETY])
         return Outcome(mind, directives=tuple(_directives(mind, asked.concerns)))
 

@@ -104,7 +104,7 @@ NOTHING = Pending()
 
 
 class Sight(NamedTuple):
-    """Two objects as they are seen now; lives only while the thinker runs.
+    """Two objects as they are seen now; lives only while the reasoner runs.
 
     Attributes:
         pair: Their ids.
@@ -125,12 +125,12 @@ class Sight(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Couple:
-    """Thinker of the cogitate phase, after the relations: couplings and the `coupled` relation."""
+    """Reasoner of the cogitate phase, after the relations: couplings and the `coupled` relation."""
 
     settings: CouplingSettings = field(default_factory=CouplingSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         old: Mapping[Pair, Pending] = mind.memory.get(COUPLING, MappingProxyType({}))
         coupled = {c.objects: c for c in mind.couplings}
         table = _table(mind)

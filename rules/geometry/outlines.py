@@ -1,6 +1,6 @@
 """How far outlines reach and how near they are to each other, worked out once for each region and each pair.
 
-In one step several thinkers ask about the same regions: who may hide a part of whom, who touches, who
+In one step several reasoners ask about the same regions: who may hide a part of whom, who touches, who
 is within whom. Regions never change, so that what was found of the most recent ones is remembered;
 nothing but time hangs on that.
 """

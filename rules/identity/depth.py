@@ -45,7 +45,7 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class BelieveDepth:
-    """Thinker of the cogitate phase, after the votes: the depth of each object.
+    """Reasoner of the cogitate phase, after the votes: the depth of each object.
 
     Depths under another identity are left out, as are those of objects hidden in part. While other
     identities are nearly as likely the depth is unknown: it hangs on the size of the model.
@@ -54,7 +54,7 @@ class BelieveDepth:
     settings: DepthSettings = field(default_factory=DepthSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one observation; see `Thinker`."""
+        """Take in one observation; see `Reasoner`."""
         old: Mapping[int, Kept] = mind.memory.get(DEPTHS, MappingProxyType({}))
         owner = owners(mind)
         told = {(owner.get(d.region_id), d.name): d for d in observation.of("depth")}

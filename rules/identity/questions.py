@@ -56,12 +56,12 @@ class Doubtful:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Thinker of the cogitate phase, after the votes: keeps the questions that wait."""
+    """Reasoner of the cogitate phase, after the votes: keeps the questions that wait."""
 
     settings: QuestionSettings = field(default_factory=QuestionSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         old: Mapping[int, Doubtful] = mind.memory.get(QUESTIONS, MappingProxyType({}))
         open_now = {q.object_id: q for q in mind.questions}
         doubts: dict[int, Doubtful] = {}

@@ -230,12 +230,12 @@ def settled(name: str, tally: Tally) -> Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Votes:
-    """Thinker of the cogitate phase: counts votes and tells who is who."""
+    """Reasoner of the cogitate phase: counts votes and tells who is who."""
 
     settings: VoteSettings = VoteSettings()
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Count one step; see `Thinker`."""
+        """Count one step; see `Reasoner`."""
         old: Ballots = mind.memory.get(VOTES, Ballots(observation.time))
         dt = max(0.0, observation.time - old.time)
         said = hypotheses_by_object(mind, observation)

@@ -152,12 +152,12 @@ def pose_support(mind: Mind, object_id: int, name: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BelievePose:
-    """Thinker of the cogitate phase: which way each object faces and how it turns. Runs after the votes."""
+    """Reasoner of the cogitate phase: which way each object faces and how it turns. Runs after the votes."""
 
     settings: PoseSettings = PoseSettings()
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one step's view hypotheses; see `Thinker`."""
+        """Take in one step's view hypotheses; see `Reasoner`."""
         said = hypotheses_by_object(mind, observation)
         known, kept, beliefs = tracks(mind), {}, []
         due = self._due(mind, said, known)

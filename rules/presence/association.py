@@ -86,7 +86,7 @@ def drop_objects(mind: Mind, ids: frozenset[int]) -> Mind:
 
 @dataclass(frozen=True, slots=True)
 class UpdateObjects:
-    """Thinker of the update phase: percepts enter the mind.
+    """Reasoner of the update phase: percepts enter the mind.
 
     When no behaviour looked for regions in this step, nothing is concluded about any object.
     """
@@ -94,7 +94,7 @@ class UpdateObjects:
     settings: ObjectSettings = ObjectSettings()
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one observation; see `Thinker`."""
+        """Take in one observation; see `Reasoner`."""
         mind = replace(
             mind,
             time=observation.time,

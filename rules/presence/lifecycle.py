@@ -38,7 +38,7 @@ __all__ = ["PresenceSettings", "SeePresence", "visible_share"]
 
 @dataclass(frozen=True, slots=True)
 class SeePresence:
-    """Thinker of the cogitate phase: keeps who is there, tells who comes, goes, hides and shows.
+    """Reasoner of the cogitate phase: keeps who is there, tells who comes, goes, hides and shows.
 
     When no behaviour looked for regions in this step, nothing is concluded.
     """
@@ -47,7 +47,7 @@ class SeePresence:
     fragments: FragmentSettings = field(default_factory=FragmentSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         if not observation.observed("region"):
             return Outcome(mind)
         old = tracks(mind)

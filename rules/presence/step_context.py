@@ -59,7 +59,7 @@ class PresenceSettings:
 
 @dataclass(slots=True)
 class Work:
-    """One step in the making; lives only while the thinker runs."""
+    """One step in the making; lives only while the reasoner runs."""
 
     mind: Mind
     observation: Observation

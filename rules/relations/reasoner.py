@@ -192,7 +192,7 @@ def qtc(mind: Mind, a: int, b: int) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Relations:
-    """Thinker of the cogitate phase: judges all relations of all pairs of present objects."""
+    """Reasoner of the cogitate phase: judges all relations of all pairs of present objects."""
 
     settings: RelationSettings = field(default_factory=RelationSettings)
     _lasts: Floats = field(init=False, repr=False, compare=False)
@@ -201,7 +201,7 @@ class Relations:
         object.__setattr__(self, "_lasts", self._durations())
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         s = self.settings
         kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
         objects = mind.present()

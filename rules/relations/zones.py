@@ -84,12 +84,12 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class SeeZones:
-    """Thinker of the cogitate phase: which objects are inside which zones of the mind."""
+    """Reasoner of the cogitate phase: which objects are inside which zones of the mind."""
 
     settings: ZoneSettings = field(default_factory=ZoneSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         if not mind.zones:
             return Outcome(mind)
         s, objects = self.settings, mind.present()

@@ -47,8 +47,8 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class RuleThinker:
-    """Thinker of the cogitate phase, after relations and couplings.
+class RuleReasoner:
+    """Reasoner of the cogitate phase, after relations and couplings.
 
     It sees the tasks as they stood after the step before, since tasks are matched later.
     """
@@ -61,7 +61,7 @@ class RuleThinker:
         object.__setattr__(self, "_prepared", ruled(self.rules))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         old, now = kept(mind), ticks(mind.time)
         # To compare the trees costs more than all that is done with them.
         same = old.rules is self.rules or old.rules == self.rules

@@ -35,7 +35,7 @@ class NarrativeSettings:
 
 @dataclass(frozen=True, slots=True)
 class TellRelations:
-    """Thinker of the cogitate phase: 'relation' events for trends that are new and last.
+    """Reasoner of the cogitate phase: 'relation' events for trends that are new and last.
 
     A pair that keeps its distance is told of only when it converged or diverged before; coupled
     pairs are left alone.
@@ -44,7 +44,7 @@ class TellRelations:
     settings: NarrativeSettings = field(default_factory=NarrativeSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Judge one step; see `Thinker`."""
+        """Judge one step; see `Reasoner`."""
         told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
         events = []
         for objects, name in mind.held(*TEMPLATES):

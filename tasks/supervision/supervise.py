@@ -1,4 +1,4 @@
-"""Supervision of tasks: the thinker of the cycle's match phase (paper, sections 6 and 7.4).
+"""Supervision of tasks: the reasoner of the cycle's match phase (paper, sections 6 and 7.4).
 
 In each step the actors of every task are matched to objects, what is seen of them is taken into
 the readings of the task, and the best reading says which stage is under way, how it stands, what
@@ -17,11 +17,11 @@ from visup.agent import (
     Observation,
     Outcome,
     Presence,
+    Reasoner,
     Severity,
     StageBelief,
     Status,
     TaskBelief,
-    Thinker,
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
@@ -58,12 +58,12 @@ LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
 SILENT_S = 0.2  # a task that is not told about is looked at no more often than this
 
 
-def task_thinker(
+def task_reasoner(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
     actions: Mapping[str, Meaning] | None = None,
-) -> Thinker:
-    """The thinker that supervises some tasks.
+) -> Reasoner:
+    """The reasoner that supervises some tasks.
 
     Args:
         tasks: Tasks, checked (see `parse_task`). One is taken to be going on; of several it is

@@ -1,4 +1,4 @@
-"""Scripted behaviours, frames and thinkers for tests of the cycle."""
+"""Scripted behaviours, frames and reasoners for tests of the cycle."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def counting(mind: Mind, seen: Observation) -> Outcome:
 
 
 def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation], Outcome]:
-    """A thinker with one concern while a predicate of time holds."""
+    """A reasoner with one concern while a predicate of time holds."""
 
     def think(mind: Mind, seen: Observation) -> Outcome:
         concern = Concern("worry", (1,), Severity.WARNING, "This is a worry.", ("because",))
@@ -66,7 +66,7 @@ def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation
 
 
 def exploding_at(index: int) -> Callable[[Mind, Observation], Outcome]:
-    """A thinker that raises at one frame, after having half-made a mind."""
+    """A reasoner that raises at one frame, after having half-made a mind."""
 
     def think(mind: Mind, seen: Observation) -> Outcome:
         if seen.frame_index == index:

@@ -1,4 +1,4 @@
-"""Runs of the thinkers over observations, for tests."""
+"""Runs of the reasoners over observations, for tests."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from visup.agent import (
     Mind,
     Observation,
     Outcome,
+    Reasoner,
     TaskBelief,
-    Thinker,
     Verdict,
 )
 
@@ -28,21 +28,21 @@ class Thought:
 
 
 def think(
-    thinkers: Iterable[Thinker],
+    reasoners: Iterable[Reasoner],
     observations: Iterable[Observation],
     actors: dict[str, tuple[str, ...]] | None = None,
 ) -> Iterator[Thought]:
-    """What an agent concludes, step by step, from thinkers alone."""
+    """What an agent concludes, step by step, from reasoners alone."""
     mind = Mind(actors=MappingProxyType(actors or {}))
-    chain = tuple(thinkers)
+    chain = tuple(reasoners)
     for seen in observations:
         mind = replace(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )
         events: tuple[Event, ...] = ()
         concerns: tuple[Concern, ...] = ()
-        for thinker in chain:
-            outcome = thinker(mind, seen)
+        for reasoner in chain:
+            outcome = reasoner(mind, seen)
             mind, events = outcome.mind, events + outcome.events
             concerns += outcome.concerns
         yield Thought(mind, events, concerns)

@@ -21,7 +21,7 @@ from tests.stepping.timelines import (
 )
 from visup.agent import Frame
 from visup.agent.contract.phases import Phase
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.stepping import Mark, Stepper
@@ -145,16 +145,16 @@ def test_a_half_made_step_can_be_looked_at_finished_and_left(phase: Phase) -> No
     assert it.midway is None
 
 
-def test_a_thinker_that_raises_is_seen_inside_its_step() -> None:
-    it = Stepper(Agent([], Thinkers(update=(counting, exploding_at(2)))), frames(5))
+def test_a_reasoner_that_raises_is_seen_inside_its_step() -> None:
+    it = Stepper(Agent([], Reasoners(update=(counting, exploding_at(2)))), frames(5))
     it.step(2)
     stopped = it.step(until="update")
     assert stopped.midway is not None
     assert stopped.midway.thought is not None
-    assert [c.kind for c in stopped.midway.thought.concerns] == ["thinking_failed"]
+    assert [c.kind for c in stopped.midway.thought.concerns] == ["reasoning_failed"]
     step = it.step().step
     assert step is not None
-    assert [a.kind for a in step.mind.alerts] == ["thinking_failed"]
+    assert [a.kind for a in step.mind.alerts] == ["reasoning_failed"]
 
 
 def test_the_end_is_told_and_the_beginning_can_be_reached() -> None:

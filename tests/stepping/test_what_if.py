@@ -93,17 +93,17 @@ def test_a_branch_without_beliefs_is_the_very_course() -> None:
 
 def test_other_rules_and_tasks_say_something_else_on_a_branch() -> None:
     it = at(10)
-    rules = it.branch(thinkers=with_rules(it.agent.thinkers, RULE))
+    rules = it.branch(reasoners=with_rules(it.agent.reasoners, RULE))
     rules.step(20)
     changed = rules.compare()
     assert {e["data"]["alert_kind"] for e in changed.new if e["kind"] == "alert"} == {"seen_one"}
     assert [e["data"]["alert_kind"] for e in changed.gone if e["kind"] == "alert"] == [
         "unexpected_object"
     ]
-    task = it.branch(thinkers=with_tasks(it.agent.thinkers, load_tasks("undock")))
+    task = it.branch(reasoners=with_tasks(it.agent.reasoners, load_tasks("undock")))
     task.step(5)
     assert [t.task for t in task.mind.tasks] == ["undock"]
-    none = it.branch(thinkers=with_tasks(it.agent.thinkers, ()))
+    none = it.branch(reasoners=with_tasks(it.agent.reasoners, ()))
     none.step(5)
     assert none.mind.tasks == ()
     assert [t.task for t in it.mind.tasks] == ["dock"]

@@ -6,7 +6,7 @@ from functools import cache
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from visup.agent import Directive, Mind, Observation, Outcome
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import frozen
 from visup.evaluation.runtime.soak import scripted
@@ -29,10 +29,10 @@ def asking(mind: Mind, seen: Observation) -> Outcome:
 
 def plain_agent() -> Agent:
     """Counts, is worried for a while, and sees what it was asked for."""
-    thinkers = Thinkers(
+    reasoners = Reasoners(
         update=(counting,), cogitate=(worried_while(lambda t: 1.0 <= t < 2.5),), match=(asking,)
     )
-    return Agent([Scripted("eye", ("x",), lambda i: (i * 7) % 5)], thinkers)
+    return Agent([Scripted("eye", ("x",), lambda i: (i * 7) % 5)], reasoners)
 
 
 def plain_stepper(count: int = COUNT) -> Stepper:
@@ -61,11 +61,11 @@ def plain_course() -> tuple[bytes, ...]:
 def reasoning_course(count: int = COUNT) -> tuple[Step, ...]:
     """The steps of `reasoning_stepper` when they are simply made."""
     agent = reasoning_agent(SETTINGS)
-    return tuple(agent.rethink(seen) for seen in scripted(count))
+    return tuple(agent.reason(seen) for seen in scripted(count))
 
 
 @cache
 def reasoning_bytes() -> tuple[bytes, ...]:
     """What the steps of `reasoning_stepper` come to when they are simply made, and not looked into."""
     agent = reasoning_agent(SETTINGS)
-    return tuple(told(agent.rethink(seen)) for seen in scripted(COUNT))
+    return tuple(told(agent.reason(seen)) for seen in scripted(COUNT))

@@ -17,10 +17,10 @@ from visup.agent import (
     Observation,
     Outcome,
     Presence,
+    Reasoner,
     Region,
     Relation,
     Severity,
-    Thinker,
     Truth,
 )
 
@@ -139,7 +139,7 @@ def _relation(script: Script, name: str, pair: tuple[int, int], time: float) -> 
 
 @dataclass(frozen=True)
 class Played:
-    """What a thinker made of a script: its minds and all it told."""
+    """What a reasoner made of a script: its minds and all it told."""
 
     minds: tuple[Mind, ...]
     outcomes: tuple[Outcome, ...]
@@ -159,13 +159,13 @@ class Played:
         return [(e.kind, str(e.data.get("stage", ""))) for e in self.events]
 
 
-def play(thinker: Thinker, script: Script, until: float, fps: float = 10.0) -> Played:
-    """Let a thinker live through a script."""
+def play(reasoner: Reasoner, script: Script, until: float, fps: float = 10.0) -> Played:
+    """Let a reasoner live through a script."""
     mind, minds, outcomes = Mind(), [], []
     for index in range(round(until * fps) + 1):
         now = mind_at(script, index / fps, index, mind)
         observation = Observation(index, index / fps, (640, 480))
-        outcome = thinker(now, observation)
+        outcome = reasoner(now, observation)
         mind = outcome.mind
         minds.append(mind)
         outcomes.append(outcome)

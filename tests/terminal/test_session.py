@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from tests.stepping.timelines import SETTINGS
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL
@@ -25,8 +25,8 @@ from visup.terminal.session_commands import COMMANDS
 
 def session(count: int = 30) -> tuple[Session, io.StringIO]:
     out = io.StringIO()
-    thinkers = Thinkers(update=(counting,), cogitate=(worried_while(lambda t: t > 1.0),))
-    agent = Agent([Scripted("eye", ("x",))], thinkers)
+    reasoners = Reasoners(update=(counting,), cogitate=(worried_while(lambda t: t > 1.0),))
+    agent = Agent([Scripted("eye", ("x",))], reasoners)
     return Session(agent, frames(count), Console(file=out, width=80)), out
 
 
@@ -179,7 +179,7 @@ def test_a_recorded_run_is_stepped_from_a_pipe(tmp_path: Path) -> None:
     agent, journal = reasoning_agent(SETTINGS), Journal(tmp_path / JOURNAL)
     journal.note(settings=plain(SETTINGS))
     for seen in scripted(40):
-        journal.record(agent.rethink(seen))
+        journal.record(agent.reason(seen))
     journal.close()
     done = CliRunner().invoke(
         app, ["step", str(tmp_path)], input="run until alert\nback 5\nstep 5\nwhy alert 1\n"

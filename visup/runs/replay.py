@@ -137,7 +137,7 @@ def replay(
         answers = recording.answers()
         begin = time.perf_counter()
         for seen in recording.observations():
-            step = agent.rethink(seen, answers.get(seen.frame_index, {}))
+            step = agent.reason(seen, answers.get(seen.frame_index, {}))
             if journal:
                 journal.record(step)
             listener(step)

@@ -133,9 +133,9 @@ def caught_up(
     frames: Iterator[Frame] = iter(source)
     for seen in past.recording.observations(after):
         frame = _frame(frames, seen, source)
-        again = agent.look(frame)
+        again = agent.perceive(frame)
         differing += packed(_without_troubles(again)) != packed(_without_troubles(seen))
-        tell(agent.rethink(seen, answers.get(seen.frame_index, {})), frame)
+        tell(agent.reason(seen, answers.get(seen.frame_index, {})), frame)
     notes = []
     if not whole and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
@@ -173,7 +173,7 @@ def _live(agent: Agent, source: Source, past: Past, after: int) -> Iterator[Fram
     """Frames of a camera, counted and timed on from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):
-        agent.rethink(last, answers.get(last.frame_index, {}))
+        agent.reason(last, answers.get(last.frame_index, {}))
         for behaviour in agent.behaviours:
             if missed := getattr(behaviour, "missed", None):
                 missed(last)

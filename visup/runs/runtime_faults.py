@@ -43,5 +43,5 @@ class Troubles:
 
 
 def tell_troubles(mind: Mind, seen: Observation) -> Outcome:
-    """The thinker to it: every trouble is a concern."""
+    """The reasoner to it: every trouble is a concern."""
     return Outcome(mind, concerns=seen.of(TROUBLE))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from visup.agent import Behaviour, Contract, Mind, Severity, Verdict
 from visup.agent.model.step import Observer
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.contract.limits import Limits
 from visup.percepts.depth import DepthBehaviour
@@ -20,12 +20,12 @@ from visup.percepts.video import Source, open_source
 from visup.runs.plugins import plug_ins
 from visup.rules.activation.attention import Attend
 from visup.rules.language.parser import load_rules, shipped_rules
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.rules.activation.waking import Wake, wakeful, waking_rules
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import sizes, task_actors, undrawn
-from visup.tasks.supervision.supervise import finish, task_thinker
+from visup.tasks.supervision.supervise import finish, task_reasoner
 from visup.runs.runtime_faults import tell_troubles
 from visup.runs.zones import load_zones
 
@@ -83,7 +83,7 @@ def build_agent(
     contracts = [b.contract for b in behaviours]
     return Agent(
         behaviours=behaviours,
-        thinkers=_thinkers(settings, tasks, contracts),
+        reasoners=_reasoners(settings, tasks, contracts),
         actors=settings.actors,
         zones=zones,
         observers=observers,
@@ -103,7 +103,7 @@ def reasoning_agent(settings: WatchSettings) -> Agent:
     zones = load_zones(settings.zones) if settings.zones else ()
     _check_zones(tasks, {z.name for z in zones})
     _check_actors(settings, tasks, None)
-    return Agent(thinkers=_thinkers(settings, tasks), actors=settings.actors, zones=zones)
+    return Agent(reasoners=_reasoners(settings, tasks), actors=settings.actors, zones=zones)
 
 
 def final_verdict(mind: Mind) -> Verdict:
@@ -150,15 +150,15 @@ def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
     return tuple(r for path in settings.rules for r in load_rules(path)) or shipped_rules()
 
 
-def _thinkers(
+def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
-) -> Thinkers:
-    interpreting = default_thinkers(rules=_rules(settings))
-    following = (task_thinker(tasks),) if tasks else ()
+) -> Reasoners:
+    interpreting = default_reasoners(rules=_rules(settings))
+    following = (task_reasoner(tasks),) if tasks else ()
     attending = (Attend(),) if settings.attention else ()
     waking = waking_rules(contracts)
     match = (*following, *attending, *((Wake(waking),) if waking else ()), tell_troubles)
-    return Thinkers(interpreting.update, interpreting.cogitate, match)
+    return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:

@@ -44,7 +44,7 @@ class LiveFeed:
     def next(self, agent: Agent) -> Given | None:
         """See `Feed`."""
         frame = next(self._frames, None)
-        return None if frame is None else Given(agent.look(frame), None, frame)
+        return None if frame is None else Given(agent.perceive(frame), None, frame)
 
 
 class RecordedFeed:

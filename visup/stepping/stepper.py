@@ -9,7 +9,7 @@ from typing import Any
 
 from visup.agent import Event, Frame, Mind
 from visup.agent.contract.phases import Phase
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
@@ -219,7 +219,7 @@ class Stepper(Course):
             raise SettingsError(what, hint="branch, and answer there")
         self.agent.answer(object_id, name)
 
-    def branch(self, *beliefs: Belief, thinkers: Thinkers | None = None) -> Stepper:
+    def branch(self, *beliefs: Belief, reasoners: Reasoners | None = None) -> Stepper:
         """Another course from here on, with what is insisted upon; this one stays as it is.
 
         It perceives the very same; when it comes to the end of what was perceived, this course goes
@@ -227,12 +227,12 @@ class Stepper(Course):
 
         Args:
             beliefs: To be held in every step of the branch whatever is seen, from `visup.stepping.what_if`.
-            thinkers: What reasons there; as here when left out.
+            reasoners: What reasons there; as here when left out.
         """
-        thinkers = thinkers or self.agent.thinkers
-        other = replace_agent(self.agent, insisting(thinkers, beliefs))
+        reasoners = reasoners or self.agent.reasoners
+        other = replace_agent(self.agent, insisting(reasoners, beliefs))
         here = self._history.here
-        swapped = thinkers.match != self.agent.thinkers.match
+        swapped = reasoners.match != self.agent.reasoners.match
         mind = insisted(without_tasks(here.mind) if swapped else here.mind, beliefs)
         other.restore(replace(here, mind=mind))
         history = self._history
@@ -298,8 +298,8 @@ class Stepper(Course):
         Raises:
             VisupError: Nothing is known of it.
         """
-        thinkers = self.agent.thinkers
-        every = (*thinkers.update, *thinkers.cogitate, *thinkers.match)
+        reasoners = self.agent.reasoners
+        every = (*reasoners.update, *reasoners.cogitate, *reasoners.match)
         return asking.why_not(self.mind, every, text)
 
     def close(self) -> None:
@@ -312,6 +312,6 @@ def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Told:
     return Told(tuple(event_line(e) for _, e in events), verdict, mind.frame_index)
 
 
-def replace_agent(agent: Agent, thinkers: Thinkers) -> Agent:
-    """An agent that reasons with other thinkers, and perceives nothing."""
-    return Agent(thinkers=thinkers, actors=agent.actors, zones=agent.zones, models=agent.models)
+def replace_agent(agent: Agent, reasoners: Reasoners) -> Agent:
+    """An agent that reasons with other reasoners, and perceives nothing."""
+    return Agent(reasoners=reasoners, actors=agent.actors, zones=agent.zones, models=agent.models)

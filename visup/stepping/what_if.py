@@ -1,6 +1,6 @@
 """What if: beliefs that a branch insists upon, and other rules or tasks to reason with.
 
-A belief is made again after every thinker, in every step: what is measured goes on saying otherwise,
+A belief is made again after every reasoner, in every step: what is measured goes on saying otherwise,
 and whatever comes later in the step reasons from the belief.
 """
 
@@ -21,17 +21,17 @@ from visup.agent import (
     Observation,
     Outcome,
     Presence,
+    Reasoner,
     Relation,
     RelationTable,
-    Thinker,
     Truth,
 )
-from visup.agent.cycle.agent import Thinkers
+from visup.agent.cycle.agent import Reasoners
 from visup.agent.model.mind import UNKNOWN_OBJECT
 from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
 from visup.rules.formula.nodes import Rule
-from visup.rules.safety.reasoner import RuleThinker
-from visup.tasks.supervision.supervise import MEMORY, task_thinker
+from visup.rules.safety.reasoner import RuleReasoner
+from visup.tasks.supervision.supervise import MEMORY, task_reasoner
 
 if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
@@ -108,14 +108,14 @@ class PresenceIs:
 
 @dataclass(frozen=True, slots=True)
 class Insisting:
-    """A thinker after which some beliefs are made so again."""
+    """A reasoner after which some beliefs are made so again."""
 
-    thinker: Thinker
+    reasoner: Reasoner
     beliefs: tuple[Belief, ...]
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """See `Thinker`."""
-        outcome = self.thinker(mind, observation)
+        """See `Reasoner`."""
+        outcome = self.reasoner(mind, observation)
         told = tuple(e for e in outcome.events if not any(_denied(b, e) for b in self.beliefs))
         return replace(outcome, mind=insisted(outcome.mind, self.beliefs), events=told)
 
@@ -135,29 +135,31 @@ def insisted(mind: Mind, beliefs: Iterable[Belief]) -> Mind:
     return mind
 
 
-def insisting(thinkers: Thinkers, beliefs: Sequence[Belief]) -> Thinkers:
-    """Thinkers that hold to some beliefs."""
+def insisting(reasoners: Reasoners, beliefs: Sequence[Belief]) -> Reasoners:
+    """Reasoners that hold to some beliefs."""
     if not beliefs:
-        return thinkers
+        return reasoners
 
-    def wrapped(some: tuple[Thinker, ...]) -> tuple[Thinker, ...]:
+    def wrapped(some: tuple[Reasoner, ...]) -> tuple[Reasoner, ...]:
         return tuple(Insisting(t, tuple(beliefs)) for t in some)
 
-    return Thinkers(wrapped(thinkers.update), wrapped(thinkers.cogitate), wrapped(thinkers.match))
-
-
-def with_rules(thinkers: Thinkers, rules: Sequence[Rule]) -> Thinkers:
-    """Thinkers that watch other rules."""
-    kept = tuple(t for t in thinkers.cogitate if not isinstance(t, RuleThinker))
-    return replace(thinkers, cogitate=(*kept, RuleThinker(tuple(rules))))
-
-
-def with_tasks(thinkers: Thinkers, tasks: Sequence[Task]) -> Thinkers:
-    """Thinkers that supervise other tasks, from their beginnings."""
-    kept = tuple(
-        t for t in thinkers.match if getattr(t, "__module__", "") != task_thinker.__module__
+    return Reasoners(
+        wrapped(reasoners.update), wrapped(reasoners.cogitate), wrapped(reasoners.match)
     )
-    return replace(thinkers, match=(*((task_thinker(tasks),) if tasks else ()), *kept))
+
+
+def with_rules(reasoners: Reasoners, rules: Sequence[Rule]) -> Reasoners:
+    """Reasoners that watch other rules."""
+    kept = tuple(t for t in reasoners.cogitate if not isinstance(t, RuleReasoner))
+    return replace(reasoners, cogitate=(*kept, RuleReasoner(tuple(rules))))
+
+
+def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
+    """Reasoners that supervise other tasks, from their beginnings."""
+    kept = tuple(
+        t for t in reasoners.match if getattr(t, "__module__", "") != task_reasoner.__module__
+    )
+    return replace(reasoners, match=(*((task_reasoner(tasks),) if tasks else ()), *kept))
 
 
 def without_tasks(mind: Mind) -> Mind:

@@ -282,8 +282,8 @@ class Session:
     def _use(self, words: Sequence[str]) -> Answer:
         if len(words) != 2 or words[0] not in ("rules", "task"):
             return _amiss(_usage("use"))
-        thinkers = swapped(self.agent.thinkers, words[0], words[1])
-        return self._begin(self.stepper.branch(thinkers=thinkers))
+        reasoners = swapped(self.agent.reasoners, words[0], words[1])
+        return self._begin(self.stepper.branch(reasoners=reasoners))
 
     def _begin(self, branch: Stepper) -> Answer:
         for watch in self.stepper.watches.values():

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 from visup.agent import Mind, Presence, Truth
-from visup.agent.cycle.agent import Thinkers
+from visup.agent.cycle.agent import Reasoners
 from visup.agent.cycle.answers import understood
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.mind import UNKNOWN_OBJECT
@@ -88,11 +88,11 @@ def _known(mind: Mind, object_id: int) -> None:
         raise SettingsError(f"there is no object {object_id}", expected=known)
 
 
-def swapped(thinkers: Thinkers, kind: str, place: str) -> Thinkers:
-    """Thinkers with other rules or another task.
+def swapped(reasoners: Reasoners, kind: str, place: str) -> Reasoners:
+    """Reasoners with other rules or another task.
 
     Args:
-        thinkers: Those that there are.
+        reasoners: Those that there are.
         kind: 'rules' or 'task'.
         place: A file, or the name of a shipped task.
 
@@ -100,5 +100,5 @@ def swapped(thinkers: Thinkers, kind: str, place: str) -> Thinkers:
         VisupError: The file is not as it should be.
     """
     if kind == "rules":
-        return with_rules(thinkers, load_rules(place))
-    return with_tasks(thinkers, load_tasks(place))
+        return with_rules(reasoners, load_rules(place))
+    return with_tasks(reasoners, load_tasks(place))

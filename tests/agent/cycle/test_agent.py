@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from tests.agent.scripted import Scripted, counting, exploding_at, frames, worried_while
 from visup.agent import Directive, Mind, Observation, Outcome, Severity
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import plain
 
@@ -14,8 +14,8 @@ def told(steps: list[Step]) -> list[object]:
 
 
 def make() -> Agent:
-    thinkers = Thinkers(update=(counting,), cogitate=(worried_while(lambda t: 0.3 <= t < 0.6),))
-    return Agent([Scripted("eye", ("x",))], thinkers)
+    reasoners = Reasoners(update=(counting,), cogitate=(worried_while(lambda t: 0.3 <= t < 0.6),))
+    return Agent([Scripted("eye", ("x",))], reasoners)
 
 
 def test_the_same_frames_give_the_same_steps() -> None:
@@ -44,15 +44,15 @@ def test_a_run_over_nothing_gives_no_step() -> None:
     assert make().run(frames(0)) is None
 
 
-def test_a_thinker_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None:
-    thinkers = Thinkers(update=(counting, exploding_at(4)))
-    agent = Agent([Scripted("eye", ("x",))], thinkers)
+def test_a_reasoner_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None:
+    reasoners = Reasoners(update=(counting, exploding_at(4)))
+    agent = Agent([Scripted("eye", ("x",))], reasoners)
     steps = list(agent.steps(frames(8)))
     before, hit, after = steps[3], steps[4], steps[5]
     assert hit.mind.memory == before.mind.memory  # half of a step never enters the mind
     assert hit.mind.time == hit.time
     assert hit.mind.unknown == {"x"}
-    assert [a.kind for a in hit.mind.alerts] == ["thinking_failed"]
+    assert [a.kind for a in hit.mind.alerts] == ["reasoning_failed"]
     assert hit.mind.alerts[0].severity is Severity.CRITICAL
     assert after.mind.memory["counting"] == 5
 
@@ -60,7 +60,7 @@ def test_a_thinker_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None:
 def test_an_open_alert_is_not_closed_by_a_step_that_could_not_think() -> None:
     always = worried_while(lambda _: True)
     blown = [exploding_at(i) for i in range(5, 40)]
-    agent = Agent([], Thinkers(cogitate=(always, *blown)))
+    agent = Agent([], Reasoners(cogitate=(always, *blown)))
     last = agent.run(frames(40))
     assert last is not None
     assert "worry" in {a.kind for a in last.mind.alerts}
@@ -72,7 +72,7 @@ def test_directives_reach_behaviours_in_the_next_step() -> None:
         return Outcome(mind, directives=(wish,))
 
     eye = Scripted("eye", ("x",))
-    Agent([eye], Thinkers(cogitate=(asks,))).run(frames(3))
+    Agent([eye], Reasoners(cogitate=(asks,))).run(frames(3))
     assert [[d.data["count"] for d in given] for given in eye.directives] == [[], [0], [1]]
 
 

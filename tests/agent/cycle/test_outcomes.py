@@ -1,4 +1,4 @@
-"""Phases are all or nothing: whatever a thinker returns, the mind stays whole."""
+"""Phases are all or nothing: whatever a reasoner returns, the mind stays whole."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from visup.agent import Event, Mind, Observation, Outcome
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 
 EVENT = Event("told", 0.0, 0, "It was told.")
 NONSENSE: dict[str, Callable[[Mind], Any]] = {
@@ -35,21 +35,21 @@ def exits(mind: Mind) -> Any:
 
 
 @pytest.mark.parametrize("what", [*NONSENSE, "exit"])
-def test_nonsense_of_a_thinker_leaves_the_mind_as_it_was(what: str) -> None:
+def test_nonsense_of_a_reasoner_leaves_the_mind_as_it_was(what: str) -> None:
     says = NONSENSE.get(what, exits)
 
     def think(mind: Mind, seen: Observation) -> Any:
         return says(mind) if seen.frame_index == 3 else Outcome(mind)
 
     always = worried_while(lambda _: True)
-    agent = Agent([Scripted("eye", ("x",))], Thinkers((counting,), (always, think)))
+    agent = Agent([Scripted("eye", ("x",))], Reasoners((counting,), (always, think)))
     steps = list(agent.steps(frames(6)))
     before, hit = steps[2].mind, steps[3].mind
     assert (hit.frame_index, set(hit.unknown)) == (3, {"x"})
     news = {"time", "frame_index", "frame_size", "alerts", "unknown"}
     held = [f.name for f in fields(Mind) if f.name not in news]
     assert [getattr(hit, name) for name in held] == [getattr(before, name) for name in held]
-    assert {a.kind for a in hit.alerts} == {"worry", "thinking_failed"}
+    assert {a.kind for a in hit.alerts} == {"worry", "reasoning_failed"}
     assert steps[3].directives == ()
     assert [e.kind for e in steps[3].events] == ["alert"]
     assert steps[5].mind.memory["counting"] == 5

@@ -21,7 +21,7 @@ from tests.agent.scripted import frames
 from tests.paths import ROOT
 from visup.agent import Contract, Directive, Frame, Observation, Outcome, Percept, ReportState
 from visup.agent.contract.limits import Limits
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.step import Step
 from visup.agent.plugins.loader import load
@@ -87,7 +87,7 @@ def numbered(mind: Any, seen: Observation) -> Outcome:
 
 
 def watch(behaviour: Any, count: int, limits: Limits = LIMITS) -> list[Step]:
-    agent = Agent([behaviour], Thinkers(cogitate=(numbered,)), limits=limits)
+    agent = Agent([behaviour], Reasoners(cogitate=(numbered,)), limits=limits)
     try:
         return list(agent.steps(frames(count)))
     finally:

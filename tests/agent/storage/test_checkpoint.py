@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from tests.agent.storage.test_codec import plugin_values, regions, same
 from visup.agent import Health, HealthStatus, Region
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.checkpoint import MAGIC, StateError, frozen, thawed
 from visup.agent.storage.codec import packed
@@ -132,7 +132,7 @@ class Summing:
 
 def made() -> Agent:
     worry = worried_while(lambda t: t % 3 < 1.5)
-    return Agent([Summing()], Thinkers(update=(counting,), cogitate=(worry,)))
+    return Agent([Summing()], Reasoners(update=(counting,), cogitate=(worry,)))
 
 
 @given(st.integers(1, 59))
@@ -150,8 +150,8 @@ def test_an_agent_that_takes_up_a_state_goes_on_like_the_one_that_gave_it(at: in
 
 
 def test_without_all_behaviours_only_the_mind_is_kept() -> None:
-    first = Agent([Scripted("eye", ("x",))], Thinkers(update=(counting,)))
+    first = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))
     first.run(frames(5))
-    second = Agent([Scripted("eye", ("x",))], Thinkers(update=(counting,)))
+    second = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))
     assert not second.load(thawed(frozen(first.save())))
     assert second.mind.memory["counting"] == 5

@@ -12,7 +12,7 @@ import pytest
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from tests.paths import ROOT
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import export_events, read_events, read_facts, read_steps
@@ -21,11 +21,11 @@ CRASH = """
 import os, signal, sys
 from pathlib import Path
 from tests.agent.scripted import counting, frames
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.storage.journal import Journal
 
 journal = Journal(Path(sys.argv[1]))
-agent = Agent([], Thinkers(update=(counting,)), observers=(journal.record,))
+agent = Agent([], Reasoners(update=(counting,)), observers=(journal.record,))
 for frame in frames(100):
     agent.step(frame)
     print(frame.index, flush=True)
@@ -37,8 +37,8 @@ for frame in frames(100):
 def run(path: Path, count: int) -> None:
     journal = Journal(path)
     worry = worried_while(lambda t: t >= 0.5)
-    thinkers = Thinkers(update=(counting,), cogitate=(worry,))
-    Agent([Scripted("eye", ("x",))], thinkers, observers=(journal.record,)).run(frames(count))
+    reasoners = Reasoners(update=(counting,), cogitate=(worry,))
+    Agent([Scripted("eye", ("x",))], reasoners, observers=(journal.record,)).run(frames(count))
     journal.note(verdict="succeeded")
     journal.close()
 
@@ -98,7 +98,7 @@ def test_reading_something_else_says_so(tmp_path: Path) -> None:
 def test_a_step_that_cannot_be_written_leaves_the_earlier_ones(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     journal = Journal(path)
-    agent = Agent([], Thinkers(update=(counting,)), observers=(journal.record,))
+    agent = Agent([], Reasoners(update=(counting,)), observers=(journal.record,))
     agent.run(frames(3))
     blocker = sqlite3.connect(path)
     blocker.execute("DROP TABLE events")  # as good as a disk that fills up

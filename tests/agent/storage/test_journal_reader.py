@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.codec import packed
 from visup.agent.storage.journal import Journal, Limits, segments
@@ -21,8 +21,8 @@ SMALL = Limits(segment_bytes=4000)
 
 def agent(*observers: object) -> Agent:
     worry = worried_while(lambda t: t >= 0.5)
-    thinkers = Thinkers(update=(counting,), cogitate=(worry,))
-    return Agent([Scripted("eye", ("x",))], thinkers, observers=observers)  # type: ignore[arg-type]
+    reasoners = Reasoners(update=(counting,), cogitate=(worry,))
+    return Agent([Scripted("eye", ("x",))], reasoners, observers=observers)  # type: ignore[arg-type]
 
 
 def write(path: Path, count: int, limits: Limits | None = None) -> list[bytes]:
@@ -63,7 +63,7 @@ def test_the_oldest_steps_go_when_more_is_kept_than_wanted_but_no_event(tmp_path
     noise = np.random.default_rng(0)
     journal = Journal(path, Limits(segment_bytes=200_000, keep_bytes=600_000))
     eye = Scripted("eye", ("x",), lambda index: noise.bytes(4000))
-    Agent([eye], Thinkers(update=(counting,)), observers=(journal.record,)).run(frames(300))
+    Agent([eye], Reasoners(update=(counting,)), observers=(journal.record,)).run(frames(300))
     journal.close()
     recording = Recording.open(path)
     first, last = recording.first_and_last() or (0, 0)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.mind import Mind
 from visup.agent.model.records import Observation
 from visup.evaluation.runtime import behaviour_faults
@@ -48,8 +48,8 @@ def test_the_campaign_sees_what_is_taken_for_known(
 
                 return Outcome(replace(mind, unknown=frozenset()))
 
-            update = (*self.thinkers.update, forget)
-            self.thinkers = Thinkers(update, self.thinkers.cogitate)  # type: ignore[arg-type]
+            update = (*self.reasoners.update, forget)
+            self.reasoners = Reasoners(update, self.reasoners.cogitate)  # type: ignore[arg-type]
             super().__post_init__()
 
     monkeypatch.setattr(behaviour_faults, "Agent", Careless)

@@ -19,11 +19,11 @@ from visup.agent import (
     TaskBelief,
     Verdict,
 )
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.evaluation.runtime.soak import scripted
 from visup.percepts.shape.behaviour import _resting
 from visup.rules.activation.attention import Attend
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 from visup.testing import disc
@@ -78,7 +78,7 @@ def test_without_attention_nothing_is_asked_and_nothing_else_changes() -> None:
     attentive = reasoning_agent(WatchSettings("script", attention=True))
     rested = 0
     for seen in scripted(90):
-        a, b = plain.rethink(seen), attentive.rethink(seen)
+        a, b = plain.reason(seen), attentive.reason(seen)
         assert a.directives == ()
         assert a.events == b.events
         rested += len(b.directives)
@@ -94,9 +94,9 @@ def test_only_directives_for_the_behaviour_count() -> None:
     assert _resting(wishes, "shape") == {3: 1.0}
 
 
-def test_attention_is_a_thinker_like_any_other() -> None:
-    rules = default_thinkers()
-    agent = Agent([], Thinkers(rules.update, rules.cogitate, (Attend(),)))
-    last = [agent.rethink(seen) for seen in scripted(90)][-1]
+def test_attention_is_a_reasoner_like_any_other() -> None:
+    rules = default_reasoners()
+    agent = Agent([], Reasoners(rules.update, rules.cogitate, (Attend(),)))
+    last = [agent.reason(seen) for seen in scripted(90)][-1]
     assert last.directives
     assert {d.data["region"] for d in last.directives} <= {1, 2, 3}

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from visup.agent import Contract, Directive, Frame, Observation, Percept, ReportState
 from visup.agent.contract.limits import Limits
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.step import Step
 from visup.rules.activation.waking import Wake, wakeful, waking_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
 from visup.testing import Shot, crossing
@@ -56,11 +56,11 @@ class Lens:
 
 
 def run(*lenses: Lens, wakeful: frozenset[str] = frozenset()) -> list[Step]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     wake = Wake(waking_rules([b.contract for b in lenses]))
-    thinkers = Thinkers(rules.update, rules.cogitate, (wake,))
+    reasoners = Reasoners(rules.update, rules.cogitate, (wake,))
     limits = Limits(hang_s=None, wakeful=wakeful)
-    return list(Agent([Eye(), *lenses], thinkers, limits=limits).steps(s.frame for s in CLIP))
+    return list(Agent([Eye(), *lenses], reasoners, limits=limits).steps(s.frame for s in CLIP))
 
 
 def state(step: Step, name: str) -> ReportState:
@@ -188,20 +188,20 @@ def test_no_kind_that_safety_rules_read_sleeps_altogether(
 
 def test_going_back_and_on_wakes_alike() -> None:
     """What these rules remember is in the mind, like everything."""
-    rules = default_thinkers()
+    rules = default_reasoners()
     lens = Lens(awake=f"{NEAR} for 0.5 s")
-    thinkers = Thinkers(rules.update, rules.cogitate, (Wake(waking_rules([lens.contract])),))
-    agent = Agent([Eye(), lens], thinkers, limits=Limits(hang_s=None))
+    reasoners = Reasoners(rules.update, rules.cogitate, (Wake(waking_rules([lens.contract])),))
+    agent = Agent([Eye(), lens], reasoners, limits=Limits(hang_s=None))
     seen = [agent.step(s.frame).observation for s in CLIP]
-    again = Agent([], thinkers)
+    again = Agent([], reasoners)
     kept, first = [], []
     for one in seen:
         kept.append(again.snapshot())
-        first.append(again.rethink(one).directives)
+        first.append(again.reason(one).directives)
     assert any(first)
     for k in (10, 25, 40):
         again.restore(kept[k])
-        assert [again.rethink(one).directives for one in seen[k:]] == first[k:]
+        assert [again.reason(one).directives for one in seen[k:]] == first[k:]
 
 
 def test_a_behaviour_that_is_never_called_changes_nothing_that_is_told() -> None:

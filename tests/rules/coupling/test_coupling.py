@@ -7,7 +7,7 @@ import pytest
 from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Truth
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 Place = Callable[[float], float]
 
@@ -22,7 +22,7 @@ def scene(right: Place, left: Place = lambda t: 100.0, seconds: float = 10.0) ->
 
 
 def run(observations: Iterator[Observation]) -> list[Thought]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate), observations))
 
 

@@ -12,14 +12,14 @@ from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Region
 from visup.evaluation.reasoning.calibration import Calibration
 from visup.rules.identity.votes import VoteSettings, candidates, unknown
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 SET = VoteSettings()
 CROWD = tuple(f"model {k}" for k in range(30))
 
 
 def run(observations: list[Observation]) -> list[Thought]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate), observations))
 
 

@@ -11,11 +11,11 @@ import pytest
 from tests.rules.scenes import SIZE, box_region, seen
 from visup.agent import Frame, Observation, Percept, Region
 from visup.agent.contract.behaviour import Contract
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.rules.identity.questions import wording
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.runs.operator import Operator, parse_answers
 
 BLANK = np.broadcast_to(np.zeros((1, 1, 1), np.uint8), (SIZE[1], SIZE[0], 3))
@@ -34,10 +34,10 @@ class Scripted:
 
 
 def agent_of(at: Callable[[int], Observation]) -> Agent:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return Agent(
         behaviours=[Scripted(at)],
-        thinkers=Thinkers(rules.update, rules.cogitate),
+        reasoners=Reasoners(rules.update, rules.cogitate),
         actors={"arm": ("rms_arm",), "guitar": ("guitar",)},
     )
 

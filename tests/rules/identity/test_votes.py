@@ -10,7 +10,7 @@ from tests.rules.runs import think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Hypothesis, ReportState
 from visup.rules.identity.votes import VoteSettings, candidates, count, weights
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 SET = VoteSettings()
 names = st.sampled_from("abcdef")
@@ -97,7 +97,7 @@ def run(similarity: float, lost_from: int = 10**9, steps: int = 60) -> tuple[flo
         )
         for i in range(steps)
     ]
-    rules = default_thinkers()
+    rules = default_reasoners()
     thoughts = list(think((*rules.update, *rules.cogitate), observations))
     belief = thoughts[-1].mind.objects[1]
     votes = belief.candidates[0].votes if belief.candidates else 0.0

@@ -10,14 +10,14 @@ from tests.rules.runs import Thought, think
 from tests.rules.scenes import Rect, box_region, seen
 from visup.agent import Observation, Region
 from visup.rules.presence.fragments import FRAGMENTS, share_within
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 TOLD = ("entry", "exit", "occlusion", "reappearance", "lost", "found")
 BODY: Rect = (200, 150, 160, 140)
 
 
 def run(observations: Iterable[Observation]) -> list[Thought]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate), observations))
 
 

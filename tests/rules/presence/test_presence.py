@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Presence, Region, ReportState
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 TOLD = ("entry", "exit", "occlusion", "reappearance", "lost", "found", "coupled", "decoupled")
 
 
 def run(observations: Iterable[Observation]) -> list[Thought]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate), observations))
 
 

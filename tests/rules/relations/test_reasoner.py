@@ -8,7 +8,7 @@ import pytest
 from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Relation, Truth
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.rules.relations._reasoner_jit import trend, with_depth
 from visup.rules.relations.reasoner import measured
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
@@ -35,7 +35,7 @@ def two_boxes(
 
 
 def thoughts(observations: Iterator[Observation]) -> list[Thought]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate), observations))
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Truth, Zone
 from visup.agent.model.errors import ManyErrors, SettingsError
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.rules.relations.zones import (
     contains,
     distance_outside,
@@ -33,7 +33,7 @@ def minds(
     at: Callable[[float], float], seconds: float, depth: float | None = None, noise: float = 0.0
 ) -> Iterator[Mind]:
     """A box of 80 x 60 px whose left edge is a function of time, and what is believed of it."""
-    rng, rules = np.random.default_rng(3), default_thinkers()
+    rng, rules = np.random.default_rng(3), default_reasoners()
     mind = Mind(zones=(DOCK, DEEP))
     for i in range(round(seconds * 25)):
         x, y = at(i / 25) + noise * rng.standard_normal(), 200 + noise * rng.standard_normal()
@@ -41,8 +41,8 @@ def minds(
         observation: Observation = seen(
             i, [box_region(1, (x, y, 80, 60))], names={1: [("probe", 0.9)]}, depths=known
         )
-        for thinker in (*rules.update, *rules.cogitate):
-            mind = thinker(mind, observation).mind
+        for reasoner in (*rules.update, *rules.cogitate):
+            mind = reasoner(mind, observation).mind
         yield mind
 
 

@@ -20,11 +20,11 @@ from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.snapshot import Facts
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.rules.relations.zones import SeeZones
 from visup.rules.safety.explain import Explanation
 from visup.rules.safety.queries import choices, explain, values_of
-from visup.rules.safety.reasoner import SAFETY, RuleThinker
+from visup.rules.safety.reasoner import SAFETY, RuleReasoner
 
 NOTHING = Observation(0, 0.0, (640, 480))
 
@@ -39,7 +39,7 @@ def closing(frames: int) -> Iterator[Observation]:
 
 
 def watched(frames: int = 125) -> list[Thought]:
-    rules = default_thinkers()
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate), closing(frames)))
 
 
@@ -68,10 +68,10 @@ def nodes(one: Explanation) -> Iterator[Explanation]:
 
 
 def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
-    thinker, memory = RuleThinker(twenty_rules()), None
+    reasoner, memory = RuleReasoner(twenty_rules()), None
     for mind in minds(3, 60):
         mind = mind if memory is None else mind.remember(SAFETY, memory)
-        outcome = thinker(mind, NOTHING)
+        outcome = reasoner(mind, NOTHING)
         memory = outcome.mind.memory[SAFETY]
     values = values_of(outcome.mind)
     raised = {(rule.name, ids) for rule, ids in values.true()}
@@ -83,7 +83,7 @@ def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
 
 
 def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
-    thinker = RuleThinker(twenty_rules())
+    reasoner = RuleReasoner(twenty_rules())
     seen_minds = list(minds(4, 90))
 
     def run(mind: Mind | None, rest: list[Mind]) -> list[tuple[object, ...]]:
@@ -91,7 +91,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
         for new in rest:
             if mind is not None:
                 new = new.remember(SAFETY, mind.memory[SAFETY])
-            outcome = thinker(new, NOTHING)
+            outcome = reasoner(new, NOTHING)
             mind = outcome.mind
             told.append(outcome.concerns)
         return told
@@ -100,7 +100,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
     mind = None
     for new in seen_minds:
         new = new if mind is None else new.remember(SAFETY, mind.memory[SAFETY])
-        mind = thinker(new, NOTHING).mind
+        mind = reasoner(new, NOTHING).mind
         kept.append(mind)
     straight = run(None, seen_minds)
     for fork in (20, 45, 70):
@@ -122,7 +122,7 @@ def test_what_was_never_judged_cannot_be_explained() -> None:
 
 
 def concerns(text: str, mind: Mind) -> set[tuple[str, tuple[int, ...]]]:
-    outcome = RuleThinker(parse_rules(text))(mind, NOTHING)
+    outcome = RuleReasoner(parse_rules(text))(mind, NOTHING)
     return {(c.kind, c.objects) for c in outcome.concerns}
 
 
@@ -141,7 +141,7 @@ def test_objects_are_distinct_unless_they_may_repeat() -> None:
 
 def values_for(text: str) -> set[tuple[int, ...]]:
     rules = parse_rules(text)
-    outcome = RuleThinker(rules)(MIND, NOTHING)
+    outcome = RuleReasoner(rules)(MIND, NOTHING)
     return {ids for _, ids in values_of(outcome.mind).true()}
 
 
@@ -169,11 +169,11 @@ def test_a_rule_without_objects_and_a_mind_without_objects() -> None:
 
 def test_cooldown_keeps_a_rule_quiet_after_its_concern_was_over() -> None:
     rules = parse_rules('rule r(a): info when named(a, probe) cooldown 1 s say "{a}"')
-    thinker, mind, told = RuleThinker(rules), Mind(), []
+    reasoner, mind, told = RuleReasoner(rules), Mind(), []
     for k in range(30):
         name = "probe" if k in (2, 5, 6, 15) else "dish"
         mind = replace(mind, time=k * 0.1).with_objects(believed(1, name))
-        outcome = thinker(mind, NOTHING)
+        outcome = reasoner(mind, NOTHING)
         mind = outcome.mind
         told += [k] if outcome.concerns else []
     assert told == [2, 15]
@@ -210,13 +210,13 @@ def test_a_zone_that_is_not_drawn_is_unknown() -> None:
 
 
 def spinning(rate: float, sigma: float, expectations: tuple[Expectation, ...] = ()) -> set[str]:
-    thinker, told, mind = RuleThinker(shipped_rules()), set[str](), MIND
+    reasoner, told, mind = RuleReasoner(shipped_rules()), set[str](), MIND
     for k in range(60):
         spin = Pose("probe", 0, (0.0, 0.0, 1.0), None, 0.0, spin=Spin(rate, sigma, (0.0, 1.0, 0.0)))
         task = TaskBelief("t", Verdict.IN_PROGRESS, expected=expectations)
         mind = replace(mind, time=1.0 + k / 25, tasks=(task,))
         mind = mind.with_objects(replace(mind.objects[1], pose=spin))
-        outcome: Outcome = thinker(mind, NOTHING)
+        outcome: Outcome = reasoner(mind, NOTHING)
         mind, told = outcome.mind, told | {c.kind for c in outcome.concerns}
     return told
 
@@ -244,7 +244,7 @@ def touching_at(depths: dict[int, tuple[str, float]], expected: bool) -> set[str
         ]
         return seen(i, boxes, names=NAMES, depths=depths)
 
-    rules = default_thinkers()
+    rules = default_reasoners()
     thoughts = think((*rules.update, *rules.cogitate, task), (approach(i) for i in range(110)))
     return {c.kind for t in thoughts for c in t.concerns}
 

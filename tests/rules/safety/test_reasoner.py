@@ -20,27 +20,27 @@ from visup.agent import (
     Observation,
     Outcome,
     Presence,
+    Reasoner,
     ReportState,
     Severity,
     TaskBelief,
-    Thinker,
     Truth,
     Verdict,
 )
 from visup.rules.language.parser import parse_rules
-from visup.rules.reasoners import default_thinkers
-from visup.rules.safety.reasoner import RuleThinker
+from visup.rules.reasoners import default_reasoners
+from visup.rules.safety.reasoner import RuleReasoner
 from visup.rules.wording.sentences import describe, sentence
 
 NAMES = {1: [("probe", 0.9)], 2: [("arm_model", 0.9)], 3: [("dish", 0.9)]}
 
 
-def run(observations: Iterable[Observation], *more: Thinker) -> list[Thought]:
-    rules = default_thinkers()
+def run(observations: Iterable[Observation], *more: Reasoner) -> list[Thought]:
+    rules = default_reasoners()
     return list(think((*rules.update, *rules.cogitate, *more), observations))
 
 
-def task(expected: tuple[Expectation, ...] = (), unexplained: tuple[int, ...] = ()) -> Thinker:
+def task(expected: tuple[Expectation, ...] = (), unexplained: tuple[int, ...] = ()) -> Reasoner:
     def put(mind: Mind, observation: Observation) -> Outcome:
         bindings = (
             Binding("satellite", ("probe",), 1, 0.9),
@@ -73,7 +73,7 @@ def closing(seconds: float = 5.0, speed: float = 20.0) -> Iterator[Observation]:
 
 def test_rules_that_serve_two_agents_by_turns_tell_each_what_they_tell_it_alone() -> None:
     """What is not worked out again is what would come out again, whoever asked before."""
-    rules = default_thinkers()
+    rules = default_reasoners()
     shared = (*rules.update, *rules.cogitate)
     scripts = [list(closing()), list(closing(speed=35.0)), [seen(i, []) for i in range(125)]]
     together = [think(shared, s) for s in scripts]
@@ -179,10 +179,10 @@ def by_history(values: list[Truth]) -> Truth:
 @settings(max_examples=80, deadline=None)
 @given(st.lists(st.sampled_from(list(Truth)), min_size=1, max_size=25))
 def test_for_is_what_history_says(values: list[Truth]) -> None:
-    thinker, mind = RuleThinker(WHEN), Mind()
+    reasoner, mind = RuleReasoner(WHEN), Mind()
     for i, value in enumerate(values):
         mind = replace(mind, time=i * 0.1).with_objects(believed(1, NAMED[value]))
-        outcome = thinker(mind, Observation(i, i * 0.1, (640, 480)))
+        outcome = reasoner(mind, Observation(i, i * 0.1, (640, 480)))
         mind = outcome.mind
         kinds = {c.kind for c in outcome.concerns}
         told = {Truth.TRUE: {"held"}, Truth.FALSE: {"not_held"}, Truth.UNKNOWN: set()}
@@ -195,7 +195,7 @@ def test_unknown_raises_no_concern_and_suspends_none() -> None:
         'rule near(a, b): info when not depth_difference(a, b) > 1 % say "{a} {b}"\n'
         'rule there(a, b): info when seen(a) unless depth_difference(a, b) > 1 % say "{a} {b}"\n'
     )
-    base = default_thinkers(rules=rules)
+    base = default_reasoners(rules=rules)
     observations = list(closing(1.0, 0.0))
     thoughts = list(think((*base.update, *base.cogitate), observations))
     assert {c.kind for c in thoughts[-1].concerns} == {"there"}

@@ -13,7 +13,7 @@ import visup.rules
 from tests.rules.runs import think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Event, Mind
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.rules.wording.relation_events import TEMPLATES
 from visup.rules.wording.sentences import LIKELY, SURE, VERBS, graded, mentions, sentence
 
@@ -67,7 +67,7 @@ def test_all_sentences_keep_their_words_in_every_band(confidence: float) -> None
 
 def told(confidence: float) -> list[Event]:
     """One box rests; another comes and hides it; regions are as sure as told."""
-    rules = default_thinkers()
+    rules = default_reasoners()
 
     def at(i: int) -> list[Event]:
         left = -220 + 6 * (i - 25)

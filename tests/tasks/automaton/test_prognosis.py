@@ -12,7 +12,7 @@ from visup.tasks import load_task, parse_task
 from visup.tasks.automaton.recognise import Recogniser
 from visup.tasks.automaton.stage_hmm import SUPERVISED, Seen
 from visup.tasks.supervision.sentences import prospects_text
-from visup.tasks.supervision.supervise import task_thinker
+from visup.tasks.supervision.supervise import task_reasoner
 
 FAILS = (
     Spell("converging", 0.5, 12.3),
@@ -28,7 +28,7 @@ SUCCEEDS = (
 
 def watch(*spells: Spell, until: float = 26.0, text: str = "", fps: float = 10.0) -> Played:
     task = parse_task(text) if text else load_task("dock")
-    return play(task_thinker([task]), Script(spells), until, fps)
+    return play(task_reasoner([task]), Script(spells), until, fps)
 
 
 def belief(played: Played, time: float) -> TaskBelief:

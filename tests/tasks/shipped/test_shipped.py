@@ -8,7 +8,7 @@ from tests.tasks.scripted import Script, Spell, play
 from visup.agent import Verdict
 from visup.tasks import load_task, shipped_tasks
 from visup.tasks.grammar.structure import task_actors
-from visup.tasks.supervision.supervise import finish, task_thinker
+from visup.tasks.supervision.supervise import finish, task_reasoner
 
 Days = dict[str, list[tuple[str, float, float, tuple[int, int]]]]
 A, B, C = (1, 2), (2, 3), (1, 3)
@@ -79,7 +79,7 @@ def lived(name: str, days: Days) -> Verdict:
     objects = dict.fromkeys(numbers.values(), (0.0, 1e9))
     until = max(s.to_s for s in spells)
     script = Script(spells, objects, identities=identities)
-    return finish(play(task_thinker([task]), script, until, fps=5.0).last.tasks[0])
+    return finish(play(task_reasoner([task]), script, until, fps=5.0).last.tasks[0])
 
 
 @pytest.mark.parametrize("name", shipped_tasks())

@@ -15,7 +15,7 @@ from visup.agent.model.errors import TaskError
 from visup.rules.relations.zones import SeeZones
 from visup.tasks import load_task, load_tasks, parse_task
 from visup.tasks.actions.actions import Meaning, known_actions, with_actions
-from visup.tasks.supervision.supervise import finish, task_thinker
+from visup.tasks.supervision.supervise import finish, task_reasoner
 
 NEARS = Spell("converging", 0.5, 6.0)
 MEETS = Spell("touching", 5.8, 30.0)
@@ -25,7 +25,7 @@ ACTORS = "actor boom is dish\n"
 
 
 def watch(text: str, script: Script, until: float = 20.0) -> Played:
-    return play(task_thinker([parse_task(text)]), script, until)
+    return play(task_reasoner([parse_task(text)]), script, until)
 
 
 def belief(played: Played, time: float | None = None) -> TaskBelief:
@@ -198,7 +198,7 @@ def moved(
     played_until: float, path: dict[float, tuple[float, float]], text: str, **mind: object
 ) -> Mind:
     """A task watched while the arm's centre and outline are where a path says, by time."""
-    thinker = task_thinker([parse_task(text)])
+    reasoner = task_reasoner([parse_task(text)])
 
     def think(before: Mind, observation: Observation) -> Outcome:
         x, y = next(p for t, p in sorted(path.items(), reverse=True) if t <= before.time)
@@ -213,7 +213,7 @@ def moved(
         arm = replace(before.objects[ARM], region=region)
         objects = MappingProxyType({**before.objects, ARM: arm})
         now = replace(before, objects=objects, **mind)  # type: ignore[arg-type]
-        return thinker(SeeZones()(now, observation).mind, observation)
+        return reasoner(SeeZones()(now, observation).mind, observation)
 
     return play(think, Script(), played_until).last
 
@@ -270,7 +270,7 @@ def test_plug_ins_add_actions() -> None:
     actions = with_actions(known_actions(), [gripped])
     task = parse_task("<t> ::= gripped(arm, satellite)", actions=actions)
     script = Script((Spell("gripped", 2.0, 30.0),), known=["gripped"])
-    assert play(task_thinker([task], actions=actions), script, 4.0).last.tasks[0].verdict is (
+    assert play(task_reasoner([task], actions=actions), script, 4.0).last.tasks[0].verdict is (
         Verdict.SUCCEEDED
     )
     with pytest.raises(TaskError, match="already"):
@@ -311,7 +311,7 @@ def test_a_file_may_hold_several_tasks(tmp_path: Path) -> None:
         load_task(file)
     with pytest.raises(TaskError, match=r"no task `land`[\s\S]*dock, meet"):
         load_task(f"{file}:land")
-    played = play(task_thinker([dock, meet]), Script((NEARS, MEETS)), 15.0)
+    played = play(task_reasoner([dock, meet]), Script((NEARS, MEETS)), 15.0)
     assert [finish(t) for t in played.last.tasks] == [Verdict.IN_PROGRESS, Verdict.SUCCEEDED]
 
 

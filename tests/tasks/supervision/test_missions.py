@@ -10,9 +10,9 @@ import pytest
 
 from tests.rules.percepts_from_truth import MISSIONS, Noise, actors_of, observations, truth_of
 from visup.agent import Alert, Concern, Event, Mind, Severity, Status, TaskBelief, Verdict
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.tasks import load_task
-from visup.tasks.supervision.supervise import finish, task_thinker
+from visup.tasks.supervision.supervise import finish, task_reasoner
 
 NAMES = (
     "approach_aborted",
@@ -36,9 +36,9 @@ class Run:
 
 @cache
 def run(name: str) -> Run:
-    """All thinkers on one mission, with alerts opened and closed as the act phase does."""
-    shipped = default_thinkers()
-    chain = (*shipped.update, *shipped.cogitate, task_thinker([load_task("dock")]))
+    """All reasoners on one mission, with alerts opened and closed as the act phase does."""
+    shipped = default_reasoners()
+    chain = (*shipped.update, *shipped.cogitate, task_reasoner([load_task("dock")]))
     mind = Mind(actors=MappingProxyType(actors_of(name)))
     beliefs: list[tuple[float, TaskBelief]] = []
     events: list[Event] = []
@@ -48,8 +48,8 @@ def run(name: str) -> Run:
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )
         concerns: list[Concern] = []
-        for thinker in chain:
-            outcome = thinker(mind, seen)
+        for reasoner in chain:
+            outcome = reasoner(mind, seen)
             mind = outcome.mind
             events += outcome.events
             concerns += outcome.concerns

@@ -11,7 +11,7 @@ from visup.agent import Status, TaskBelief, Verdict
 from visup.runs.wiring import final_verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.inference import AUDIBLE
-from visup.tasks.supervision.supervise import SILENT_S, task_thinker
+from visup.tasks.supervision.supervise import SILENT_S, task_reasoner
 
 DOCK = parse_task("""<dock> ::= <approach> <captured>
 <approach> ::= converging(arm, satellite)
@@ -47,7 +47,7 @@ PARTS = (
 
 
 def watch(spells: tuple[Spell, ...], until: float = 26.0) -> Played:
-    return play(task_thinker([DOCK, INSPECT, LEAVE]), Script(spells), until)
+    return play(task_reasoner([DOCK, INSPECT, LEAVE]), Script(spells), until)
 
 
 def belief(played: Played, task: str, time: float | None = None) -> TaskBelief:
@@ -121,7 +121,7 @@ def test_that_a_task_is_recognised_and_set_aside_is_told() -> None:
 
 
 def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own_pace() -> None:
-    minds = play(task_thinker([DOCK, INSPECT, LEAVE]), Script(DOCKS), 26.0, 25.0).minds
+    minds = play(task_reasoner([DOCK, INSPECT, LEAVE]), Script(DOCKS), 26.0, 25.0).minds
     paces = set()
     for before, mind in pairwise(minds):
         for old, new in zip(before.memory["tasks"], mind.memory["tasks"], strict=True):
@@ -134,5 +134,5 @@ def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own
 
 
 def test_one_task_alone_is_followed_in_each_step() -> None:
-    for mind in play(task_thinker([DOCK]), Script(DOCKS), 15.0, 25.0).minds:
+    for mind in play(task_reasoner([DOCK]), Script(DOCKS), 15.0, 25.0).minds:
         assert mind.memory["tasks"][0].time == mind.time

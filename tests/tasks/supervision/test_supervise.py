@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, Played, Script, Spell, play
 from visup.agent import Expectation, Severity, Status, TaskBelief, Truth, Verdict
 from visup.tasks import load_task, parse_task
-from visup.tasks.supervision.supervise import finish, task_thinker
+from visup.tasks.supervision.supervise import finish, task_reasoner
 
 DOCK = load_task("dock")
 FAILS = (
@@ -29,7 +29,7 @@ CROWDED = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (6.5, 1e9)}
 
 def watch(script: Script, until: float, text: str = "", fps: float = 10.0) -> Played:
     task = parse_task(text) if text else DOCK
-    return play(task_thinker([task]), script, until, fps)
+    return play(task_reasoner([task]), script, until, fps)
 
 
 def task_of(played: Played, time: float | None = None) -> TaskBelief:
@@ -209,7 +209,7 @@ TWICE = (
 
 
 def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
-    played = play(task_thinker([RETRY]), Script(TWICE), 30.0)
+    played = play(task_reasoner([RETRY]), Script(TWICE), 30.0)
     assert task_of(played).verdict is Verdict.SUCCEEDED
     assert "stage_failing" not in dict(played.told())
     assert task_of(played, 8.0).current == "back_off"
@@ -346,8 +346,8 @@ def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
 
 
 def test_an_actor_does_not_change_hands_in_a_moment() -> None:
-    thinker = task_thinker([DOCK])
-    played = play(thinker, Script(SUCCEEDS), 5.0)
+    reasoner = task_reasoner([DOCK])
+    played = play(reasoner, Script(SUCCEEDS), 5.0)
     swapped = Script(SUCCEEDS, identities={ARM: {"satellite": 0.9}, SATELLITE: {"arm": 0.9}})
     from tests.tasks.scripted import mind_at
     from visup.agent import Observation
@@ -355,7 +355,7 @@ def test_an_actor_does_not_change_hands_in_a_moment() -> None:
     mind = played.last
     for i in range(1, 40):
         mind = mind_at(swapped, 5.0 + i / 10, 50 + i, mind)
-        mind = thinker(mind, Observation(50 + i, mind.time, (640, 480))).mind
+        mind = reasoner(mind, Observation(50 + i, mind.time, (640, 480))).mind
         bound = [b.object_id for b in mind.tasks[0].bindings]
         assert bound == ([ARM, SATELLITE] if mind.time < 7.1 - 1e-9 else [SATELLITE, ARM])
 
@@ -384,17 +384,17 @@ def test_the_story_does_not_hang_on_the_frame_rate(name: str, fps: float) -> Non
     assert watch(Script(spells), until, fps=fps).told() == watch(Script(spells), until).told()
 
 
-def test_a_thinker_is_a_pure_function_and_keeps_nothing_to_itself() -> None:
-    thinker = task_thinker([DOCK])
-    played = play(thinker, Script(FAILS), 20.0)
-    again = play(thinker, Script(FAILS), 20.0)
+def test_a_reasoner_is_a_pure_function_and_keeps_nothing_to_itself() -> None:
+    reasoner = task_reasoner([DOCK])
+    played = play(reasoner, Script(FAILS), 20.0)
+    again = play(reasoner, Script(FAILS), 20.0)
     assert [m.tasks for m in again.minds] == [m.tasks for m in played.minds]
     assert again.events == played.events
     hash(played.last.memory["tasks"][0].readings[0].state)
 
 
 def test_several_tasks_are_supervised_side_by_side() -> None:
-    played = play(task_thinker([DOCK, RETRY]), Script(TWICE), 30.0)
+    played = play(task_reasoner([DOCK, RETRY]), Script(TWICE), 30.0)
     assert [t.task for t in played.last.tasks] == ["dock", "dock_with_retry"]
     assert played.last.tasks[1].verdict is Verdict.SUCCEEDED
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from visup.agent import Frame, Mind, ObjectBelief, Presence
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.evaluation.missions.mission_files import mission_folders
 from visup.evaluation.missions.mission_poses import true_spin
@@ -32,9 +32,9 @@ from visup.evaluation.missions.missions import (
 from visup.evaluation.reasoning.calibration import Calibration
 from visup.evaluation.simulation.truth_masks import Mission, TrueMask, load_mission
 from visup.evaluation.simulation.truth_percepts import PerceptNoise, behaviours_of, frames_of
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.tasks import load_task
-from visup.tasks.supervision.supervise import task_thinker
+from visup.tasks.supervision.supervise import task_reasoner
 
 SPIN_SPAN_S = 5.0
 """Spin is scored over the last seconds of a mission."""
@@ -156,11 +156,11 @@ def watch_mission(mission: Mission, noise: PerceptNoise, *, every: int = 1) -> W
     """Supervise one mission on percepts made from its truth."""
     behaviours, who = behaviours_of(mission, noise)
     watch = Watch(mission, truths_of(mission.truth, mission.fps), who)
-    rules = default_thinkers()
-    task = task_thinker([load_task(str(mission.told["task"]))])
+    rules = default_reasoners()
+    task = task_reasoner([load_task(str(mission.told["task"]))])
     agent = Agent(
         behaviours=behaviours,
-        thinkers=Thinkers(rules.update, rules.cogitate, (task,)),
+        reasoners=Reasoners(rules.update, rules.cogitate, (task,)),
         actors={a: (m,) for a, m in mission.told["actors"].items()},
         observers=(watch,),
     )

@@ -12,7 +12,7 @@ import numpy as np
 from visup.agent import Mind, Observation, Percept, Region, Report, ReportState
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 SIZE = (640, 480)
 FPS = 25.0
@@ -49,13 +49,13 @@ def twenty_rules() -> tuple[Rule, ...]:
 
 def minds(objects: int, frames: int) -> Iterator[Mind]:
     """Minds of boxes that go round on ellipses, as rules find them."""
-    thinkers = default_thinkers(rules=())
+    reasoners = default_reasoners(rules=())
     mind = Mind()
     for index in range(frames):
         seen = observation(index, objects)
         mind = replace(mind, time=seen.time, frame_index=index, frame_size=SIZE)
-        chain = (*thinkers.update, *thinkers.cogitate)
-        mind = reduce(lambda m, thinker: thinker(m, seen).mind, chain, mind)
+        chain = (*reasoners.update, *reasoners.cogitate)
+        mind = reduce(lambda m, reasoner: reasoner(m, seen).mind, chain, mind)
         yield mind
 
 

@@ -19,7 +19,7 @@ from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula, shipped_rules
 from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals
-from visup.rules.safety.reasoner import SAFETY, RuleThinker
+from visup.rules.safety.reasoner import SAFETY, RuleReasoner
 
 rule_peer = oracle("rule_peer")
 rule_oracle = oracle("rule_oracle")
@@ -186,14 +186,14 @@ def _rule_cost(objects: int, frames: int = 250) -> dict[str, Any]:
 
 
 def _timed(rules: tuple[Rule, ...], seen: list[Mind]) -> tuple[list[float], list[int]]:
-    thinker, memory = RuleThinker(rules), None
+    reasoner, memory = RuleReasoner(rules), None
     nothing = Observation(0, 0.0, (0, 0))
     taken, concerns = [], []
     for mind in seen:
         if memory is not None:
             mind = mind.remember(SAFETY, memory)
         begin = time.perf_counter()
-        outcome = thinker(mind, nothing)
+        outcome = reasoner(mind, nothing)
         taken.append(time.perf_counter() - begin)
         concerns.append(len(outcome.concerns))
         memory = outcome.mind.memory[SAFETY]
@@ -202,12 +202,12 @@ def _timed(rules: tuple[Rule, ...], seen: list[Mind]) -> tuple[list[float], list
 
 def _snapshots(count: int = SNAPSHOTS) -> dict[str, Any]:
     """Memory of what rules remember in as many minds, all kept; three objects, the shipped rules."""
-    thinker, mind = RuleThinker(shipped_rules()), list(minds(3, 50))[-1]
+    reasoner, mind = RuleReasoner(shipped_rules()), list(minds(3, 50))[-1]
     nothing = Observation(0, 0.0, (0, 0))
     kept = []
     tracemalloc.start()
     for k in range(count):
-        mind = thinker(replace(mind, time=2.0 + k / FPS), nothing).mind
+        mind = reasoner(replace(mind, time=2.0 + k / FPS), nothing).mind
         kept.append(mind.memory[SAFETY])
     held, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()

@@ -6,7 +6,7 @@ misbehaves for a while. Looked at are, in every step:
 - whether the run goes on to its end;
 - whether the fault is told in the very step in which it took place (an alert is open, the report
   says so), and how much longer than its budget that step took;
-- whether the agent's own thinkers get through it;
+- whether the agent's own reasoners get through it;
 - whether all that the behaviour gives is unknown until it has run again;
 - whether a word of the rule language is true or false while what it reads is unknown, or an alert
   is told to be over while that cannot be known. Every word is asked, both ways, by rules of its own.
@@ -25,7 +25,7 @@ import numpy as np
 
 from visup.agent import Contract, Depth, Health, HealthStatus, Hypothesis
 from visup.agent.contract.limits import Limits
-from visup.agent.cycle.agent import Agent, Thinkers
+from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.records import BROKEN, ReportState
 from visup.agent.model.step import Step
 from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, Misbehaving
@@ -33,7 +33,7 @@ from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.inputs_missing import inputs
 from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 from visup.testing import Scripted, Shot, crossing
 
 COUNT = 1000
@@ -131,10 +131,10 @@ def run(trial: Trial) -> None:
         contract, _truth()[trial.kind], trial.fault, trial.at, lasts, 1.5 * BUDGET_S
     )
     others = [_honest(kind) for kind in KINDS if kind != trial.kind]
-    rules = default_thinkers(rules=(*shipped_rules(), *probes()))
+    rules = default_reasoners(rules=(*shipped_rules(), *probes()))
     agent = Agent(
         [*others, culprit],
-        Thinkers(rules.update, rules.cogitate),
+        Reasoners(rules.update, rules.cogitate),
         limits=Limits(budgets=bool(rng.random() < 0.5), hang_s=BUDGET_S),
     )
     try:
@@ -168,7 +168,7 @@ def _judge(trial: Trial, step: Step) -> None:
         trial.problems.append("told: no alert is open while it is broken")
     unknown = step.mind.unknown
     for alert in step.mind.alerts:
-        if alert.kind == "thinking_failed":
+        if alert.kind == "reasoning_failed":
             trial.problems.append(f"thought: {alert.cause} {' '.join(alert.evidence)}")
             return  # no rule was read in this step
         word = alert.kind.removeprefix(PROBE).rpartition("_")[0]

@@ -1,7 +1,7 @@
 """Reasoning for a very long time: time of a step, memory that stays flat, minds that are kept.
 
 Scripted percepts without pictures: boxes that drift, meet, flicker, go over the border and come back
-under other ids, called by names that change. What is measured is the thinkers of rules/ alone.
+under other ids, called by names that change. What is measured is the reasoners of rules/ alone.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from visup.agent import (
     Mind,
     Observation,
     Percept,
+    Reasoner,
     Region,
     Report,
     ReportState,
-    Thinker,
 )
 from visup.evaluation.simulation.truth_masks import region_from_mask
-from visup.rules.reasoners import default_thinkers
+from visup.rules.reasoners import default_reasoners
 
 SIZE = (640, 480)
 FPS = 25.0
@@ -97,16 +97,16 @@ def resident_mb() -> float:
 
 def _thought(count: int, frames: int, seed: int, mind: Mind) -> Iterator[tuple[float, Mind]]:
     """Seconds that each step took, and the mind after it."""
-    rules = default_thinkers()
-    thinkers: tuple[Thinker, ...] = (*rules.update, *rules.cogitate)
+    rules = default_reasoners()
+    reasoners: tuple[Reasoner, ...] = (*rules.update, *rules.cogitate)
     start = mind.time + 1.0 / FPS if mind.frame_index >= 0 else 0.0
     for seen in script(count, frames, seed, start):
         begin = time.perf_counter()
         mind = replace(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )
-        for thinker in thinkers:
-            mind = thinker(mind, seen).mind
+        for reasoner in reasoners:
+            mind = reasoner(mind, seen).mind
         yield time.perf_counter() - begin, mind
 
 

@@ -137,7 +137,7 @@ def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> 
     thought, whole, alerts = [], [], []
     for one in seen:
         begin = time.process_time()
-        step = agent.rethink(one)
+        step = agent.reason(one)
         thought.append(time.process_time() - begin)
         journal.record(step)
         whole.append(time.process_time() - begin)
@@ -169,7 +169,7 @@ def _observers(settings: WatchSettings, place: Path) -> float:
     thought, told = [], []
     for one in script(COUNTS[0], LEAST_STEPS, 2):
         begin = time.thread_time()
-        step = agent.rethink(one)
+        step = agent.reason(one)
         middle = time.thread_time()
         sinks(step, blank)
         thought.append(middle - begin)
@@ -185,7 +185,7 @@ def _mind_kb(count: int) -> float:
         if k == WARM:
             gc.collect()
             before = resident_mb()
-        mind = agent.rethink(one).mind
+        mind = agent.reason(one).mind
         if k >= WARM:
             minds.append(mind)
     return 1024 * (resident_mb() - before) / len(minds)

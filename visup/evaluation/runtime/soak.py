@@ -216,7 +216,7 @@ class _Run:
 
     def step(self, seen: Observation) -> None:
         begin = time.process_time()
-        self.journal.record(self.agent.rethink(seen))
+        self.journal.record(self.agent.reason(seen))
         self._costs.append((time.process_time() - begin) * 1e3)
 
 
@@ -225,7 +225,7 @@ def _events_of(folder: Path, frames: int) -> str:
     agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
     journal = _journal(folder)
     for seen in scripted(frames):
-        journal.record(agent.rethink(seen))
+        journal.record(agent.reason(seen))
     journal.close()
     export_events(folder / JOURNAL, folder / "events.jsonl")
     return hashlib.sha256((folder / "events.jsonl").read_bytes()).hexdigest()
@@ -268,7 +268,7 @@ def sinks_ratio(place: Path, frames: int, also: tuple[str, ...] = ()) -> float:
         seen = list(scripted(block, number * block))
         begin = time.perf_counter()
         for one in seen:
-            step = agent.rethink(one)
+            step = agent.reason(one)
             for observer in observers:
                 observer(step, blank)
         taken[watched].append(time.perf_counter() - begin)

@@ -141,7 +141,7 @@ def _slower() -> float:
         block = [next(frames) for _ in range(BLOCK)]
         begin = time.process_time()
         for seen in block:
-            agent.rethink(seen)
+            agent.reason(seen)
         middle = time.process_time()
         it.step(BLOCK)
         alone.append(middle - begin)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from visup.agent import Mind, Presence, Thinker
+from visup.agent import Mind, Presence, Reasoner
 from visup.agent.model.errors import SettingsError
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.breakpoints import rules, stages
@@ -60,7 +60,7 @@ def why(reasons: Reasons, text: str) -> Why:
     return answers[asked.about]()
 
 
-def why_not(mind: Mind, thinkers: Sequence[Thinker], text: str) -> Why:
+def why_not(mind: Mind, reasoners: Sequence[Reasoner], text: str) -> Why:
     """The answer to `why not TEXT`.
 
     Raises:
@@ -69,11 +69,11 @@ def why_not(mind: Mind, thinkers: Sequence[Thinker], text: str) -> Why:
     asked = _taken_apart(text, mind, (*NOT_YET, "relation"))
     if asked.about in _PRESENCE:
         wanted = _PRESENCE[asked.about]
-        return whynot.presence_unmet(mind, _one(asked, mind), wanted, thinkers)
+        return whynot.presence_unmet(mind, _one(asked, mind), wanted, reasoners)
     answers: dict[str, Callable[[], Why]] = {
-        "entry": lambda: whynot.entry_unmet(mind, _one(asked, mind), thinkers),
-        "identified": lambda: whynot.identity_unmet(mind, _one(asked, mind), thinkers),
-        "coupled": lambda: whynot.coupling_unmet(mind, *_two(asked), thinkers),
+        "entry": lambda: whynot.entry_unmet(mind, _one(asked, mind), reasoners),
+        "identified": lambda: whynot.identity_unmet(mind, _one(asked, mind), reasoners),
+        "coupled": lambda: whynot.coupling_unmet(mind, *_two(asked), reasoners),
         "rule": lambda: whynot.alert_unmet(mind, asked.name, asked.ids),
         "stage": lambda: whynot.stage_unmet(mind, asked.name),
         "relation": lambda: whynot.relation_unmet(mind, asked.name, asked.ids),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any, TypeVar
 
-from visup.agent import Mind, ObjectBelief, Presence, Status, TaskBelief, Thinker, Truth
+from visup.agent import Mind, ObjectBelief, Presence, Reasoner, Status, TaskBelief, Truth
 from visup.agent.model.errors import SettingsError
 from visup.rules.coupling.coupling import COUPLING, Couple, CouplingSettings
 from visup.rules.identity.votes import VOTES, Ballot, Ballots, Votes
@@ -103,12 +103,12 @@ def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
             yield Why(f"awaited: {wanted.relation}({who}) is {stands}{amount}")
 
 
-def entry_unmet(mind: Mind, object_id: int, thinkers: Sequence[Thinker]) -> Why:
+def entry_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Why:
     """Why the entry of an object was not told."""
     belief, track = _tracked(mind, object_id)
     if belief.confirmed:
         return Why(f"object {object_id} has entered; first seen at {belief.first_seen:.2f} s")
-    presence = _first(thinkers, SeePresence)
+    presence = _first(reasoners, SeePresence)
     s = presence.settings if presence else PresenceSettings()
     parts = []
     if track is not None:
@@ -130,13 +130,13 @@ def entry_unmet(mind: Mind, object_id: int, thinkers: Sequence[Thinker]) -> Why:
 
 
 def presence_unmet(
-    mind: Mind, object_id: int, wanted: Presence, thinkers: Sequence[Thinker]
+    mind: Mind, object_id: int, wanted: Presence, reasoners: Sequence[Reasoner]
 ) -> Why:
     """Why an object is not believed hidden, gone, or seen."""
     belief, track = _tracked(mind, object_id)
     if belief.presence is wanted:
         return Why(f"object {object_id} is {wanted.value}")
-    presence = _first(thinkers, SeePresence)
+    presence = _first(reasoners, SeePresence)
     s = presence.settings if presence else PresenceSettings()
     parts = [Why(f"it is {belief.presence.value}, last seen at {belief.last_seen:.2f} s")]
     missing = mind.time - belief.last_seen
@@ -151,12 +151,12 @@ def presence_unmet(
     return Why(f"object {object_id} is not believed to be {wanted.value}", tuple(parts))
 
 
-def identity_unmet(mind: Mind, object_id: int, thinkers: Sequence[Thinker]) -> Why:
+def identity_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Why:
     """Why an object was not identified."""
     belief = _belief(mind, object_id)
     ballots: Any = mind.memory.get(VOTES, Ballots(mind.time))
     ballot: Ballot = ballots.of.get(object_id, Ballot())
-    s = (_first(thinkers, Votes) or Votes()).settings
+    s = (_first(reasoners, Votes) or Votes()).settings
     if ballot.told is not None and ballot.told == belief.name:
         return Why(f"object {object_id} was identified as {ballot.told}")
     parts = []
@@ -172,18 +172,18 @@ def identity_unmet(mind: Mind, object_id: int, thinkers: Sequence[Thinker]) -> W
     heard = "never" if ballot.heard is None else f"at {ballot.heard:.2f} s"
     parts.append(Why(f"what it looks like was last said {heard}"))
     if not belief.confirmed:
-        parts.append(entry_unmet(mind, object_id, thinkers))
+        parts.append(entry_unmet(mind, object_id, reasoners))
     return Why(f"object {object_id} is not identified", tuple(parts))
 
 
-def coupling_unmet(mind: Mind, a: int, b: int, thinkers: Sequence[Thinker]) -> Why:
+def coupling_unmet(mind: Mind, a: int, b: int, reasoners: Sequence[Reasoner]) -> Why:
     """Why two objects are not believed to be coupled."""
     low, high = sorted((a, b))
     for object_id in (low, high):
         _belief(mind, object_id)
     if mind.coupled(low, high):
         return Why(f"objects {low} and {high} are coupled")
-    couple = _first(thinkers, Couple)
+    couple = _first(reasoners, Couple)
     s = couple.settings if couple else CouplingSettings()
     pending: Any = mind.memory.get(COUPLING, {}).get((low, high))
     parts = []
@@ -252,7 +252,7 @@ def _tracked(mind: Mind, object_id: int) -> tuple[ObjectBelief, Track | None]:
     return _belief(mind, object_id), tracks(mind).of.get(object_id)
 
 
-def _first(thinkers: Sequence[Thinker], kind: type[Kind]) -> Kind | None:
-    """The thinker of a kind, also where it was made to hold to beliefs."""
-    bare = (getattr(t, "thinker", t) for t in thinkers)
+def _first(reasoners: Sequence[Reasoner], kind: type[Kind]) -> Kind | None:
+    """The reasoner of a kind, also where it was made to hold to beliefs."""
+    bare = (getattr(t, "reasoner", t) for t in reasoners)
     return next((t for t in bare if isinstance(t, kind)), None)
