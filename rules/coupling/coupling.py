@@ -34,7 +34,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
+from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.relative_motion import Joint, begun, follow, motion
 from visup.rules.geometry.regions import scale
 from visup.rules.presence.sightings import merged_pairs
@@ -47,7 +47,7 @@ COUPLING = "rules.coupling"
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
 
-COLUMNS = Columns((Column(("", "coupled"), (0, 0), 0),))
+COLUMNS = ColumnLayout((Column(("", "coupled"), (0, 0), 0),))
 
 YES, MAYBE, NO = 1, 0, -1
 """Codes of truths."""
@@ -153,7 +153,7 @@ class Couple:
                 p = NOTHING
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_cells(_coupled(sights, coupled, mind))
+        table = table.with_block(_coupled(sights, coupled, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
@@ -242,7 +242,9 @@ def _table(mind: Mind) -> RelationTable:
     return RelationTable(ids, extra=tuple(table))
 
 
-def _coupled(sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mind) -> Cells:
+def _coupled(
+    sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mind
+) -> RelationBlock:
     """The relation of being coupled."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
     state, since = [0] * len(sights), [mind.time] * len(sights)
@@ -252,7 +254,7 @@ def _coupled(sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mi
         elif sight.touching == MAYBE or (hidden and not hidden.isdisjoint(sight.pair)):
             state[k] = UNKNOWN_CODE
     sure = np.full((1, len(sights)), CONFIDENCE)
-    return Cells(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
+    return RelationBlock(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
 
 
 def _regions(sight: Sight, mind: Mind) -> tuple[Region, Region] | None:

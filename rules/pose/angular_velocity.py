@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from visup.agent import Spin
+from visup.agent import AngularVelocity
 from visup.rules.pose.rotations import Floats
 from visup.rules.pose.spin_fit import Fit, FitSettings, Turns, first_rate, long_pieces, thinned
 
@@ -132,7 +132,7 @@ def _known(turns: Turns, before: Rate, settings: SpinSettings) -> Fit | None:
     return fit if fit.run(settings.steps) and fit.contrast() > settings.unchanged else None
 
 
-def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
+def spin_of(rate: Rate, settings: SpinSettings) -> AngularVelocity | None:
     """A rate in the words of the mind, or None when it is too uncertain to be told."""
     length = float(np.linalg.norm(rate.vector))
     axis = rate.vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
@@ -144,7 +144,7 @@ def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
     if sigma > max(settings.known_deg_s, settings.known_share * degrees):
         return None
     x, y, z = axis.tolist()
-    return Spin(degrees, sigma, (x, y, z))
+    return AngularVelocity(degrees, sigma, (x, y, z))
 
 
 def _fitted(turns: Turns, start: Floats | None, settings: SpinSettings) -> Fit | None:

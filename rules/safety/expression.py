@@ -19,7 +19,7 @@ from math import isinf
 from typing import Any, cast
 
 from visup.agent import Mind, Truth
-from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
 from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
@@ -86,7 +86,7 @@ class Judged:
     readings: tuple[Reading, ...]
 
     @property
-    def truths(self) -> Mapping[tuple[int, ...], Truth | Interval]:
+    def truth_codes(self) -> Mapping[tuple[int, ...], Truth | Interval]:
         """Choice of objects -> verdict of a formula, interval of a quantity."""
         return {r.objects: r.interval if r.truth is None else r.truth for r in self.readings}
 
@@ -158,10 +158,10 @@ def expression(text: str) -> Expression:
     written, variables = _with_variables(text)
     try:
         return Expression(text, _rule(written, variables), False)
-    except (RuleError, ManyErrors) as fault:
+    except (RuleError, ErrorGroup) as fault:
         try:
             rule = _rule(f"({written}) >= ({written})", variables)
-        except (RuleError, ManyErrors):
+        except (RuleError, ErrorGroup):
             raise fault from None
         return Expression(text, rule, True)
 
@@ -192,7 +192,7 @@ def _rule(text: str, variables: tuple[str, ...]) -> Rule:
     try:
         (rule,) = parse_rules(lines, "<expression>")
     except RuleError as fault:
-        if isinstance(fault.where, Place) and fault.where.line > text.count("\n") + 2:
+        if isinstance(fault.where, SourceLocation) and fault.where.line > text.count("\n") + 2:
             # It was the wrapping that did not fit: the user wrote too little.
             raise RuleError(f"'{text}' ends too early", expected=fault.expected) from None
         raise

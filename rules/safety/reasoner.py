@@ -68,7 +68,7 @@ class RuleReasoner:
         if not same or (old.now is not None and now < old.now):
             old = Kept(self.rules)
         if old.now is not None and now - old.now < SPACING:
-            return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
+            return Outcome(mind, conditions=tuple(h.concern for h in old.held.values()))
         prepared, facts = self._prepared, Facts(mind)
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
@@ -89,7 +89,7 @@ class RuleReasoner:
                 cooling,
             ),
         )
-        return Outcome(mind, concerns=tuple([h.concern for h in held.values()]))
+        return Outcome(mind, conditions=tuple([h.concern for h in held.values()]))
 
 
 def kept(mind: Mind) -> Kept:

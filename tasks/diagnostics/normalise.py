@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from visup.agent.model.errors import Place
+from visup.agent.model.errors import SourceLocation
 from visup.tasks.diagnostics.diagnostic import Source, TaskFault
 
 COMMENT = re.compile(r"#.*")
@@ -104,7 +104,7 @@ def _meant(char: str) -> str:
     return LIKE.get(char, " ")
 
 
-def _odd_fault(code: str, char: str, place: Place) -> TaskFault:
+def _odd_fault(code: str, char: str, place: SourceLocation) -> TaskFault:
     if code == "E106":
         return TaskFault(code, "a tab", place, expected="spaces", hint="use spaces")
     if code == "E104":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from visup.agent import Concern, Event, Mind, Severity, Truth
+from visup.agent import AlertCondition, Event, Mind, Severity, Truth
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.conditions import facts_of
 from visup.tasks.grammar.nodes import Invariant
@@ -49,7 +49,7 @@ def patience(follower: Follower, invariant: Invariant) -> float:
     return value(follower.task.amount(invariant.lasting.duration))
 
 
-def invariant_concerns(follower: Follower, memory: TaskMemory) -> Iterator[Concern]:
+def invariant_concerns(follower: Follower, memory: TaskMemory) -> Iterator[AlertCondition]:
     """A concern for each invariant that has been broken for as long as counts."""
     for invariant, since in zip(follower.task.invariants, memory.broken_since, strict=True):
         if since is not None and memory.time - since >= patience(follower, invariant):
@@ -58,7 +58,7 @@ def invariant_concerns(follower: Follower, memory: TaskMemory) -> Iterator[Conce
             objects = played(memory.belief, tuple(dict.fromkeys(actors)))
             cause = f"`{invariant}` has not held since {since:.1f} s."
             key = f"{follower.task.name}: {invariant}"
-            yield Concern("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
+            yield AlertCondition("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
 
 
 def invariant_events(

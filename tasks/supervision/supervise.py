@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from visup.agent import (
+    AlertCondition,
     Binding,
-    Concern,
     Event,
     Mind,
     Observation,
@@ -233,7 +233,7 @@ def _events(follower: Follower, memory: TaskMemory, new: TaskMemory, mind: Mind)
     yield from invariant_events(follower, memory, new, mind)
 
 
-def _concerns(follower: Follower, memory: TaskMemory) -> Iterator[Concern]:
+def _concerns(follower: Follower, memory: TaskMemory) -> Iterator[AlertCondition]:
     yield from stage_concerns(memory.belief)
     yield from invariant_concerns(follower, memory)
 

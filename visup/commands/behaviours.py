@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from visup.agent import Contract
-    from visup.agent.plugins.loader import Offer
+    from visup.agent.plugins.factory import BehaviourFactory
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -40,7 +40,7 @@ class {title}:
     def __init__(self, settings=None):
         self.settings = settings or self.Settings()
 
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         grey = frame.image.mean(axis=2)
         y, x = divmod(int(grey.argmax()), grey.shape[1])
         contrast = float(grey[y, x] - grey.mean())
@@ -56,16 +56,16 @@ def list_behaviours() -> None:
     from rich.table import Table
 
     from visup.agent.model.errors import BehaviourError
-    from visup.agent.plugins.registry import discover
+    from visup.agent.plugins.registry import discover_behaviours
 
-    registry, console = discover(), Console(highlight=False)
+    registry, console = discover_behaviours(), Console(highlight=False)
     table = Table(padding=(0, 0))
     for heading in ("name", "gives", "needs", "every", "budget", "found in"):
         table.add_column(heading, overflow="fold")
     broken = []
     for name in registry.names():
         try:
-            offer = registry.offer(name)
+            offer = registry.factory(name)
             table.add_row(name, *_row(offer.contract), offer.where)
         except BehaviourError as fault:
             broken.append(str(fault))
@@ -124,15 +124,15 @@ def new(
     typer.echo(f"{path}: change it, then\n  visup behaviours check {path}")
 
 
-def _offers(where: str) -> list[Offer]:
-    from visup.agent.plugins.loader import offers
-    from visup.agent.plugins.registry import discover
+def _offers(where: str) -> list[BehaviourFactory]:
+    from visup.agent.plugins.factory import find_factories
+    from visup.agent.plugins.registry import discover_behaviours
 
-    registry = discover()
-    return [registry.offer(where)] if where in registry.names() else offers(where)
+    registry = discover_behaviours()
+    return [registry.factory(where)] if where in registry.names() else find_factories(where)
 
 
-def _check(console: Console, offer: Offer, values: dict[str, dict[str, object]]) -> bool:
+def _check(console: Console, offer: BehaviourFactory, values: dict[str, dict[str, object]]) -> bool:
     from visup.testing import findings
 
     name = offer.contract.name if offer.contract else offer.where

@@ -96,7 +96,7 @@ def settings_of(
     realtime: bool | None = None,
 ) -> WatchSettings:
     """The settings of a run, from the command's options."""
-    from visup.agent.plugins.settings import merged, parse_settings, read_settings
+    from visup.agent.plugins.settings import merge_settings, parse_settings, read_settings
     from visup.runs.settings import WatchSettings, parse_actors
 
     return WatchSettings(
@@ -107,7 +107,7 @@ def settings_of(
         actors=parse_actors(actor or ()),
         behaviours=tuple(behaviour or ()),
         plugins=tuple(plugin or ()),
-        plugin_settings=merged(
+        plugin_settings=merge_settings(
             read_settings(settings_file) if settings_file else {}, parse_settings(setting or ())
         ),
         isolate=tuple(isolate or ()),
@@ -175,13 +175,13 @@ def watch(
 
     Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
     """
-    from visup.agent.storage.journal import Limits
+    from visup.agent.storage.journal import JournalLimits
     from visup.runs.runner import RunOptions
 
     keep = None if keep_gb is None else int(keep_gb * 1e9)
     options = RunOptions(
         video=video,
-        limits=Limits(keep_bytes=keep),
+        limits=JournalLimits(keep_bytes=keep),
         state_every_s=state_every,
         sinks=tuple(sink or ()),
     )

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import visup
-from visup.agent import Concern, Frame, Severity, TaskBelief
+from visup.agent import AlertCondition, Frame, Severity, TaskBelief
 from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.agent.model.errors import ExtraMissingError, OutputError
-from visup.agent.storage.journal import Journal, Limits
+from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
 from visup.percepts.video import Source
 from visup.runs.settings import WatchSettings
@@ -64,7 +64,7 @@ class Recorder:
         *,
         video: bool = True,
         report: bool = True,
-        limits: Limits | None = None,
+        limits: JournalLimits | None = None,
         resume: bool = False,
     ) -> None:
         from visup.report.collector import Collector
@@ -78,7 +78,7 @@ class Recorder:
             "fps": source.fps,
             "size": source.size,
             "live": source.live,
-            "settings": plain(settings),
+            "settings": to_jsonable(settings),
         }
         if not resume:
             self.journal.note(**self.facts)
@@ -109,11 +109,11 @@ class Recorder:
         """Take note of a step that the journal holds already."""
         self._derive(step, frame, ["report"])
 
-    def troubles(self) -> Iterable[Concern]:
+    def troubles(self) -> Iterable[AlertCondition]:
         """What is wrong with recording now."""
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
-            yield Concern(
+            yield AlertCondition(
                 "not_recorded",
                 (),
                 Severity.WARNING,

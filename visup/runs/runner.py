@@ -12,7 +12,7 @@ from visup.agent import Frame, Severity, Verdict
 from visup.agent.model.step import Observer, Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.journal import Limits
+from visup.agent.storage.journal import JournalLimits
 from visup.percepts.video import Source
 from visup.percepts.video.live import LiveSource
 from visup.percepts.video.realtime import in_real_time
@@ -47,7 +47,7 @@ class RunOptions:
 
     video: bool = True
     report: bool = True
-    limits: Limits = field(default_factory=Limits)
+    limits: JournalLimits = field(default_factory=JournalLimits)
     state_every_s: float = 30.0
     sinks: tuple[str, ...] = ()
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from visup.agent import Concern, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
+from visup.agent import AlertCondition, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
 
 TROUBLE = "trouble"
-Teller = Callable[[], Iterable[Concern]]
+Teller = Callable[[], Iterable[AlertCondition]]
 
 
 class Troubles:
@@ -35,13 +35,13 @@ class Troubles:
         """Nothing is remembered."""
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """One percept of kind 'trouble' for each trouble that holds now."""
         now = [concern for teller in self._tellers for concern in teller()]
         return [Percept(TROUBLE, c, frame.time, self.contract.name) for c in now]
 
 
-def tell_troubles(mind: Mind, seen: Observation) -> Outcome:
+def tell_troubles(mind: Mind, observation: Observation) -> Outcome:
     """The reasoner to it: every trouble is a concern."""
-    return Outcome(mind, concerns=seen.of(TROUBLE))
+    return Outcome(mind, conditions=observation.of(TROUBLE))

@@ -196,8 +196,8 @@ class WhenStop:
         was, now = self._follow(self.expression, before, step.mind)
         changes = self.changes or self.expression.quantity
         if not changes:
-            truths = {k: v for k, v in now.truths.items() if isinstance(v, Truth)}
-            old = {k: v for k, v in was.truths.items() if isinstance(v, Truth)} if was else {}
+            truths = {k: v for k, v in now.truth_codes.items() if isinstance(v, Truth)}
+            old = {k: v for k, v in was.truth_codes.items() if isinstance(v, Truth)} if was else {}
             return _turned(self.expression.text, old, truths, False)
         if was is None:
             return ""

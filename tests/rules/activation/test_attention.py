@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from visup.agent import (
+    AngularVelocity,
     Candidate,
     Directive,
     Expectation,
@@ -15,7 +16,6 @@ from visup.agent import (
     Observation,
     Pose,
     Presence,
-    Spin,
     TaskBelief,
     Verdict,
 )
@@ -60,7 +60,10 @@ def test_who_is_known_rests_with_a_reason() -> None:
         replace(KNOWN, candidates=(Candidate("arm", 1.0, 0.6, 0.9),)),
         replace(KNOWN, confirmed=False),
         replace(KNOWN, presence=Presence.LEFT),
-        replace(KNOWN, pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=Spin(9.0, 1.0, (0, 0, 1)))),
+        replace(
+            KNOWN,
+            pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=AngularVelocity(9.0, 1.0, (0, 0, 1))),
+        ),
     ],
 )
 def test_who_is_not_settled_or_turns_is_looked_at(belief: ObjectBelief) -> None:
