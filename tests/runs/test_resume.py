@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tests.paths import ROOT
 import itertools
 import sqlite3
 from collections.abc import Iterator
@@ -14,22 +13,23 @@ import numpy as np
 import pytest
 
 from tests.clips import moving_disc, write_clip
+from tests.paths import ROOT
 from tests.percepts.video.test_live import FakeCapture
 from visup.agent import Frame
+from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
 from visup.agent.storage.codec import packed
-from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.runs.operator import HumanOperator
 from visup.percepts.video.live import LiveSource
-from visup.runs.replay import transcript_diff, recorded_transcript, replay, settings_for
+from visup.runs.checkpoints import CHECKPOINT
+from visup.runs.monotonic_clock import MonotonicFrames
+from visup.runs.operator import HumanOperator
+from visup.runs.replay import recorded_transcript, replay, settings_for, transcript_diff
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import RunOptions, fresh_folder, supervise
 from visup.runs.settings import WatchSettings
-from visup.runs.checkpoints import CHECKPOINT
-from visup.runs.monotonic_clock import MonotonicFrames
 
 BARE = RunOptions(video=False, report=False, state_every_s=0.2)
 
@@ -155,12 +155,16 @@ def test_a_replay_tells_the_same_and_another_rule_is_seen(
     rules.write_text(
         'rule seen(a): warning\n    when in_view(a) > 0.2 s\n    say "{a} {is} seen."\n'
     )
-    warned = transcript_diff(recorded_transcript(run), replay(run, settings_for(run, rules=(rules,))))
+    warned = transcript_diff(
+        recorded_transcript(run), replay(run, settings_for(run, rules=(rules,)))
+    )
     assert warned.counts()["alerts"][1] > 0
     assert [e["data"]["alert_kind"] for e in warned.new if e["kind"] == "alert"] == ["seen"]
     strict = tmp_path / "strict.task"
     strict.write_text("<go> ::= <near>\n<near> ::= converging(arm, satellite)\n")
-    changed = transcript_diff(recorded_transcript(run), replay(run, settings_for(run, tasks=(str(strict),))))
+    changed = transcript_diff(
+        recorded_transcript(run), replay(run, settings_for(run, tasks=(str(strict),)))
+    )
     assert changed.verdicts[0] != changed.verdicts[1]
     bound = replace(settings_for(run), actors={"arm": ("a",), "crane": ("b",)})
     with monkeypatch.context() as patched:

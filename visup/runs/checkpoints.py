@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import visup
-from visup.agent.model.step import Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
+from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import StateError, frozen, thawed
 
 CHECKPOINT = "state.bin"

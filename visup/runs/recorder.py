@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import visup
 from visup.agent import Concern, Frame, Severity, TaskBelief
-from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import plain
 from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, Limits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
+from visup.agent.storage.jsonable import plain
 from visup.percepts.video import Source
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks

@@ -17,9 +17,9 @@ from typing import Any
 import visup
 from visup.agent import Severity, Verdict
 from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import event_line, plain
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
+from visup.agent.storage.jsonable import event_line, plain
 from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict, reasoning_agent

@@ -9,21 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from visup.agent import Frame, Severity, Verdict
-from visup.agent.model.step import Observer, Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
+from visup.agent.model.step import Observer, Step
 from visup.agent.storage.journal import Limits
 from visup.percepts.video import Source
 from visup.percepts.video.live import LiveSource
 from visup.percepts.video.realtime import in_real_time
-from visup.runs.recorder import Recorder, recorder_state
-from visup.runs.resume import InterruptedRun, catch_up
-from visup.runs.settings import WatchSettings
-from visup.sinks import Sinks
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.monotonic_clock import MonotonicFrames
-from visup.runs.wiring import build_agent, final_verdict, open_video
+from visup.runs.recorder import Recorder, recorder_state
+from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent, final_verdict, open_video
+from visup.sinks import Sinks
 
 if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
