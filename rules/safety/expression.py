@@ -86,7 +86,7 @@ class Judged:
     readings: tuple[Reading, ...]
 
     @property
-    def truth_codes(self) -> Mapping[tuple[int, ...], Truth | Interval]:
+    def truths(self) -> Mapping[tuple[int, ...], Truth | Interval]:
         """Choice of objects -> verdict of a formula, interval of a quantity."""
         return {r.objects: r.interval if r.truth is None else r.truth for r in self.readings}
 

@@ -40,7 +40,7 @@ class {title}:
     def __init__(self, settings=None):
         self.settings = settings or self.Settings()
 
-    def perceive(self, frame, observation, directives):
+    def perceive(self, frame, seen, directives):
         grey = frame.image.mean(axis=2)
         y, x = divmod(int(grey.argmax()), grey.shape[1])
         contrast = float(grey[y, x] - grey.mean())
@@ -65,8 +65,8 @@ def list_behaviours() -> None:
     broken = []
     for name in registry.names():
         try:
-            offer = registry.factory(name)
-            table.add_row(name, *_row(offer.contract), offer.where)
+            factory = registry.factory(name)
+            table.add_row(name, *_row(factory.contract), factory.where)
         except BehaviourError as fault:
             broken.append(str(fault))
     console.print(table)
@@ -93,7 +93,7 @@ def check(
     from visup.agent.plugins.settings import parse_settings
 
     console, values = Console(highlight=False), parse_settings(setting or ())
-    kept = [_check(console, offer, values) for offer in _offers(where)]
+    kept = [_check(console, factory, values) for factory in _factories(where)]
     raise typer.Exit(0 if all(kept) else 1)
 
 
@@ -124,7 +124,7 @@ def new(
     typer.echo(f"{path}: change it, then\n  visup behaviours check {path}")
 
 
-def _offers(where: str) -> list[BehaviourFactory]:
+def _factories(where: str) -> list[BehaviourFactory]:
     from visup.agent.plugins.factory import find_factories
     from visup.agent.plugins.registry import discover_behaviours
 
@@ -132,14 +132,16 @@ def _offers(where: str) -> list[BehaviourFactory]:
     return [registry.factory(where)] if where in registry.names() else find_factories(where)
 
 
-def _check(console: Console, offer: BehaviourFactory, values: dict[str, dict[str, object]]) -> bool:
-    from visup.testing import findings
+def _check(
+    console: Console, factory: BehaviourFactory, values: dict[str, dict[str, object]]
+) -> bool:
+    from visup.testing import check_results
 
-    name = offer.contract.name if offer.contract else offer.where
+    name = factory.contract.name if factory.contract else factory.where
     given = values.get(name, {})
-    offer.make(given)  # what cannot be made at all is an error, not a finding
-    found = findings(lambda: offer.make(given))
-    console.print(f"{name} ({offer.where})", markup=False, style="bold")
+    factory.make(given)  # what cannot be made at all is an error, not a finding
+    found = check_results(lambda: factory.make(given))
+    console.print(f"{name} ({factory.where})", markup=False, style="bold")
     for finding in found:
         mark = "[green]ok[/green]    " if finding.passed else "[red]failed[/red]"
         console.print(f"  {mark} ", end="")

@@ -58,7 +58,7 @@ class Watch:
     """
 
     mission: Mission
-    truth_codes: Truths
+    truths: Truths
     who: Mapping[int, tuple[str, ...]]
     said: Record = field(default_factory=Record)
     right: int = 0
@@ -79,7 +79,7 @@ class Watch:
         for name, masks in self._scored(step):
             belief = covering(step.mind, masks)
             said = "nobody" if belief is None else belief.name
-            together = {self.truth_codes.names[n] for n in self._together(name, step.time)}
+            together = {self.truths.names[n] for n in self._together(name, step.time)}
             right = said in together
             self.scored += 1
             self.right += right
@@ -98,7 +98,7 @@ class Watch:
 
     def _together(self, name: str, time: float) -> frozenset[str]:
         """The true objects that are one body with this one now."""
-        for event in self.truth_codes.events:
+        for event in self.truths.events:
             if event.kind == "coupled" and name in event.objects and time >= event.time:
                 return event.objects
         return frozenset({name})
@@ -108,7 +108,7 @@ class Watch:
         here = self.mission.masks[step.frame_index]
         for name, mask in here.items():
             entered = [
-                e.time for e in self.truth_codes.events if e.kind == "entry" and name in e.objects
+                e.time for e in self.truths.events if e.kind == "entry" and name in e.objects
             ]
             late = bool(entered) and step.time >= min(entered) + UNSCORED_START_S
             if mask.visible_px < SMALLEST_SCORED_PX or not late:
@@ -172,7 +172,7 @@ def run_scores(watch: Watch) -> dict[str, Any]:
     """Figures of one run."""
     names = watch.names()
     told = [(kind, ids) for kind, ids, _ in watch.said.events]
-    true = {(e.kind, e.objects) for e in watch.truth_codes.events}
+    true = {(e.kind, e.objects) for e in watch.truths.events}
 
     def false(kind: str) -> int:
         return sum(
@@ -187,7 +187,7 @@ def run_scores(watch: Watch) -> dict[str, Any]:
         "false_coupled": false("coupled"),
         "false_exit": false("exit"),
         "spin_errors": _spin_errors(watch),
-        **told_scores(watch.truth_codes, watch.said, names),
+        **told_scores(watch.truths, watch.said, names),
     }
 
 
