@@ -18,10 +18,10 @@ from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.database import ModelDatabase
 from visup.percepts.video import Source, open_source
 from visup.runs.plugins import plug_ins
-from visup.rules.activation.attention import Attend
+from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
-from visup.rules.activation.waking import Wake, wakeful, waking_rules
+from visup.rules.activation.activation import ActivationReasoner, always_active, activation_rules
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import sizes, task_actors, undrawn
@@ -88,7 +88,7 @@ def build_agent(
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
-        limits=replace(_limits(settings, live), wakeful=wakeful(contracts, _rules(settings))),
+        limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
 
 
@@ -155,9 +155,9 @@ def _reasoners(
 ) -> Reasoners:
     interpreting = default_reasoners(rules=_rules(settings))
     following = (task_reasoner(tasks),) if tasks else ()
-    attending = (Attend(),) if settings.attention else ()
-    waking = waking_rules(contracts)
-    match = (*following, *attending, *((Wake(waking),) if waking else ()), tell_troubles)
+    attending = (AttentionReasoner(),) if settings.attention else ()
+    waking = activation_rules(contracts)
+    match = (*following, *attending, *((ActivationReasoner(waking),) if waking else ()), tell_troubles)
     return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 

@@ -23,7 +23,7 @@ from visup.stepping.cursor import Stopped
 from visup.stepping.diff import MindDiff, difference
 from visup.stepping.explanations import questions as asking
 from visup.stepping.explanations.evidence import Why
-from visup.stepping.explanations.why import Reasons
+from visup.stepping.explanations.why import ReasonFinder
 from visup.stepping.history import LATEST, SPACING, History
 from visup.stepping.observation_sources import Feed, LiveFeed, RecordedFeed
 from visup.stepping.timeline import Course
@@ -286,7 +286,7 @@ class Stepper(Course):
         Raises:
             VisupError: Nothing is known of it.
         """
-        reasons = Reasons(self, self.at, self.mind)
+        reasons = ReasonFinder(self, self.at, self.mind)
         return asking.why(reasons, what) if isinstance(what, str) else reasons.of(what)
 
     def why_not(self, text: str) -> Why:

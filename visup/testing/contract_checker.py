@@ -22,7 +22,7 @@ from visup.agent.execution.process_runner import parcel
 from visup.agent.execution.worker import packed_bytes
 from visup.agent.model.errors import BehaviourError, VisupError
 from visup.agent.plugins.loader import checked
-from visup.rules.activation.waking import waking_rules
+from visup.rules.activation.activation import activation_rules
 from visup.testing.clips import CLIPS, Shot
 from visup.testing.scripted import Says, stand_ins
 
@@ -138,7 +138,7 @@ def _conduct(
 def _wakes(contract: Contract) -> Finding:
     said = "says when it is awake"
     try:
-        waking_rules([contract])
+        activation_rules([contract])
     except BehaviourError as fault:
         return Finding(said, False, str(fault))
     return Finding(said, True, contract.awake)
