@@ -48,8 +48,8 @@ class RunTimeline(Protocol):
     def mind(self) -> Mind: ...  # noqa: D102
 
     def mind_at(self, number: int) -> Mind: ...  # noqa: D102
-    def seen_at(self, number: int) -> Observation: ...  # noqa: D102
-    def told(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
+    def observation_at(self, number: int) -> Observation: ...  # noqa: D102
+    def percept_reason(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class ReasonFinder:
                 return self.verdict(what.task)
             case StageBelief():
                 return self.stage(what.stage)
-        raise SettingsError(f"why of a {type(what).__name__} cannot be told")
+        raise SettingsError(f"why of a {type(what).__name__} cannot be percept_reason")
 
     def alert(self, alert_id: int) -> Why:
         """Why an alert was opened, and why it stays open; those that are over are found too."""
@@ -124,13 +124,13 @@ class ReasonFinder:
             bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
             failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
             if failing:  # which tell of their actors
-                return Why("because", (*stated, *failing))
+                return Why("explanation_tree", (*stated, *failing))
         if kind == "behaviour_failed":
             stated += self._failed()
-        return Why("because", (*stated, *self._objects(event.objects)))
+        return Why("explanation_tree", (*stated, *self._objects(event.objects)))
 
     def _failed(self) -> tuple[Why, ...]:
-        seen = self.course.seen_at(self.number)
+        seen = self.course.observation_at(self.number)
         bad = (r for r in seen.reports if r.state not in (ReportState.RAN, ReportState.RESTED))
         return tuple(
             Why(f"{r.behaviour} {r.state.value}: {r.error}", (), seen.frame_index, seen.time)
@@ -190,11 +190,13 @@ class ReasonFinder:
             "they last converged at": getattr(pending, "converged_at", None),
             "apart since": getattr(pending, "apart_since", None),
         }
-        told = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        percept_reason = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
         if pending is not None:
-            told.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
+            percept_reason.append(
+                Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}")
+            )
         return (
-            *told,
+            *percept_reason,
             *(
                 self.relation(n, (low, high), deep=False)
                 for n in self._judged("touching", low, high)
@@ -232,7 +234,7 @@ class ReasonFinder:
         """The latest percepts that say what it looks like."""
         number = self._step_of(b.last_seen)
         for back in range(number, max(self.course.begin, number - LOOK_BACK), -1):
-            seen = self.course.seen_at(back)
+            seen = self.course.observation_at(back)
             found = region_percepts(seen, b.region.id, names=True)
             named = tuple(w for w in found if w.percept and w.percept.kind != "region")
             if named:
@@ -242,7 +244,7 @@ class ReasonFinder:
     def _sight(self, object_id: int) -> Why:
         """When an object was seen last, and as which region."""
         b = self._belief(object_id)
-        seen = self.course.seen_at(self._step_of(b.last_seen))
+        seen = self.course.observation_at(self._step_of(b.last_seen))
         who = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
         text = f"{who}, first seen at {b.first_seen:.2f} s, was last seen at {b.last_seen:.2f} s"
         return Why(text, region_percepts(seen, b.region.id))
@@ -270,7 +272,7 @@ class ReasonFinder:
             if e.kind.startswith("stage_") and e.data.get("stage") == s.stage
         ]
         parts = [Why(s.evidence)] if s.evidence else []
-        parts += [Why("it was told", tuple(since[-3:]))] if since else []
+        parts += [Why("it was percept_reason", tuple(since[-3:]))] if since else []
         parts += self._asked(task) if task.current == s.stage else []
         text = f"stage {s.stage} is {s.status.value} since {s.since:.2f} s"
         return Why(f"{text}, confidence {s.confidence:.2f}", (*parts, *self._actors(task)))
@@ -323,7 +325,7 @@ class ReasonFinder:
         return Why(text, (*stated, *alerts, *stages), *self._here)
 
     def event(self, event: Event) -> Why:
-        """Why an event was told, as things were when it was."""
+        """Why an event was percept_reason, as things were when it was."""
         number = self._step_of(event.time)
         then = self.after(number)
         return Why(event.text, then._behind(event), event.frame_index, event.time)
@@ -342,7 +344,7 @@ class ReasonFinder:
             return (self.relation(str(data["relation"]), event.objects),)
         if event.kind in ("identified", "question", "answer"):
             return tuple(self.identity(i) for i in event.objects)
-        seen = self.course.seen_at(self.number)
+        seen = self.course.observation_at(self.number)
         other = (
             ()
             if event.objects
@@ -365,7 +367,7 @@ class ReasonFinder:
     def _step_of(self, time: float) -> int:
         """The step of the frame at a time, or the first after it that is known."""
         numbers = range(self.course.begin + 1, self.number + 1)
-        place = bisect_left(numbers, time, key=lambda n: self.course.seen_at(n).time)
+        place = bisect_left(numbers, time, key=lambda n: self.course.observation_at(n).time)
         return numbers[min(place, len(numbers) - 1)]
 
     @property
