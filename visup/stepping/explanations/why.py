@@ -49,7 +49,7 @@ class RunTimeline(Protocol):
 
     def mind_at(self, number: int) -> Mind: ...  # noqa: D102
     def observation_at(self, number: int) -> Observation: ...  # noqa: D102
-    def percept_reason(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
+    def told(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class ReasonFinder:
                 return self.verdict(what.task)
             case StageBelief():
                 return self.stage(what.stage)
-        raise SettingsError(f"why of a {type(what).__name__} cannot be percept_reason")
+        raise SettingsError(f"a {type(what).__name__} cannot be explained")
 
     def alert(self, alert_id: int) -> Why:
         """Why an alert was opened, and why it stays open; those that are over are found too."""
@@ -124,10 +124,10 @@ class ReasonFinder:
             bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
             failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
             if failing:  # which tell of their actors
-                return Why("explanation_tree", (*stated, *failing))
+                return Why("because", (*stated, *failing))
         if kind == "behaviour_failed":
             stated += self._failed()
-        return Why("explanation_tree", (*stated, *self._objects(event.objects)))
+        return Why("because", (*stated, *self._objects(event.objects)))
 
     def _failed(self) -> tuple[Why, ...]:
         seen = self.course.observation_at(self.number)
@@ -190,13 +190,13 @@ class ReasonFinder:
             "they last converged at": getattr(pending, "converged_at", None),
             "apart since": getattr(pending, "apart_since", None),
         }
-        percept_reason = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        dated = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
         if pending is not None:
-            percept_reason.append(
+            dated.append(
                 Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}")
             )
         return (
-            *percept_reason,
+            *dated,
             *(
                 self.relation(n, (low, high), deep=False)
                 for n in self._judged("touching", low, high)
@@ -272,7 +272,7 @@ class ReasonFinder:
             if e.kind.startswith("stage_") and e.data.get("stage") == s.stage
         ]
         parts = [Why(s.evidence)] if s.evidence else []
-        parts += [Why("it was percept_reason", tuple(since[-3:]))] if since else []
+        parts += [Why("it was told", tuple(since[-3:]))] if since else []
         parts += self._asked(task) if task.current == s.stage else []
         text = f"stage {s.stage} is {s.status.value} since {s.since:.2f} s"
         return Why(f"{text}, confidence {s.confidence:.2f}", (*parts, *self._actors(task)))
@@ -325,7 +325,7 @@ class ReasonFinder:
         return Why(text, (*stated, *alerts, *stages), *self._here)
 
     def event(self, event: Event) -> Why:
-        """Why an event was percept_reason, as things were when it was."""
+        """Why an event was told, as things were when it was."""
         number = self._step_of(event.time)
         then = self.after(number)
         return Why(event.text, then._behind(event), event.frame_index, event.time)
