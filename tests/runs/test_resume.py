@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.clips import moving_disc, write_clip
-from tests.percepts.video.test_live import FakeCapture
+from tests.percepts.video.test_live_source import FakeCapture
 from visup.agent import Frame
 from visup.agent.model.step import Step
 from visup.agent.storage.codec import packed
@@ -23,7 +23,7 @@ from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
 from visup.runs.operator import Operator
-from visup.percepts.video.live import LiveSource
+from visup.percepts.video.live_source import LiveSource
 from visup.runs.replay import difference, recorded, replay, settings_for
 from visup.runs.resume import past_of
 from visup.runs.runner import RunOptions, fresh_folder, supervise
