@@ -192,9 +192,7 @@ class ReasonFinder:
         }
         dated = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
         if pending is not None:
-            dated.append(
-                Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}")
-            )
+            dated.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
         return (
             *dated,
             *(
