@@ -1,6 +1,15 @@
 """visup, the visual supervisor: it watches machines work and says in plain words whether it goes well.
 
-Where to read first:
+    import visup
+
+    for step in visup.watch("clip.mp4", task="dock", models="things.models"):
+        for event in step.events:
+            print(f"{event.time:6.1f} s  {event.text}")
+
+What stands in `__all__` is the public API; docs/api.md lists it with examples. Names are loaded when they
+are first used, so that `import visup` costs next to nothing.
+
+To read the source, begin here:
 
 1. `visup/agent/model/`: what flows (`records.py`) and what is believed (`mind.py`).
 2. `visup/agent/cycle/agent.py`: the cogitation-action cycle on one screen.
@@ -8,12 +17,98 @@ Where to read first:
 4. `visup/rules/` and `visup/tasks/`: interpreting what is seen, and verifying tasks.
 5. `visup/runs/wiring.py`: all of it wired together; `visup/cli.py`: the command.
 
-`docs/tour.md` follows one frame through all of it.
+`docs/tour.md` follows one frame through all of it, and `docs/architecture.md` is the map.
 """
 
-from importlib.metadata import PackageNotFoundError, version
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-try:
-    __version__ = version("visup")
-except PackageNotFoundError:  # run from a checkout that was never installed
-    __version__ = "0+unknown"
+if TYPE_CHECKING:
+    from visup.agent.contract.behaviour import Behaviour, Contract
+    from visup.agent.cycle.agent import Agent
+    from visup.agent.model.errors import VisupError
+    from visup.agent.model.mind import Mind, Verdict
+    from visup.agent.model.records import (
+        Alert,
+        Directive,
+        Event,
+        Frame,
+        Observation,
+        Percept,
+        Region,
+        Severity,
+    )
+    from visup.agent.model.step import Step
+    from visup.api.recorded import RecordedRun, open_run
+    from visup.api.watching import Run, watch
+    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.runs.settings import WatchSettings as Settings
+    from visup.stepping.stepper import Stepper
+    from visup.tasks.checks.load import load_task
+    from visup.tasks.grammar.nodes import Task
+    from visup.version import __version__
+
+__all__ = [
+    "Agent",
+    "Alert",
+    "Behaviour",
+    "Contract",
+    "Directive",
+    "Event",
+    "Frame",
+    "Mind",
+    "ModelDatabase",
+    "Observation",
+    "Percept",
+    "RecordedRun",
+    "Region",
+    "Run",
+    "Settings",
+    "Severity",
+    "Step",
+    "Stepper",
+    "Task",
+    "Verdict",
+    "VisupError",
+    "__version__",
+    "load_task",
+    "open_run",
+    "watch",
+]
+
+# Where each name is found when it is first used; type checkers and editors read the imports above.
+_HOMES = {
+    "visup.agent.contract.behaviour": ("Behaviour", "Contract"),
+    "visup.agent.cycle.agent": ("Agent",),
+    "visup.agent.model.errors": ("VisupError",),
+    "visup.agent.model.mind": ("Mind", "Verdict"),
+    "visup.agent.model.records": (
+        *("Alert", "Directive", "Event", "Frame", "Observation", "Percept", "Region", "Severity"),
+    ),
+    "visup.agent.model.step": ("Step",),
+    "visup.api.recorded": ("RecordedRun", "open_run"),
+    "visup.api.watching": ("Run", "watch"),
+    "visup.percepts.shape.database.database": ("ModelDatabase",),
+    "visup.runs.settings": ("WatchSettings as Settings",),
+    "visup.stepping.stepper": ("Stepper",),
+    "visup.tasks.checks.load": ("load_task",),
+    "visup.tasks.grammar.nodes": ("Task",),
+    "visup.version": ("__version__",),
+}
+_HOME_OF = {
+    name.rpartition(" as ")[2]: (module, name.partition(" as ")[0])
+    for module, names in _HOMES.items()
+    for name in names
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'visup' has no attribute {name!r}")
+    module, there = _HOME_OF[name]
+    found = globals()[name] = getattr(import_module(module), there)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -11,17 +11,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import visup
 from visup.agent import Concern, Frame, Severity, TaskBelief
-from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import plain
 from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, Limits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
+from visup.agent.storage.jsonable import plain
 from visup.percepts.video import Source
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
+from visup.version import __version__
 
 if TYPE_CHECKING:
     from visup.agent import Verdict
@@ -73,7 +73,7 @@ class Recorder:
         self.folder = folder
         self.journal = Journal(folder / JOURNAL, limits, resume=resume)
         self.facts: dict[str, Any] = {
-            "visup": visup.__version__,
+            "visup": __version__,
             "source": source.name,
             "fps": source.fps,
             "size": source.size,

@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import Frame, Observation, Severity
-from visup.agent.model.step import Step
 from visup.agent.cycle.agent import Agent
-from visup.agent.storage.codec import packed
 from visup.agent.model.errors import OutputError, SourceError
+from visup.agent.model.step import Step
+from visup.agent.storage.codec import packed
 from visup.agent.storage.journal_reader import Recording
 from visup.percepts.video import Source
-from visup.runs.settings import WatchSettings
 from visup.runs.checkpoints import State, read_state
 from visup.runs.runtime_faults import Troubles
+from visup.runs.settings import WatchSettings
 
 
 @dataclass(frozen=True, slots=True)

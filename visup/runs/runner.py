@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from visup.agent import Frame, Severity, Verdict
-from visup.agent.model.step import Observer, Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
+from visup.agent.model.step import Observer, Step
 from visup.agent.storage.journal import Limits
 from visup.percepts.video import Source
 from visup.percepts.video.live import LiveSource
 from visup.percepts.video.realtime import in_real_time
-from visup.runs.recorder import Recorder, kept_of
-from visup.runs.resume import Past, caught_up
-from visup.runs.settings import WatchSettings
-from visup.sinks import Sinks
 from visup.runs.checkpoints import StateKeeper
 from visup.runs.monotonic_clock import Steady
-from visup.runs.wiring import build_agent, final_verdict, open_video
+from visup.runs.recorder import Recorder, kept_of
+from visup.runs.resume import Past, caught_up
 from visup.runs.runtime_faults import Troubles
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import build_agent, final_verdict, open_video
+from visup.sinks import Sinks
 
 if TYPE_CHECKING:
     from visup.runs.operator import Operator
@@ -112,6 +112,23 @@ def fresh_folder(out: Path | None, source: str) -> Path:
     return out
 
 
+@dataclass(frozen=True, slots=True)
+class Listeners:
+    """Who hears of a run while it goes on.
+
+    Attributes:
+        observers: Called with each step after it is recorded.
+        progress: Called after each step.
+        operator: Who answers questions; nobody by default.
+        notice: Called with what cannot wait for a step, such as that a camera dropped: one sentence.
+    """
+
+    observers: Sequence[Observer] = ()
+    progress: Progress | None = None
+    operator: Operator | None = None
+    notice: Callable[[str], None] | None = None
+
+
 def supervise(
     settings: WatchSettings,
     folder: Path | None,
@@ -128,10 +145,10 @@ def supervise(
     Args:
         settings: What to watch and against what.
         folder: A folder from `fresh_folder`, that of `past`, or None to record nothing.
-        observers: Told of each step after it is recorded.
-        progress: Told of each step.
-        operator: Who answers questions; nobody by default.
-        notice: Told what cannot wait for a step, such as that a camera dropped: one sentence.
+        observers: As of `Listeners`, like the three that follow.
+        progress: See there.
+        operator: See there.
+        notice: See there.
         options: How it is recorded and told.
         past: The run to go on with; `settings` are its own.
 
@@ -141,6 +158,51 @@ def supervise(
     Raises:
         VisupError: Something given is not as it should be.
     """
+    listeners = Listeners(observers, progress, operator, notice)
+    run = supervised(settings, folder, listeners, options, past)
+    while True:
+        try:
+            next(run)
+        except StopIteration as end:
+            result: RunResult = end.value
+            return result
+
+
+def supervised(
+    settings: WatchSettings,
+    folder: Path | None,
+    listeners: Listeners,
+    options: RunOptions | None = None,
+    past: Past | None = None,
+) -> Generator[Step, None, RunResult]:
+    """Open a source and all that watches it; then one step each time that it is asked for.
+
+    A KeyboardInterrupt thrown in ends the run as stopped by the user, with verdict and report; a
+    generator that is merely closed leaves the run as one that was killed, to be resumed.
+
+    Args:
+        settings: As of `supervise`.
+        folder: See there.
+        listeners: Who hears of it.
+        options: How it is recorded and told.
+        past: The run to go on with.
+
+    Raises:
+        VisupError: Something given is not as it should be.
+    """
+    run = _supervised(settings, folder, listeners, options, past)
+    next(run)
+    return cast("Generator[Step, None, RunResult]", run)
+
+
+def _supervised(
+    settings: WatchSettings,
+    folder: Path | None,
+    listeners: Listeners,
+    options: RunOptions | None,
+    past: Past | None,
+) -> Generator[Step | None, None, RunResult]:
+    """First None, once all is open; then the steps."""
     options = options or RunOptions()
     tally = _Tally(past.grave if past else False)
     troubles = Troubles()
@@ -158,13 +220,14 @@ def supervise(
             frames, notes = _caught_up(agent, source, past, recorder)
         # The journal comes first: what is told was recorded before.
         recording = (recorder,) if recorder else ()
+        operator = listeners.operator
         answering = (_attending(operator, agent, recorder, past),) if operator else ()
-        agent.observers = (tally, *recording, *observers, sinks, *answering)
+        agent.observers = (tally, *recording, *listeners.observers, sinks, *answering)
         if recorder:
             troubles.ask(recorder.troubles)
         troubles.ask(sinks.troubles)
         if isinstance(source, LiveSource):
-            source.notify = notify(sinks, notice)
+            source.notify = notify(sinks, listeners.notice)
             troubles.ask(source.troubles)
         pace = in_real_time(source, frames) if _keeps_pace(settings, source) else None
         if pace:
@@ -174,13 +237,15 @@ def supervise(
         steady = Steady(pace or frames, source.fps, begin)
         troubles.ask(steady.troubles)
         steps = past.steps if past else 0
+        yield None
         try:
             for step in agent.steps(steady):
                 steps += 1
                 if states:
                     states.offer(agent, step, lambda: kept_of(recorder))
-                if progress:
-                    progress(steps, _steps_of(source, settings))
+                if listeners.progress:
+                    listeners.progress(steps, _steps_of(source, settings))
+                yield step
         except KeyboardInterrupt:
             tally.stopped = True
         if states:
