@@ -16,7 +16,7 @@ from visup.agent.model.records import Event
 from visup.agent.model.step import Step
 from visup.report.pictures import html_picture, text_picture
 from visup.terminal.display import html_of
-from visup.terminal.narrator import line, verdict_line
+from visup.terminal.narrator import event_row, verdict_line
 from visup.wording import worded_once
 
 MOST_EVENTS = 12
@@ -36,7 +36,7 @@ def story(title: str, events: Iterable[Event], verdict: Verdict | None) -> Rende
     return Group(
         Text(title, style="bold"),
         *(head if len(told) > MOST_EVENTS else ()),
-        *(line(e) for e in told[-MOST_EVENTS:]),
+        *(event_row(e) for e in told[-MOST_EVENTS:]),
         Text.from_markup(verdict_line(verdict)),
     )
 

@@ -1,6 +1,7 @@
-"""One supervised run: the agent wired from its settings, driven over a source, recorded, replayed, resumed.
+"""Runs: an agent wired from settings, a source watched to its end, and the folder that records it.
 
-Read in this order: `settings.py` (what a run is given), `wiring.py` (the agent made from it), `runner.py`
-(the run from start to end), `recorder.py` (what it writes), `replay.py` and `resume.py` (what can be done
-with it afterwards).
+Read `settings.py` (what a run is given), `wiring.py` (an agent from it), `runner.py` (one supervised run)
+and `recorder.py` (its folder); then `checkpoints.py` with `resume.py` (going on with a run that was killed),
+`replay.py` (reasoning again about a recorded run), `runtime_faults.py` (faults of the surroundings as
+percepts) and `operator.py` (who answers questions).
 """

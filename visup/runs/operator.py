@@ -85,7 +85,7 @@ def _taken(queue: SimpleQueue[str]) -> list[str]:
 
 
 @dataclass(slots=True)
-class Operator:
+class HumanOperator:
     """Hands answers to an agent.
 
     Attributes:

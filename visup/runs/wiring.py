@@ -21,8 +21,8 @@ from visup.rules.activation.attention import Attend
 from visup.rules.activation.waking import Wake, wakeful, waking_rules
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
-from visup.runs.plugins import plug_ins
-from visup.runs.runtime_faults import tell_troubles
+from visup.runs.plugins import user_behaviours
+from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
 from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
@@ -143,7 +143,7 @@ def _behaviours(
             ShapeBehaviour(database),
             DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
         ]
-    return [*seeing, *plug_ins(settings)]
+    return [*seeing, *user_behaviours(settings)]
 
 
 def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
@@ -157,7 +157,7 @@ def _reasoners(
     following = (task_reasoner(tasks),) if tasks else ()
     attending = (Attend(),) if settings.attention else ()
     waking = waking_rules(contracts)
-    match = (*following, *attending, *((Wake(waking),) if waking else ()), tell_troubles)
+    match = (*following, *attending, *((Wake(waking),) if waking else ()), runtime_fault_reasoner)
     return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 
