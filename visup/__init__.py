@@ -24,28 +24,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from visup.agent.contract.behaviour import Behaviour, Contract
-    from visup.agent.cycle.agent import Agent
-    from visup.agent.model.errors import VisupError
-    from visup.agent.model.mind import Mind, Verdict
-    from visup.agent.model.records import (
+    from visup.agent import (
         Alert,
+        Behaviour,
+        Contract,
         Directive,
         Event,
         Frame,
+        Mind,
         Observation,
         Percept,
         Region,
         Severity,
+        Verdict,
+        VisupError,
     )
+    from visup.agent.cycle.agent import Agent
     from visup.agent.model.step import Step
-    from visup.api.recorded import RecordedRun, open_run
-    from visup.api.watching import Run, watch
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.api import RecordedRun, Run, open_run, watch
+    from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.runs.settings import WatchSettings as Settings
-    from visup.stepping.stepper import Stepper
-    from visup.tasks.checks.load import load_task
-    from visup.tasks.grammar.nodes import Task
+    from visup.stepping import Stepper
+    from visup.tasks import Task, load_task
     from visup.version import __version__
 
 __all__ = [
@@ -78,21 +78,17 @@ __all__ = [
 
 # Where each name is found when it is first used; type checkers and editors read the imports above.
 _HOMES = {
-    "visup.agent.contract.behaviour": ("Behaviour", "Contract"),
-    "visup.agent.cycle.agent": ("Agent",),
-    "visup.agent.model.errors": ("VisupError",),
-    "visup.agent.model.mind": ("Mind", "Verdict"),
-    "visup.agent.model.records": (
-        *("Alert", "Directive", "Event", "Frame", "Observation", "Percept", "Region", "Severity"),
+    "visup.agent": (
+        *("Alert", "Behaviour", "Contract", "Directive", "Event", "Frame", "Mind", "Observation"),
+        *("Percept", "Region", "Severity", "Verdict", "VisupError"),
     ),
+    "visup.agent.cycle.agent": ("Agent",),
     "visup.agent.model.step": ("Step",),
-    "visup.api.recorded": ("RecordedRun", "open_run"),
-    "visup.api.watching": ("Run", "watch"),
-    "visup.percepts.shape.database.database": ("ModelDatabase",),
+    "visup.api": ("RecordedRun", "Run", "open_run", "watch"),
+    "visup.percepts.shape.database.model_database": ("ModelDatabase",),
     "visup.runs.settings": ("WatchSettings as Settings",),
-    "visup.stepping.stepper": ("Stepper",),
-    "visup.tasks.checks.load": ("load_task",),
-    "visup.tasks.grammar.nodes": ("Task",),
+    "visup.stepping": ("Stepper",),
+    "visup.tasks": ("Task", "load_task"),
     "visup.version": ("__version__",),
 }
 _HOME_OF = {

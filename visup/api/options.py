@@ -11,7 +11,7 @@ from typing import Any, TypedDict
 from pydantic import TypeAdapter, ValidationError
 
 from visup.agent.model.errors import SettingsError
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.runs.settings import WatchSettings
 from visup.tasks.grammar.nodes import Task
 

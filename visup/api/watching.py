@@ -20,7 +20,7 @@ from visup.agent.model.step import Step
 from visup.api.display import html_with_picture, story, with_picture
 from visup.api.options import TaskLike, WatchOptions, settings_from
 from visup.api.records import Records
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.runs.runner import Listeners, RunOptions, RunResult, fresh_folder, supervised
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict

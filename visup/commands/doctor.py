@@ -61,9 +61,9 @@ def examine() -> Iterator[CheckedPart]:
     """Look at Python, the libraries, the extras, the codecs and the shipped files."""
     import platform
 
-    import visup
+    from visup.version import __version__
 
-    yield CheckedPart("visup", "ok", visup.__version__)
+    yield CheckedPart("visup", "ok", __version__)
     yield CheckedPart("Python", "ok", platform.python_version())
     for name in CORE:
         yield _library(name, None)
