@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from visup.agent import Frame, Severity, Verdict
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
-from visup.percepts.video.live import LiveSource
-from visup.percepts.video.realtime import RealTime, in_real_time
+from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
@@ -140,7 +140,7 @@ class _Run:
         stack.callback(self._sinks.close)
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
         self._severity = _SeverityMonitor(past.grave if past else False)
-        self._pace: RealTime | None = None
+        self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
         self._stopped = False
         self._notes: tuple[str, ...] = ()
