@@ -21,7 +21,8 @@ from visup.api.display import html_with_picture, story, with_picture
 from visup.api.options import TaskLike, WatchOptions, settings_from
 from visup.api.records import Records
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.runs.runner import Listeners, RunOptions, RunResult, fresh_folder, supervised
+from visup.runs.result import RunResult
+from visup.runs.runner import Audience, fresh_folder, supervised
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict
 
@@ -101,7 +102,7 @@ class Run(Iterator[Step]):
         self._frame: Frame | None = None
         self._begun = False
         folder = fresh_folder(Path(out), settings.source) if out is not None else None
-        self._run = supervised(settings, folder, Listeners((self._note,)), RunOptions())
+        self._run = supervised(settings, folder, Audience((self._note,)))
 
     def __next__(self) -> Step:
         self._begun = True
