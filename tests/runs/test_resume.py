@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tests.paths import ROOT
 import itertools
 import sqlite3
 from collections.abc import Iterator
@@ -14,22 +13,23 @@ import numpy as np
 import pytest
 
 from tests.clips import moving_disc, write_clip
+from tests.paths import ROOT
 from tests.percepts.video.test_live import FakeCapture
 from visup.agent import Frame
+from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
 from visup.agent.storage.codec import packed
-from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.runs.operator import Operator
 from visup.percepts.video.live import LiveSource
+from visup.runs.checkpoints import STATE
+from visup.runs.monotonic_clock import Steady
+from visup.runs.operator import Operator
 from visup.runs.replay import difference, recorded, replay, settings_for
 from visup.runs.resume import past_of
 from visup.runs.runner import RunOptions, fresh_folder, supervise
 from visup.runs.settings import WatchSettings
-from visup.runs.checkpoints import STATE
-from visup.runs.monotonic_clock import Steady
 
 BARE = RunOptions(video=False, report=False, state_every_s=0.2)
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.percepts.motion.clips import texture
 from visup.agent import Frame, HealthStatus
-from visup.evaluation.health.health import statuses
+from visup.evaluation.health.runner import statuses
 from visup.percepts.health.image_quality import measure
 from visup.percepts.health.noise import change_of
 
