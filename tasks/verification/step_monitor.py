@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import Meaning
-from visup.tasks.automaton.derivatives import Step
-from visup.tasks.verification.observe import UNSEEN, Sighting
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 
 BAD = (Status.FAILING, Status.FAILED)
 
 
 @dataclass(frozen=True)
-class Watch:
+class StepMonitor:
     """What is kept about a step under way; times in seconds.
 
     Attributes:
@@ -67,24 +67,24 @@ class Watch:
     opened: bool = False
 
 
-def entered(now: float) -> Watch:
+def entered(now: float) -> StepMonitor:
     """What is kept about a step that begins now."""
-    return Watch(entered=now, since=now)
+    return StepMonitor(entered=now, since=now)
 
 
 def update(
-    watch: Watch,
-    step: Step,
+    monitor: StepMonitor,
+    step: TaskStep,
     meaning: Meaning,
-    seen: Sighting,
+    seen: ActionObservation,
     now: float,
     dt: float,
     settings: TaskSettings,
-) -> Watch:
+) -> StepMonitor:
     """Take one sighting into what is kept about a step.
 
     Args:
-        watch: What was kept.
+        monitor: What was kept.
         step: The step.
         meaning: Its action.
         seen: What is seen of it now.
@@ -95,11 +95,13 @@ def update(
     Returns:
         What is kept now, with the new status.
     """
-    if step.sign("begins") is not None and not watch.opened:
+    if step.condition("begins") is not None and not monitor.opened:
         # Until it begins, nothing that is seen speaks for or against it.
-        watch = replace(watch, opened=seen.entry is not None)
-        seen = seen if watch.opened else replace(UNSEEN, observed=seen.observed)
-    noted = _note_contrary(_note_progress(watch, step, meaning, seen, now, dt, settings), seen, now)
+        monitor = replace(monitor, opened=seen.entry is not None)
+        seen = seen if monitor.opened else replace(UNOBSERVED, observed=seen.observed)
+    noted = _note_contrary(
+        _note_progress(monitor, step, meaning, seen, now, dt, settings), seen, now
+    )
     late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
     noted = replace(noted, late=late)
     status = _status(noted, seen, now, settings)
@@ -120,111 +122,115 @@ def update(
     )
 
 
-def over(watch: Watch, step: Step, meaning: Meaning) -> bool:
+def over(monitor: StepMonitor, step: TaskStep, meaning: Meaning) -> bool:
     """Whether a step is over by itself, whatever comes next."""
-    told = step.hold_s is not None or step.sign("ends") is not None
-    return watch.fulfilled and (not meaning.lasts or told)
+    told = step.hold_s is not None or step.condition("ends") is not None
+    return monitor.fulfilled and (not meaning.lasts or told)
 
 
-def overdue(step: Step, now: float) -> bool:
+def overdue(step: TaskStep, now: float) -> bool:
     """Whether a `within` around the step has run out."""
     return any(now > d.at for d in step.deadlines)
 
 
 def _note_progress(
-    watch: Watch,
-    step: Step,
+    monitor: StepMonitor,
+    step: TaskStep,
     meaning: Meaning,
-    seen: Sighting,
+    seen: ActionObservation,
     now: float,
     dt: float,
     settings: TaskSettings,
-) -> Watch:
+) -> StepMonitor:
     if not seen.observed:
         # Not seen is not "no": what was reached stays, the clocks stand still.
-        return replace(watch, unseen_since=_first(watch.unseen_since, now), better_since=None)
-    held, broken, ceased = watch.held_s, watch.broken_since, watch.ceased
+        return replace(monitor, unseen_since=_first(monitor.unseen_since, now), better_since=None)
+    held, broken, ceased = monitor.held_s, monitor.broken_since, monitor.ceased
     if seen.holds is Truth.TRUE:
         held, broken = held + dt, None
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
         if now - broken >= settings.gap_s:
-            held, ceased = 0.0, ceased or watch.fulfilled
+            held, ceased = 0.0, ceased or monitor.fulfilled
     helping = seen.helps is not None
     must = meaning.hold_s if step.hold_s is None else step.hold_s
     complete = held >= must - 1e-9
     if seen.over is not None:
         complete = seen.over is Truth.TRUE and (complete or step.hold_s is None)
     return replace(
-        watch,
-        begun=_first(watch.begun, now) if helping else watch.begun,
-        held=watch.held or seen.holds is Truth.TRUE,
+        monitor,
+        begun=_first(monitor.begun, now) if helping else monitor.begun,
+        held=monitor.held or seen.holds is Truth.TRUE,
         held_s=held,
         broken_since=broken,
-        fulfilled=watch.fulfilled or complete,
-        helped_by=seen.helps.name if seen.helps else watch.helped_by,
-        helped_since=seen.helps.since if seen.helps else watch.helped_since,
-        helped_at=now if helping else watch.helped_at,
-        better_since=_first(watch.better_since, now) if helping and not seen.contrary else None,
+        fulfilled=monitor.fulfilled or complete,
+        helped_by=seen.helps.name if seen.helps else monitor.helped_by,
+        helped_since=seen.helps.since if seen.helps else monitor.helped_since,
+        helped_at=now if helping else monitor.helped_at,
+        better_since=_first(monitor.better_since, now) if helping and not seen.contrary else None,
         ceased=ceased,
-        denied=watch.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
+        denied=monitor.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
         unseen_since=None,
         confidence=seen.helps.confidence if seen.helps else 1.0,
     )
 
 
-def _note_contrary(watch: Watch, seen: Sighting, now: float) -> Watch:
+def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
     """A contrary counts from when it was true within this step; holding outweighs it."""
     if not seen.observed:
-        return watch
-    if seen.contrary is None or (seen.holds is Truth.TRUE and not seen.stern):
-        return replace(watch, contrary=None, contrary_since=None)
-    since = max(watch.entered, seen.contrary.since)
-    if watch.contrary == seen.contrary.name and watch.contrary_since is not None:
-        since = min(since, watch.contrary_since)
+        return monitor
+    if seen.contrary is None or (seen.holds is Truth.TRUE and not seen.decisive):
+        return replace(monitor, contrary=None, contrary_since=None)
+    since = max(monitor.entered, seen.contrary.since)
+    if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:
+        since = min(since, monitor.contrary_since)
     confidence = seen.contrary.confidence
-    return replace(watch, contrary=seen.contrary.name, contrary_since=since, confidence=confidence)
+    return replace(
+        monitor, contrary=seen.contrary.name, contrary_since=since, confidence=confidence
+    )
 
 
-def _status(watch: Watch, seen: Sighting, now: float, settings: TaskSettings) -> Status:
-    if watch.late:
+def _status(
+    monitor: StepMonitor, seen: ActionObservation, now: float, settings: TaskSettings
+) -> Status:
+    if monitor.late:
         return Status.FAILED
     if not seen.observed:
-        return _status_unseen(watch, now, settings)
-    if _fails(watch, now, settings):
-        return Status.FAILED if _long_failing(watch, now, settings) else Status.FAILING
-    if watch.status in BAD and not _recovered(watch, now, settings):
-        return Status.FAILED if _long_failing(watch, now, settings) else watch.status
-    if watch.begun is None:
+        return _status_unseen(monitor, now, settings)
+    if _fails(monitor, now, settings):
+        return Status.FAILED if _long_failing(monitor, now, settings) else Status.FAILING
+    if monitor.status in BAD and not _recovered(monitor, now, settings):
+        return Status.FAILED if _long_failing(monitor, now, settings) else monitor.status
+    if monitor.begun is None:
         return Status.ACTIVE
-    stalled = watch.helped_at is not None and now - watch.helped_at >= settings.stalled_s
+    stalled = monitor.helped_at is not None and now - monitor.helped_at >= settings.stalled_s
     return Status.STALLED if stalled else Status.PROGRESSING
 
 
-def _status_unseen(watch: Watch, now: float, settings: TaskSettings) -> Status:
+def _status_unseen(monitor: StepMonitor, now: float, settings: TaskSettings) -> Status:
     """A failing stage stays so while it is not seen; any other becomes unknown after a while."""
-    lasting = watch.status in (Status.FAILING, Status.FAILED, Status.ACTIVE)
-    long = watch.unseen_since is not None and now - watch.unseen_since >= settings.unseen_s
-    return Status.UNKNOWN if long and not lasting else watch.status
+    lasting = monitor.status in (Status.FAILING, Status.FAILED, Status.ACTIVE)
+    long = monitor.unseen_since is not None and now - monitor.unseen_since >= settings.unseen_s
+    return Status.UNKNOWN if long and not lasting else monitor.status
 
 
-def _fails(watch: Watch, now: float, settings: TaskSettings) -> bool:
-    if watch.contrary_since is None:
+def _fails(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+    if monitor.contrary_since is None:
         return False
-    patience = settings.contrary_s if watch.begun is not None else settings.contrary_early_s
-    return now - watch.contrary_since >= patience - 1e-9
+    patience = settings.contrary_s if monitor.begun is not None else settings.contrary_early_s
+    return now - monitor.contrary_since >= patience - 1e-9
 
 
-def _long_failing(watch: Watch, now: float, settings: TaskSettings) -> bool:
-    if watch.status is Status.FAILED:
+def _long_failing(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+    if monitor.status is Status.FAILED:
         return True
-    return watch.status is Status.FAILING and now - watch.since >= settings.failed_s
+    return monitor.status is Status.FAILING and now - monitor.since >= settings.failed_s
 
 
-def _recovered(watch: Watch, now: float, settings: TaskSettings) -> bool:
+def _recovered(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
     """What failed for good goes on only when it has gone well for as long as that took."""
-    must = settings.failed_s if watch.status is Status.FAILED else settings.recover_s
-    return watch.better_since is not None and now - watch.better_since >= must
+    must = settings.failed_s if monitor.status is Status.FAILED else settings.recover_s
+    return monitor.better_since is not None and now - monitor.better_since >= must
 
 
 def _first(earlier: float | None, now: float) -> float:

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from visup.agent import Relation, Truth
 from visup.tasks.actions.vocabulary import OPPOSITE
-from visup.tasks.automaton.derivatives import Step
+from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.grammar.conditions import Both, Condition, Denied, Either
-from visup.tasks.grammar.nodes import Action, Comparison, Hold, Sign, Task
+from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
 from visup.tasks.grammar.structure import keyed
 from visup.tasks.grammar.units import value
-from visup.tasks.verification.observe import Relations, Sighting
+from visup.tasks.verification.observe import ActionObservation, RelationLookup
 
 FIRM = (Truth.FALSE, Truth.UNKNOWN, Truth.TRUE)
 """Kleene's strong logic: the least of a conjunction, the greatest of a disjunction."""
@@ -22,7 +22,7 @@ Holds = Callable[[str, tuple[str, ...]], Truth]
 
 
 @dataclass(frozen=True)
-class Conditions:
+class ConditionEvaluator:
     """The conditions of a task at one moment.
 
     Attributes:
@@ -33,7 +33,7 @@ class Conditions:
 
     task: Task
     holds: Holds
-    relations: Relations
+    relations: RelationLookup
 
     def truth(self, condition: Condition) -> Truth:
         """Whether a condition holds; unknown when what decides it was not observed."""
@@ -56,13 +56,13 @@ class Conditions:
         held = self.relations.time - found.since >= must - 1e-9
         return found if held else replace(found, truth=Truth.FALSE)
 
-    def apply(self, step: Step, seen: Sighting) -> Sighting:
+    def apply(self, step: TaskStep, seen: ActionObservation) -> ActionObservation:
         """A sighting with what the course itself says of the step in place of what its action says."""
-        for sign in step.signs:
+        for sign in step.conditions:
             seen = self._apply(sign, seen)
         return seen
 
-    def _apply(self, sign: Sign, seen: Sighting) -> Sighting:
+    def _apply(self, sign: StageCondition, seen: ActionObservation) -> ActionObservation:
         found = self.relation(sign.condition, sign.lasting)
         known = seen.observed or found.truth is not Truth.UNKNOWN
         true = found if found.truth is Truth.TRUE else None
@@ -75,4 +75,4 @@ class Conditions:
                 helps = seen.helps if seen.holds is Truth.TRUE else true
                 return replace(seen, helps=helps, observed=known)
             case "fails":
-                return replace(seen, contrary=true, stern=True, observed=known)
+                return replace(seen, contrary=true, decisive=True, observed=known)

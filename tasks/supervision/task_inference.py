@@ -6,8 +6,8 @@ ago makes room. Tasks that share an object are rivals: at most one of them is go
 is stays a rival until one has been believed; after that a task that goes badly is one that fails, not
 one that never was, unless a rival explains better what is seen.
 
-The approximation: evidence is taken along the likeliest reading of each task, not summed over all of
-them, and that a reading passed over a step is not held against its task; tasks that share no object are
+The approximation: evidence is taken along the likeliest hypothesis of each task, not summed over all of
+them, and that a hypothesis passed over a step is not held against its task; tasks that share no object are
 taken to be independent. So a task whose end alone is seen may be taken to be going on.
 """
 
@@ -29,7 +29,7 @@ IDLE = 3.0
 SURE = 0.9
 """Once some task is so likely to be going on, that none is is out of the question."""
 
-AUDIBLE = 0.3
+REPORTABLE = 0.3
 """A task less likely than this to be going on is not told about."""
 
 EXCLUDED = 0.05
@@ -37,7 +37,7 @@ EXCLUDED = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Activity:
+class TaskActivity:
     """What is believed of whether a task is going on.
 
     Attributes:
@@ -53,9 +53,9 @@ class Activity:
     ended: bool = False
 
     @property
-    def audible(self) -> bool:
+    def reportable(self) -> bool:
         """Whether it is likely enough to be told about."""
-        return self.chance >= AUDIBLE
+        return self.chance >= REPORTABLE
 
     @property
     def excluded(self) -> bool:
@@ -63,20 +63,20 @@ class Activity:
         return self.chance < EXCLUDED
 
 
-ALONE = Activity(MOST, 1.0, True)
+ALONE = TaskActivity(MOST, 1.0, True)
 """A task that is the only one given is taken to be going on."""
 
-ENDED = Activity(MOST, 1.0, True, True)
+ENDED = TaskActivity(MOST, 1.0, True, True)
 """A task that was going on, and is over."""
 
 
-def weighed(
-    before: Sequence[Activity],
+def updated_activities(
+    before: Sequence[TaskActivity],
     gains: Sequence[float],
     cast: Sequence[frozenset[int]],
     dt: float,
     over: Sequence[bool] | None = None,
-) -> tuple[Activity, ...]:
+) -> tuple[TaskActivity, ...]:
     """How likely each of several tasks is going on.
 
     Args:
@@ -93,18 +93,20 @@ def weighed(
     if len(before) == 1:
         return (ALONE,)
     ended = over or [False] * len(before)
-    found: dict[int, Activity] = {}
+    found: dict[int, TaskActivity] = {}
     for group in rivals(cast):
         open_ones = [k for k in group if not ended[k]]
         anew = any(ended[k] and not before[k].ended for k in group)
-        old = [Activity() if anew else before[k] for k in open_ones]
+        old = [TaskActivity() if anew else before[k] for k in open_ones]
         new = _rivalling(old, [gains[k] for k in open_ones], dt)
         found |= dict(zip(open_ones, new, strict=True))
         found |= {k: ENDED for k in group if ended[k]}
     return tuple(found[k] for k in range(len(before)))
 
 
-def _rivalling(before: Sequence[Activity], gains: Sequence[float], dt: float) -> Iterator[Activity]:
+def _rivalling(
+    before: Sequence[TaskActivity], gains: Sequence[float], dt: float
+) -> Iterator[TaskActivity]:
     """The same for rivals of which none has ended."""
     if not before:
         return
@@ -117,7 +119,7 @@ def _rivalling(before: Sequence[Activity], gains: Sequence[float], dt: float) ->
     chances = shares(evidence, none=not begun)
     begun = begun or sum(chances) >= SURE
     for e, chance in zip(evidence, chances, strict=True):
-        yield Activity(e, chance, begun)
+        yield TaskActivity(e, chance, begun)
 
 
 def _counted(gains: Sequence[float], begun: bool) -> Sequence[float]:
