@@ -38,7 +38,7 @@ from visup.agent import (
 from visup.agent.model.step import Step
 from visup.stepping.cursor import PausedStep, StepResult
 from visup.stepping.diff import MindChange, MindDiff
-from visup.stepping.explanations.evidence import Why, worded
+from visup.stepping.explanations.evidence import Why, percept_text
 from visup.terminal.narrator import event_row
 from visup.terminal.tables import (
     alert_line,
@@ -129,7 +129,7 @@ def _(record: Observation) -> RenderableType:
     for report in record.reports:
         branch = tree.add(Text(_report(report)))
         for percept in report.percepts[:12]:
-            branch.add(Text(worded(percept.value)))
+            branch.add(Text(percept_text(percept.value)))
         if more := len(report.percepts) - 12:
             branch.add(Text(f"and {more} more", style="dim")) if more > 0 else None
     return tree
@@ -142,7 +142,9 @@ def _report(r: Report) -> str:
 
 @shown.register
 def _(record: Report) -> RenderableType:
-    return Group(behaviours_table((record,)), *(Text(worded(p.value)) for p in record.percepts))
+    return Group(
+        behaviours_table((record,)), *(Text(percept_text(p.value)) for p in record.percepts)
+    )
 
 
 @shown.register
@@ -174,7 +176,7 @@ def _silhouette(region: Region, columns: int = 40) -> str:
 @shown.register
 def _(record: Percept) -> RenderableType:
     head = f"{record.kind} by {record.source} at {record.time:.2f} s, confidence {record.confidence:.2f}"
-    return Group(Text(head, style="bold"), Text(worded(record.value)))
+    return Group(Text(head, style="bold"), Text(percept_text(record.value)))
 
 
 @shown.register

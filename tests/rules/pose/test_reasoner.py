@@ -29,7 +29,7 @@ from visup.agent import (
 )
 from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
-from visup.rules.pose.reasoner import BelievePose, PoseSettings, pose_support, tracks
+from visup.rules.pose.reasoner import PoseReasoner, PoseSettings, pose_support, pose_tracks
 from visup.rules.presence.association import OWNERS
 
 REGION = Region(
@@ -56,7 +56,7 @@ def believed(
     times: Floats, told: Callable[[int], Said], mind: Mind | None = None
 ) -> Iterator[tuple[Mind, Pose | None]]:
     """Minds and poses after each look."""
-    mind, think = mind or one_object(), BelievePose()
+    mind, think = mind or one_object(), PoseReasoner()
     for k, time in enumerate(times.tolist()):
         mind = think(replace(mind, time=time), observation(told(k), time)).mind
         yield mind, mind.objects[1].pose
@@ -182,7 +182,7 @@ def test_nothing_said_is_nothing_known() -> None:
     times = np.arange(0.0, 3.0, 0.1)
     *_, (mind, pose) = believed(times, lambda k: ())
     assert pose is None
-    assert not tracks(mind)
+    assert not pose_tracks(mind)
     assert pose_support(mind, 1, "sat") == 1.0
 
 
@@ -206,7 +206,7 @@ def test_a_hypothesis_told_again_is_no_new_look() -> None:
     times = np.arange(0.0, 4.0, 0.04)
     said = (Hypothesis(1, "sat", 0, 0.8, 0.1, direction=(1.0, 0.0, 0.0)),)
     *_, (mind, pose) = believed(times, lambda k: said)
-    assert len(tracks(mind)[1].levels) == 1
+    assert len(pose_tracks(mind)[1].levels) == 1
     assert pose is not None
     assert pose.direction == pytest.approx((1.0, 0.0, 0.0))
 
@@ -224,7 +224,7 @@ def test_whatever_the_budget_nobody_waits_longer_than_it_takes_to_serve_all(
     count: int, most: int, seed: int
 ) -> None:
     rng, mind = np.random.default_rng(seed), many_objects(count)
-    think = BelievePose(PoseSettings(most_looks=most, every_s=0.0))
+    think = PoseReasoner(PoseSettings(most_looks=most, every_s=0.0))
     served: list[set[int]] = []
     for k in range(30):
         said = tuple(
@@ -233,7 +233,7 @@ def test_whatever_the_budget_nobody_waits_longer_than_it_takes_to_serve_all(
         )
         time = 0.04 * k
         mind = think(replace(mind, time=time), observation(said, time)).mind
-        served.append({i for i, t in tracks(mind).items() if t.time == time})
+        served.append({i for i, t in pose_tracks(mind).items() if t.time == time})
     rounds = -(-count // most)
     assert all(len(ids) == min(count, most) for ids in served)
     for k in range(30 - rounds + 1):
@@ -258,7 +258,7 @@ def test_memory_does_not_grow() -> None:
 
 
 def tracks_of(mind: Mind) -> list[object]:
-    track = tracks(mind)[1]
+    track = pose_tracks(mind)[1]
     levels = [dict(level) for level in track.levels]
     return [dict(track.trees), levels, dict(track.strain), track.settled, track.said]
 

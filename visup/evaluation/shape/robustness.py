@@ -18,7 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import VisupError
-from visup.evaluation.shape.corrupt import CORRUPTIONS, HARMLESS, LARGE, MASKS, odd_mask
+from visup.evaluation.shape.corrupt import (
+    CORRUPTIONS,
+    HARMLESS,
+    LARGE,
+    MASKS,
+    corrupt_file,
+    odd_mask,
+)
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.index.view_records import NewView
 from visup.percepts.shape.matching.shape_similarity import shape_of
