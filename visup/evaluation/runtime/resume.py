@@ -23,8 +23,8 @@ from rich.console import Console
 from visup.agent.model.errors import OutputError, SettingsError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text
 from visup.runs.resume import interrupted_run
-from visup.runs.runner import RunOptions, supervise
-from visup.runs.settings import WatchSettings
+from visup.runs.runner import Audience, supervise
+from visup.runs.settings import RunOptions, WatchSettings
 from visup.terminal.narrator import Narrator
 
 KILLED_AGAIN = 0.25
@@ -184,7 +184,8 @@ def _supervise(
 ) -> None:
     past = interrupted_run(folder) if resume else None
     options = RunOptions(video=False, report=False, state_every_s=every)
-    supervise(settings, folder, observers=[Narrator(console, True)], options=options, past=past)
+    audience = Audience([Narrator(console, True)])
+    supervise(settings, folder, audience=audience, options=options, past=past)
 
 
 def _forked(folder: Path, run: Callable[[Console], None]) -> int:
