@@ -102,11 +102,11 @@ def _codecs() -> str:
 
     import numpy as np
 
-    from visup.report.video import VideoWriter
+    from visup.report.video import WebmWriter
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "probe.webm"
-        writer = VideoWriter(path, 25.0)
+        writer = WebmWriter(path, 25.0)
         for _ in range(3):
             writer.write(np.zeros((48, 64, 3), np.uint8))
         writer.close()
