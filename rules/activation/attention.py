@@ -15,8 +15,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Directive, Mind, ObjectBelief, Observation, Outcome
+from visup.agent.model.memory import MemoryKey
 
-ATTENTION = "rules.attention"
+ATTENTION: MemoryKey[Mapping[int, tuple[str, float]]] = MemoryKey(
+    "rules.attention", MappingProxyType({})
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,7 @@ class AttentionReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[int, tuple[str, float]] = mind.memory.get(ATTENTION, MappingProxyType({}))
+        old = mind.recall(ATTENTION)
         since = {b.id: self._since(b, old, mind.time) for b in mind.objects.values()}
         wanted = {i for t in mind.tasks for e in t.expected for i in e.objects}
         resting = [

@@ -34,6 +34,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
@@ -46,8 +47,6 @@ from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics
 from visup.rules.wording.sentences import sentence
-
-COUPLING = "rules.coupling"
 
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
@@ -105,6 +104,11 @@ class CouplingEvidence:
     joint: RelativeTrack | None = None
 
 
+COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
+    "rules.coupling", MappingProxyType({})
+)
+
+
 NO_EVIDENCE = CouplingEvidence()
 
 
@@ -136,7 +140,7 @@ class CouplingReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[Pair, CouplingEvidence] = mind.memory.get(COUPLING, MappingProxyType({}))
+        old = mind.recall(COUPLING)
         coupled = {c.objects: c for c in mind.couplings}
         table = _table(mind)
         sights = _observed_pairs(table, mind)

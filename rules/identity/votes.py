@@ -45,13 +45,13 @@ from visup.agent import (
     Presence,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.mind import UNKNOWN_OBJECT
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 from visup.rules.wording.sentences import called, seems, spaced
 
-VOTES = "rules.votes"
 VoteCounts = tuple[tuple[str, float], ...]
 
 
@@ -125,6 +125,9 @@ class VoteMemory:
 
     time: float
     of: Mapping[int, ObjectVotes] = field(default_factory=lambda: MappingProxyType({}))
+
+
+VOTES: MemoryKey[VoteMemory | None] = MemoryKey("rules.votes", None)
 
 
 def weights(
@@ -241,7 +244,7 @@ class IdentityReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Count one step; see `Reasoner`."""
-        old: VoteMemory = mind.memory.get(VOTES, VoteMemory(observation.time))
+        old = mind.recall(VOTES) or VoteMemory(observation.time)
         dt = max(0.0, observation.time - old.time)
         said = hypotheses_by_object(mind, observation)
         ballots: dict[int, ObjectVotes] = {}

@@ -22,8 +22,9 @@ from visup.agent import (
     Region,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 
-OWNERS = "rules.objects"
+OWNERS: MemoryKey[Mapping[int, int]] = MemoryKey("rules.objects", MappingProxyType({}))
 KNOWN_KINDS = frozenset({"region", "hypothesis", "depth", "health"})
 
 
@@ -50,8 +51,7 @@ class ObjectSettings:
 
 def region_owners(mind: Mind) -> Mapping[int, int]:
     """Region id -> object id, for all regions that are remembered."""
-    found: Mapping[int, int] = mind.memory.get(OWNERS, MappingProxyType({}))
-    return found
+    return mind.recall(OWNERS)
 
 
 def hypotheses_by_object(

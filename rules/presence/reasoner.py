@@ -12,15 +12,12 @@ Each of these stands in a file of its own, in the order in which `PresenceReason
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome
-from visup.agent.model.fast_replace import replace
 from visup.rules.presence.fragments import (
     FRAGMENTS,
-    FragmentHypothesis,
     FragmentSettings,
     FragmentTest,
 )
@@ -58,7 +55,7 @@ class PresenceReasoner:
         old = presence_memory(mind)
         start = observation.time if old.start is None else old.start
         known = {i: t for i, t in old.of.items() if i in mind.objects}
-        doubts: Mapping[int, FragmentHypothesis] = mind.memory.get(FRAGMENTS, MappingProxyType({}))
+        doubts = mind.recall(FRAGMENTS)
         work = StepContext(mind, observation, known, doubts, self.settings)
         reidentify(work)
         merge(work)
@@ -69,12 +66,9 @@ class PresenceReasoner:
         update_visible(work)
         update_missing(work)
         kept = {i: t for i, t in work.of.items() if i in work.mind.objects}
-        told = {
-            TRACKS: PresenceMemory(start, MappingProxyType(kept)),
-            FRAGMENTS: MappingProxyType(dict(work.doubts)),
-        }
-        memory = MappingProxyType({**work.mind.memory, **told})
-        return Outcome(replace(work.mind, memory=memory), tuple(work.events))
+        mind = work.mind.remember(TRACKS, PresenceMemory(start, MappingProxyType(kept)))
+        mind = mind.remember(FRAGMENTS, MappingProxyType(dict(work.doubts)))
+        return Outcome(mind, tuple(work.events))
 
 
 def _update_tracks(work: StepContext) -> None:

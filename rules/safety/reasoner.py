@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Mind, Observation, Outcome, TaskBelief
+from visup.agent.model.memory import MemoryKey
 from visup.rules.formula.nodes import Rule
 from visup.rules.formula.units import ticks
 from visup.rules.monitoring.operators import SPACING
@@ -15,8 +16,6 @@ from visup.rules.predicates.snapshot import Facts
 from visup.rules.safety.alarm_condition import Held, stand
 from visup.rules.safety.compiled_rules import Key, Ruled, ruled
 from visup.rules.safety.verdicts import Values, rerowed
-
-SAFETY = "rules.safety"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,14 +45,22 @@ class Kept:
     cooling: Mapping[Key, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
+SAFETY = MemoryKey("rules.safety", Kept())
+
+
 @dataclass(frozen=True, slots=True)
 class RuleReasoner:
     """Reasoner of the cogitate phase, after relations and couplings.
 
     It sees the tasks as they stood after the step before, since tasks are matched later.
+
+    Attributes:
+        rules: What is watched.
+        memory: Its key; another reasoner of rules in the same agent needs one of its own.
     """
 
     rules: tuple[Rule, ...]
+    memory: MemoryKey[Kept] = SAFETY
     _prepared: Ruled = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -62,7 +69,7 @@ class RuleReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old, now = kept(mind), ticks(mind.time)
+        old, now = mind.recall(self.memory), ticks(mind.time)
         # To compare the trees costs more than all that is done with them.
         same = old.rules is self.rules or old.rules == self.rules
         if not same or (old.now is not None and now < old.now):
@@ -76,7 +83,7 @@ class RuleReasoner:
         values = Values(prepared, facts, now, before)
         held, cooling = stand(values, old.held, old.cooling, old.time)
         mind = mind.remember(
-            SAFETY,
+            self.memory,
             Kept(
                 self.rules,
                 now,
@@ -94,5 +101,4 @@ class RuleReasoner:
 
 def kept(mind: Mind) -> Kept:
     """What rules remember in a mind."""
-    found: Kept = mind.memory.get(SAFETY, Kept())
-    return found
+    return mind.recall(SAFETY)

@@ -164,7 +164,7 @@ def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
 
 def without_tasks(mind: Mind) -> Mind:
     """The mind as if no task had been supervised yet."""
-    memory = {k: v for k, v in mind.memory.items() if k != MEMORY}
+    memory = {k: v for k, v in mind.memory.items() if k != MEMORY.name}
     return replace(mind, tasks=(), memory=MappingProxyType(memory))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from visup.agent import Mind, ObjectBelief, Presence, Reasoner, Status, TaskBelief, Truth
 from visup.agent.model.errors import SettingsError
@@ -156,7 +156,7 @@ def presence_unmet(
 def identity_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Why:
     """Why an object was not identified."""
     belief = _belief(mind, object_id)
-    ballots: Any = mind.memory.get(VOTES, VoteMemory(mind.time))
+    ballots = mind.recall(VOTES) or VoteMemory(mind.time)
     ballot: ObjectVotes = ballots.of.get(object_id, ObjectVotes())
     s = (_first(reasoners, IdentityReasoner) or IdentityReasoner()).settings
     if ballot.told is not None and ballot.told == belief.name:
@@ -187,7 +187,7 @@ def coupling_unmet(mind: Mind, a: int, b: int, reasoners: Sequence[Reasoner]) ->
         return Why(f"objects {low} and {high} are coupled")
     couple = _first(reasoners, CouplingReasoner)
     s = couple.settings if couple else CouplingSettings()
-    pending: Any = mind.memory.get(COUPLING, {}).get((low, high))
+    pending = mind.recall(COUPLING).get((low, high))
     parts = []
     touching = mind.relation("touching", low, high)
     if touching is None or touching.truth is not Truth.TRUE:
