@@ -21,7 +21,6 @@ from visup.agent.contract.saving import Saveable
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
 from visup.agent.model.mind import (
-    AngularVelocity,
     Binding,
     Candidate,
     Coupling,
@@ -32,6 +31,7 @@ from visup.agent.model.mind import (
     Presence,
     Prospect,
     Question,
+    Spin,
     StageBelief,
     Status,
     TaskBelief,
@@ -77,7 +77,6 @@ __all__ = [
     "Agent",
     "Alert",
     "AlertCondition",
-    "AngularVelocity",
     "Behaviour",
     "Binding",
     "Candidate",
@@ -115,6 +114,7 @@ __all__ = [
     "Saveable",
     "Severity",
     "Snapshot",
+    "Spin",
     "StageBelief",
     "Status",
     "Step",
@@ -127,10 +127,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_LAZY[name]), name)
+if not TYPE_CHECKING:  # else every name would be there for checkers
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LAZY:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_LAZY[name]), name)
 
 
 _RECORDS = (
@@ -158,7 +160,7 @@ _RECORDS = (
     Relation,
     RelationTable,
     Report,
-    AngularVelocity,
+    Spin,
     StageBelief,
     TaskBelief,
     Zone,
