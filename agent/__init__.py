@@ -22,7 +22,6 @@ from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.mind import (
-    AngularVelocity,
     Binding,
     Candidate,
     Coupling,
@@ -33,6 +32,7 @@ from visup.agent.model.mind import (
     Presence,
     Prospect,
     Question,
+    Spin,
     StageBelief,
     Status,
     TaskBelief,
@@ -78,7 +78,6 @@ __all__ = [
     "Agent",
     "Alert",
     "AlertCondition",
-    "AngularVelocity",
     "Behaviour",
     "Binding",
     "Candidate",
@@ -117,6 +116,7 @@ __all__ = [
     "Saveable",
     "Severity",
     "Snapshot",
+    "Spin",
     "StageBelief",
     "Status",
     "Step",
@@ -129,10 +129,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_LAZY[name]), name)
+if not TYPE_CHECKING:  # else every name would be there for checkers
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LAZY:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_LAZY[name]), name)
 
 
 _RECORDS = (
@@ -160,7 +162,7 @@ _RECORDS = (
     Relation,
     RelationTable,
     Report,
-    AngularVelocity,
+    Spin,
     StageBelief,
     TaskBelief,
     Zone,

@@ -78,7 +78,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True)
-class AngularVelocity:
+class Spin:
     """How fast an object turns about itself.
 
     Attributes:
@@ -113,7 +113,7 @@ class Pose:
     rotation: float | None
     since: float
     confidence: float = 1.0
-    spin: AngularVelocity | None = None
+    spin: Spin | None = None
 
 
 @dataclass(frozen=True, slots=True)

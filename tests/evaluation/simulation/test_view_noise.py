@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from visup.agent import AngularVelocity, Pose
+from visup.agent import Pose, Spin
 from visup.agent.model.orientation import orientations, swing_and_roll
 from visup.evaluation.missions.pose_errors import spin_error, view_error
 from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
@@ -52,7 +52,7 @@ def test_errors_of_poses_are_measured_against_the_truth() -> None:
     true = -turns[20].as_matrix()[2]
     aside = Rotation.from_rotvec([0, np.radians(30), 0]).apply(true)
     x, y, z = aside.tolist()
-    pose = Pose("sat", 0, (x, y, z), 0.0, 0.0, spin=AngularVelocity(5.0, 0.1, (0, 1, 0)))
+    pose = Pose("sat", 0, (x, y, z), 0.0, 0.0, spin=Spin(5.0, 0.1, (0, 1, 0)))
     assert view_error(truth, {(20, "sat"): pose}) == pytest.approx(30.0, abs=0.5)
     assert spin_error(truth, {(20, "sat"): pose}) == pytest.approx(1.0, abs=1e-6)
     assert view_error(truth, {}) is None

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 from visup.agent import (
-    AngularVelocity,
     Candidate,
     Directive,
     Expectation,
@@ -16,6 +15,7 @@ from visup.agent import (
     Observation,
     Pose,
     Presence,
+    Spin,
     TaskBelief,
     Verdict,
 )
@@ -64,7 +64,7 @@ def test_who_is_known_rests_with_a_reason() -> None:
         replace(KNOWN, presence=Presence.LEFT),
         replace(
             KNOWN,
-            pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=AngularVelocity(9.0, 1.0, (0, 0, 1))),
+            pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=Spin(9.0, 1.0, (0, 0, 1))),
         ),
     ],
 )

@@ -14,7 +14,7 @@ from tests.rules.safety.test_reasoner import NAMES, believed
 from tests.rules.scenes import box_region, seen
 from visup.agent import Binding, Expectation, Mind, Observation, Outcome, TaskBelief, Verdict
 from visup.agent.model.errors import RuleError
-from visup.agent.model.mind import AngularVelocity, Pose, Zone
+from visup.agent.model.mind import Pose, Spin, Zone
 from visup.cli import app
 from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
@@ -218,7 +218,7 @@ def spinning(rate: float, sigma: float, expectations: tuple[Expectation, ...] = 
             (0.0, 0.0, 1.0),
             None,
             0.0,
-            spin=AngularVelocity(rate, sigma, (0.0, 1.0, 0.0)),
+            spin=Spin(rate, sigma, (0.0, 1.0, 0.0)),
         )
         task = TaskBelief("t", Verdict.IN_PROGRESS, expected=expectations)
         mind = replace(mind, time=1.0 + k / 25, tasks=(task,))
