@@ -72,7 +72,7 @@ def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> froze
 
 @dataclass(frozen=True, slots=True)
 class ActivationReasoner:
-    """Reasoner of the match phase, after the tasks: calls behaviours that are asleep else.
+    """Reasoner of the attend phase: calls behaviours that are asleep else.
 
     Attributes:
         rules: From `activation_rules`.

@@ -41,7 +41,7 @@ class AttentionSettings:
 
 @dataclass(frozen=True, slots=True)
 class AttentionReasoner:
-    """Reasoner of the match phase, after the tasks: says which regions need not be matched now."""
+    """Reasoner of the attend phase: says which regions need not be matched now."""
 
     settings: AttentionSettings = field(default_factory=AttentionSettings)
 

@@ -304,9 +304,7 @@ class Stepper(Timeline):
         Raises:
             VisupError: Nothing is known of it.
         """
-        reasoners = self.agent.reasoners
-        every = (*reasoners.update, *reasoners.cogitate, *reasoners.match)
-        return asking.why_not(self.mind, every, text)
+        return asking.why_not(self.mind, tuple(self.agent.reasoners), text)
 
     def close(self) -> None:
         """Let go of what the agent's behaviours have started."""
