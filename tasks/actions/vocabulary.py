@@ -18,7 +18,7 @@ from visup.rules.formula.units import ANGLE, LENGTH, SHARE, SPEED, TIME, TURNING
 from visup.rules.predicates.inputs_missing import blind
 from visup.rules.predicates.snapshot import MAYBE, NO, YES, Facts
 from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
-from visup.rules.relations.zones import asked, contains
+from visup.rules.relations.zones import contains, zone_truth
 from visup.tasks.actions.actions import ACTIONS, Meaning
 from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
 from visup.tasks.grammar.nodes import Action, Actors, Task, walk
@@ -191,7 +191,7 @@ def _zone_look(task: Task, name: str, zone: str) -> Look:
             within = contains(points, polygon)
             told = _truth(bool(within.all() if name == "wholly_inside" else within.any()))
         else:
-            told = asked(facts.mind, question, ids[0], zone)
+            told = zone_truth(facts.mind, question, ids[0], zone)
         return OPPOSITE[told] if name == "outside" else told
 
     return look

@@ -32,9 +32,9 @@ from visup.tasks.grammar.nodes import (
     Reference,
     Repeated,
     Sequence,
-    Sign,
     Span,
     Stage,
+    StageCondition,
     Task,
     Timed,
     Together,
@@ -212,10 +212,10 @@ class _ToTree(Transformer[Token, Any]):
     def deadline(self, items: list[Any]) -> Deadline:
         return Deadline(items[1], _over(_of(items[0]), items[1].span))
 
-    def sign(self, items: list[Any]) -> Sign:
+    def sign(self, items: list[Any]) -> StageCondition:
         kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
         lasting = items[2] if len(items) > 2 else None
-        return Sign(kind, items[1], lasting, _over(_of(items[0]), items[-1].span))
+        return StageCondition(kind, items[1], lasting, _over(_of(items[0]), items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:
         span = _over(_of(items[0]), _of(items[-1]))

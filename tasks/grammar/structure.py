@@ -118,7 +118,7 @@ def _names(task: Task, node: Course) -> tuple[str, ...]:
     match node:
         case Action() | Comparison():
             return keyed(task, node)[1]
-        case Judged(signs=signs):
+        case Judged(conditions=signs):
             facts = (f for s in signs for f in facts_of(s.condition))
             return tuple(a for f in facts for a in keyed(task, f)[1])
         case Reference(stage=name):

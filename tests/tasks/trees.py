@@ -26,8 +26,8 @@ from visup.tasks.grammar.nodes import (
     Reference,
     Repeated,
     Sequence,
-    Sign,
     Stage,
+    StageCondition,
     Task,
     Timed,
     Together,
@@ -63,7 +63,7 @@ def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]
 
 conditions = st.recursive(facts, _joined, max_leaves=4)
 kinds = st.sampled_from(["begins", "ends", "progresses", "fails"])
-signs = st.builds(Sign, kinds, conditions, st.none() | holds)
+signs = st.builds(StageCondition, kinds, conditions, st.none() | holds)
 
 
 def _several(inner: st.SearchStrategy[Course]) -> st.SearchStrategy[tuple[Course, ...]]:

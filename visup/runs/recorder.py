@@ -11,17 +11,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import visup
 from visup.agent import Concern, Frame, Severity, TaskBelief
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, Limits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
 from visup.agent.storage.jsonable import plain
-from visup.percepts.video import Source
+from visup.percepts.video import VideoSource
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
+from visup.version import __version__
 
 if TYPE_CHECKING:
     from visup.report.records import RunData
@@ -57,7 +57,7 @@ class Recorder:
     def __init__(
         self,
         settings: WatchSettings,
-        source: Source,
+        source: VideoSource,
         folder: Path,
         options: RunOptions,
         *,
@@ -70,7 +70,7 @@ class Recorder:
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
         self.journal = Journal(folder / JOURNAL, Limits(keep_bytes=keep), resume=resume)
         self.facts: dict[str, Any] = {
-            "visup": visup.__version__,
+            "visup": __version__,
             "source": source.name,
             "fps": source.fps,
             "size": source.size,

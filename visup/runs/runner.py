@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from visup.agent import Frame, Severity, Verdict
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
-from visup.percepts.video.live import LiveSource
-from visup.percepts.video.realtime import RealTime, in_real_time
+from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
@@ -104,12 +104,47 @@ def supervise(
     Raises:
         VisupError: Something given is not as it should be.
     """
-    audience = audience or Audience()
+    run = supervised(settings, folder, audience or Audience(), options, past)
+    while True:
+        try:
+            next(run)
+        except StopIteration as end:
+            result: RunResult = end.value
+            return result
+
+
+def supervised(
+    settings: WatchSettings,
+    folder: Path | None,
+    audience: Audience,
+    options: RunOptions | None = None,
+    past: InterruptedRun | None = None,
+) -> Generator[Step, None, RunResult]:
+    """As `supervise`, one step each time that it is asked for; the source is open when it returns.
+
+    A KeyboardInterrupt thrown in ends the run as stopped by the user, with verdict and report; a
+    generator that is merely closed leaves the run as one that was killed, to be resumed.
+    """
+    run = _supervised(settings, folder, audience, options or RunOptions(), past)
+    next(run)
+    return cast("Generator[Step, None, RunResult]", run)
+
+
+def _supervised(
+    settings: WatchSettings,
+    folder: Path | None,
+    audience: Audience,
+    options: RunOptions,
+    past: InterruptedRun | None,
+) -> Generator[Step | None, None, RunResult]:
+    """First None, once everything is open; then the steps."""
     with ExitStack() as stack:
-        run = _Run(settings, folder, options or RunOptions(), past, stack)
+        run = _Run(settings, folder, options, past, stack)
         frames = run.catch_up(past) if past else run.source
         run.connect(audience, past)
-        run.watch(run.timed(frames, past), audience.progress)
+        timed = run.timed(frames, past)
+        yield None
+        yield from run.watch(timed, audience.progress)
         return run.result()
 
 
@@ -140,7 +175,7 @@ class _Run:
         stack.callback(self._sinks.close)
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
         self._severity = _SeverityMonitor(past.grave if past else False)
-        self._pace: RealTime | None = None
+        self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
         self._stopped = False
         self._notes: tuple[str, ...] = ()
@@ -180,7 +215,7 @@ class _Run:
         self._faults.add_source(monotonic.runtime_faults)
         return monotonic
 
-    def watch(self, frames: Iterable[Frame], progress: Progress | None) -> None:
+    def watch(self, frames: Iterable[Frame], progress: Progress | None) -> Iterator[Step]:
         """Step through frames until they end or the user stops."""
         count = self.source.frame_count
         total = None if count is None else -(-count // self._settings.every)
@@ -193,6 +228,7 @@ class _Run:
                     )
                 if progress:
                     progress(self._steps, total)
+                yield step
         except KeyboardInterrupt:
             self._stopped = True
 

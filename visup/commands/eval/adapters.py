@@ -22,7 +22,7 @@ def shapes_closing(figures: Figures) -> Iterator[str]:
 def clips(names: list[str] | None, cache: Path, progress: Progress) -> Figures:
     """Rendered clips and their bars."""
     from visup.commands.render import needs_renderer
-    from visup.evaluation.motion.clips import evaluate_clips
+    from visup.evaluation.motion.rendered_clips import evaluate_clips
 
     needs_renderer()
     return evaluate_clips(cache, names or (), progress=progress)
@@ -74,8 +74,8 @@ def reasoning(
         from visup.evaluation.runtime.endurance import evaluate_endurance
 
         return evaluate_endurance(long, progress=progress)
-    from visup.evaluation.reasoning.reasoning import evaluate_reasoning
-    from visup.evaluation.simulation.truth_percepts import PerceptNoise
+    from visup.evaluation.reasoning.simulated_missions import evaluate_reasoning
+    from visup.evaluation.simulation.percepts import PerceptNoise
 
     noise = PerceptNoise(merge_coupled=merge)
     return evaluate_reasoning(folder, **settings, noise=noise, progress=progress)

@@ -41,7 +41,7 @@ EVALUATIONS = (
     Evaluation(
         "motion",
         "Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.",
-        "visup.evaluation.motion.motion:evaluate_motion",
+        "visup.evaluation.motion.runner:evaluate_motion",
         "segmenting",
         ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio"),
         (_LIMIT,),
@@ -50,7 +50,7 @@ EVALUATIONS = (
     Evaluation(
         "shapes",
         "Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time.",
-        "visup.evaluation.shape.shapes:evaluate_shapes",
+        "visup.evaluation.shape.retrieval:evaluate_shapes",
         "comparing",
         ("nn1", "rank_sum", "bullseye", "ms_shape", "ms_pair", "compared", "lost"),
         (_LIMIT,),
@@ -60,7 +60,7 @@ EVALUATIONS = (
     Evaluation(
         "missions",
         "Whole missions: identity, events, stages, alerts, verdicts, speed.",
-        "visup.evaluation.missions.missions:evaluate_missions",
+        "visup.evaluation.missions.runner:evaluate_missions",
         "supervising",
         (
             *("identity", "event_precision", "event_recall", "event_f1", "stage"),
@@ -74,7 +74,7 @@ EVALUATIONS = (
     Evaluation(
         "health",
         "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
-        "visup.evaluation.health.health:evaluate_health",
+        "visup.evaluation.health.runner:evaluate_health",
         "watching",
         (
             *("clips", "found", "named", "latency_s", "early"),
@@ -132,7 +132,7 @@ EVALUATIONS = (
     Evaluation(
         "views",
         "Views from unseen directions: clean, with contour noise, cut by a border, both.",
-        "visup.evaluation.shape.views:evaluate_views",
+        "visup.evaluation.shape.view_recognition:evaluate_views",
         "recognising",
         (),
         (
