@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Interval = tuple[float, float]
-Box = NDArray[np.float64]
+IntervalArray = NDArray[np.float64]
 """(2, ...) array: lower bounds, upper bounds."""
 
 UNKNOWN: Interval = (-inf, inf)
@@ -124,7 +124,7 @@ class Scalars:
 class Arrays:
     """(2, cells) arrays of intervals, one for each choice of objects."""
 
-    def constant(self, value: Interval) -> Box:
+    def constant(self, value: Interval) -> IntervalArray:
         """See `Algebra`."""
         return np.array(value).reshape(2, 1)
 
@@ -135,6 +135,6 @@ class Arrays:
     shifted: Any = staticmethod(np.add)
     tallied: Any = staticmethod(np.add)
 
-    def held(self, v: Box) -> Box:
+    def held(self, v: IntervalArray) -> IntervalArray:
         """See `Algebra`."""
         return np.array((v[0] > 0, v[1] >= 0), dtype=np.float64)

@@ -9,7 +9,7 @@ from typing import Any
 from visup.agent import Truth
 from visup.rules.formula.nodes import Formula
 from visup.rules.formula.units import TICKS, ticks
-from visup.rules.monitoring.compiler import Compiler, Step
+from visup.rules.monitoring.compiler import Compiler, Operation
 from visup.rules.monitoring.intervals import UNKNOWN, Interval, Scalars
 
 Signals = Mapping[str, float | Interval | None]
@@ -70,7 +70,7 @@ def verdict(interval: Interval) -> Truth:
     return Truth.FALSE if high < 0 else Truth.UNKNOWN
 
 
-def _run(step: Step, slot: int) -> Run:
+def _run(step: Operation, slot: int) -> Run:
     """How one step of a program is done."""
     one, other = (*step.reads, -1, -1)[:2]
     if step.operator is not None:
@@ -109,7 +109,7 @@ def _known(value: float | Interval | None) -> Interval:
     return value if isinstance(value, tuple) else (float(value), float(value))
 
 
-def _function(step: Step) -> Callable[..., Interval]:
+def _function(step: Operation) -> Callable[..., Interval]:
     """What a step does to the intervals of one moment."""
     a, numbers = _ON, (*step.numbers, 0.0, 0.0)
     first, second = numbers[:2]

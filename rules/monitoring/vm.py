@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from visup.compiled import compiled
 
 Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
+Ints = NDArray[np.int64]
 Codes = NDArray[np.int8]
 
 (OP, DEST, A, B, CELLS, STATE, MASK_A, MASK, AXIS, APART) = range(10)
@@ -35,7 +35,7 @@ CHOICE_BITS = 32
 
 @compiled
 def run(
-    code: Whole,
+    code: Ints,
     numbers: Floats,
     begin: int,
     end: int,
@@ -83,19 +83,19 @@ def run(
         elif op == NUMBER:
             arena[out], arena[out + 1] = p, p
         elif op == FACT:
-            _told(facts, code[i], n, arena)
+            _read_facts(facts, code[i], n, arena)
         elif op in (SPREAD, SOME, EVERY):
-            _along(code[i], n, arena)
+            _along_axis(code[i], n, arena)
         elif op >= ALWAYS:
-            if _kept(code[i], now, p, arena, before, after):
+            if _update_states(code[i], now, p, arena, before, after):
                 changed = True
         else:
-            _computed(op, c, a, b, p, out, arena)
+            _arithmetic(op, c, a, b, p, out, arena)
     return changed
 
 
 @compiled
-def _computed(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floats) -> None:
+def _arithmetic(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floats) -> None:
     """Arithmetic of quantities; what is no number is unknown, 0 times what is without end is 0."""
     for k in range(c):
         low, high = arena[a + k], arena[a + c + k]
@@ -130,7 +130,7 @@ def _product(p: float, q: float) -> float:
 
 
 @compiled
-def _told(facts: Codes, row: Whole, n: int, arena: Floats) -> None:
+def _read_facts(facts: Codes, row: Ints, n: int, arena: Floats) -> None:
     """What is true is [inf, inf], what is false [-inf, -inf]; the other way round if so asked."""
     c, out, turned = row[CELLS], row[DEST], row[AXIS]
     for k in range(c):
@@ -149,7 +149,7 @@ def _strides(mask: int, n: int) -> tuple[int, int, int]:
 
 
 @compiled
-def _along(row: Whole, n: int, arena: Floats) -> None:
+def _along_axis(row: Ints, n: int, arena: Floats) -> None:
     """The same intervals for more objects, on which they do not depend.
 
     Or the greatest (`exists`) or the least (`forall`) along an axis, of objects that are not left out.
@@ -181,8 +181,8 @@ def _along(row: Whole, n: int, arena: Floats) -> None:
 
 
 @compiled
-def _kept(
-    row: Whole, now: float, span: float, arena: Floats, before: Floats, after: Floats
+def _update_states(
+    row: Ints, now: float, span: float, arena: Floats, before: Floats, after: Floats
 ) -> bool:
     """One operator that keeps but a moment of each choice of objects."""
     op, c, out, a, b, changed = row[OP], row[CELLS], row[DEST], row[A], row[B], False
@@ -230,7 +230,7 @@ def _kept(
 
 
 @compiled
-def choices(rules: Whole, n: int, arena: Floats, found: Whole) -> int:
+def find_true(rules: Ints, n: int, arena: Floats, found: Ints) -> int:
     """Every choice of objects for which a rule is true and not suspended.
 
     Args:

@@ -23,19 +23,19 @@ from visup.tasks.grammar.nodes import (
     Choice,
     Clause,
     Comparison,
+    Conditioned,
     Counted,
     Course,
     Hold,
-    Judged,
     Reference,
     Repeated,
     Sequence,
-    Sign,
     Task,
     Timed,
     Together,
+    WhenClause,
 )
-from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 
 W = TypeVar("W")
@@ -77,10 +77,10 @@ class Step:
     stage: str
     hold_s: float | None = None
     deadlines: tuple[Due, ...] = ()
-    signs: tuple[Sign, ...] = ()
+    signs: tuple[WhenClause, ...] = ()
     inside: frozenset[str] = frozenset()
 
-    def sign(self, kind: str) -> Sign | None:
+    def sign(self, kind: str) -> WhenClause | None:
         """What the course says of how it begins, ends, progresses or fails, or None."""
         return next((s for s in self.signs if s.kind == kind), None)
 
@@ -105,7 +105,7 @@ class Todo:
     stage: str
     hold_s: float | None = None
     deadlines: tuple[Due, ...] = ()
-    signs: tuple[Sign, ...] = ()
+    signs: tuple[WhenClause, ...] = ()
     inside: frozenset[str] = frozenset()
 
 
@@ -229,7 +229,7 @@ def enter(
         case Timed(item=item, clauses=clauses):
             timed = _timed(task, replace(todo, course=item), clauses, now)
             yield from enter(task, timed, watch, now, depth)
-        case Judged(item=item, signs=signs):
+        case Conditioned(item=item, signs=signs):
             kinds = {s.kind for s in signs}
             kept = tuple(s for s in todo.signs if s.kind not in kinds)
             judged = replace(todo, course=item, signs=(*kept, *signs))
@@ -271,7 +271,7 @@ def moves(task: Task, state: State[W], watch: W, now: float) -> Iterator[Move[W]
 
 
 def _enter_fact(task: Task, todo: Todo, fact: Fact, watch: W) -> Iterator[State[W] | None]:
-    key, actors = keyed(task, fact)
+    key, actors = fact_key(task, fact)
     step = Step(key, actors, todo.stage, todo.hold_s, todo.deadlines, todo.signs, todo.inside)
     yield Leaf(step, watch)
     if any(task.actor(a).optional for a in actors):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from visup.agent import Status, TaskBelief, Verdict
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.derivatives import Step
 from visup.tasks.verification.verify import Watch
 
@@ -16,7 +16,9 @@ def names(words: Sequence[str]) -> str:
     return the[0] if len(the) == 1 else f"{', '.join(the[:-1])} and {the[-1]}"
 
 
-def evidence(step: Step, meaning: Meaning, watch: Watch, now: float, actions: Words) -> str:
+def evidence(
+    step: Step, meaning: ActionDefinition, watch: Watch, now: float, actions: Words
+) -> str:
     """Why a step stands as it does: one clause, without capital and full stop.
 
     Args:
@@ -53,7 +55,7 @@ def evidence(step: Step, meaning: Meaning, watch: Watch, now: float, actions: Wo
     return f"{who} should be {meaning.text}"
 
 
-def outcome(step: Step, meaning: Meaning, watch: Watch, now: float) -> tuple[Status, str]:
+def outcome(step: Step, meaning: ActionDefinition, watch: Watch, now: float) -> tuple[Status, str]:
     """How a step that has been left ended, and why.
 
     Returns:
@@ -90,7 +92,7 @@ def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
     return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
 
 
-Words = Mapping[str, Meaning]
+Words = Mapping[str, ActionDefinition]
 
 STAGE_WORDS = {
     "stage_started": "Stage `{stage}` of task `{task}` has begun",

@@ -25,8 +25,8 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning, known_actions
-from visup.tasks.actions.vocabulary import vocabulary
+from visup.tasks.actions.actions import ActionDefinition, known_actions
+from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, revised
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
@@ -61,7 +61,7 @@ SILENT_S = 0.2  # a task that is not told about is looked at no more often than 
 def task_reasoner(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
-    actions: Mapping[str, Meaning] | None = None,
+    actions: Mapping[str, ActionDefinition] | None = None,
 ) -> Reasoner:
     """The reasoner that supervises some tasks.
 
@@ -108,8 +108,10 @@ def finish(belief: TaskBelief) -> Verdict:
     return belief.verdict
 
 
-def _follower(task: Task, actions: Mapping[str, Meaning], settings: TaskSettings) -> Follower:
-    words = vocabulary(task, actions)
+def _follower(
+    task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
+) -> Follower:
+    words = task_vocabulary(task, actions)
     follower = Follower(task, words.meanings, settings, words.looks)
     follower.success(follower.start(0.0))  # so that no step has to work out the whole course
     return follower

@@ -8,11 +8,11 @@ from functools import cached_property
 from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
-from visup.rules.predicates.snapshot import Facts
-from visup.tasks.actions.actions import Meaning
-from visup.tasks.actions.vocabulary import Look
+from visup.rules.predicates.snapshot import Snapshot
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.actions.vocabulary import FactEvaluator
 
-NOTHING: Mapping[str, Look] = MappingProxyType({})
+NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NEVER: Mapping[str, float] = MappingProxyType({})
 
 
@@ -50,14 +50,14 @@ class Relations:
 
     Args:
         mind: The mind.
-        looks: Words and keys that are not plain relations of the mind (see `vocabulary`).
+        looks: Words and keys that are not plain relations of the mind (see `task_vocabulary`).
         before: Since when what `lasting` was told of has been true, by key.
     """
 
     def __init__(
         self,
         mind: Mind,
-        looks: Mapping[str, Look] = NOTHING,
+        looks: Mapping[str, FactEvaluator] = NOTHING,
         before: Mapping[str, float] = NEVER,
     ) -> None:
         self._mind = mind
@@ -94,8 +94,8 @@ class Relations:
         return self._mind.time
 
     @cached_property
-    def _facts(self) -> Facts:
-        return Facts(self._mind)
+    def _facts(self) -> Snapshot:
+        return Snapshot(self._mind)
 
     def _look(self, name: str, objects: tuple[int, ...]) -> Relation:
         key = (name, objects)
@@ -141,7 +141,9 @@ class Relations:
         return any(self.find(n, objects).truth is not Truth.UNKNOWN for n in names)
 
 
-def observe(meaning: Meaning, objects: tuple[int | None, ...], relations: Relations) -> Sighting:
+def observe(
+    meaning: ActionDefinition, objects: tuple[int | None, ...], relations: Relations
+) -> Sighting:
     """What is seen of an action.
 
     Args:
@@ -170,7 +172,7 @@ def observe(meaning: Meaning, objects: tuple[int | None, ...], relations: Relati
     )
 
 
-def _holds(meaning: Meaning, ids: tuple[int, ...], relations: Relations) -> Truth:
+def _holds(meaning: ActionDefinition, ids: tuple[int, ...], relations: Relations) -> Truth:
     """True when one of the relations is, false when all that are known are false."""
     if relations.first_true(meaning.holds, ids) is not None:
         return Truth.TRUE

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from visup.agent import Relation, Truth
 from visup.tasks.actions.vocabulary import OPPOSITE
 from visup.tasks.automaton.derivatives import Step
-from visup.tasks.grammar.conditions import Both, Condition, Denied, Either
-from visup.tasks.grammar.nodes import Action, Comparison, Hold, Sign, Task
-from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.conditions import And, Condition, Not, Or
+from visup.tasks.grammar.nodes import Action, Comparison, Hold, Task, WhenClause
+from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.verification.observe import Relations, Sighting
 
@@ -39,12 +39,12 @@ class Conditions:
         """Whether a condition holds; unknown when what decides it was not observed."""
         match condition:
             case Action() | Comparison():
-                return self.holds(*keyed(self.task, condition))
-            case Denied(item=item):
+                return self.holds(*fact_key(self.task, condition))
+            case Not(item=item):
                 return OPPOSITE[self.truth(item)]
-            case Both(parts=parts):
+            case And(parts=parts):
                 return min((self.truth(p) for p in parts), key=FIRM.index)
-            case Either(parts=parts):
+            case Or(parts=parts):
                 return max((self.truth(p) for p in parts), key=FIRM.index)
 
     def relation(self, condition: Condition, lasting: Hold | None) -> Relation:
@@ -62,7 +62,7 @@ class Conditions:
             seen = self._apply(sign, seen)
         return seen
 
-    def _apply(self, sign: Sign, seen: Sighting) -> Sighting:
+    def _apply(self, sign: WhenClause, seen: Sighting) -> Sighting:
         found = self.relation(sign.condition, sign.lasting)
         known = seen.observed or found.truth is not Truth.UNKNOWN
         true = found if found.truth is Truth.TRUE else None

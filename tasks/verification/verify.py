@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.derivatives import Step
 from visup.tasks.verification.observe import UNSEEN, Sighting
 from visup.tasks.verification.settings import TaskSettings
@@ -39,7 +39,7 @@ class Watch:
         ceased: Whether it once held and then was seen not to.
         unseen_since: Since when nothing is known about it, or None.
         denied: Whether what the course says of its end was last seen not to hold.
-        opened: Whether what the course says of its beginning was seen (see `Sign`).
+        opened: Whether what the course says of its beginning was seen (see `WhenClause`).
         confidence: Of the last sighting, 0 to 1.
     """
 
@@ -75,7 +75,7 @@ def entered(now: float) -> Watch:
 def update(
     watch: Watch,
     step: Step,
-    meaning: Meaning,
+    meaning: ActionDefinition,
     seen: Sighting,
     now: float,
     dt: float,
@@ -120,7 +120,7 @@ def update(
     )
 
 
-def over(watch: Watch, step: Step, meaning: Meaning) -> bool:
+def over(watch: Watch, step: Step, meaning: ActionDefinition) -> bool:
     """Whether a step is over by itself, whatever comes next."""
     told = step.hold_s is not None or step.sign("ends") is not None
     return watch.fulfilled and (not meaning.lasts or told)
@@ -134,7 +134,7 @@ def overdue(step: Step, now: float) -> bool:
 def _note_progress(
     watch: Watch,
     step: Step,
-    meaning: Meaning,
+    meaning: ActionDefinition,
     seen: Sighting,
     now: float,
     dt: float,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from visup.agent import Depth, Hypothesis, Observation, Percept, Region
 from visup.agent.model.notebook import showing
-from visup.rules.safety.explain import Explanation
+from visup.rules.safety.explain import RuleExplanation
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Why:
         return "\n".join(self.lines())
 
 
-def because(explained: Explanation) -> Why:
+def because(explained: RuleExplanation) -> Why:
     """What the rule language explains, as a tree of reasons."""
     return Why(explained.line(), tuple(because(p) for p in explained.parts))
 
