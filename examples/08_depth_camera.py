@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Contract, Depth, Directive, Frame, Observation, Percept
 from visup.agent.cycle.agent import Agent
-from visup.testing import crossing, stand_ins
+from visup.testing import crossing, stub_behaviours
 
 
 class StandIn:
@@ -53,7 +53,7 @@ class DepthCamera:
 
 if __name__ == "__main__":
     shots = crossing(10)
-    agent = Agent([*stand_ins(("region", "hypothesis"), shots), DepthCamera()])
+    agent = Agent([*stub_behaviours(("region", "hypothesis"), shots), DepthCamera()])
     for step in agent.steps(shot.frame for shot in shots):
         told = [f"region {d.region_id} at {d.depth:.1f} m" for d in step.observation.of("depth")]
         print(f"{step.time:4.2f} s  {', '.join(told)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from visup.runs.demo import demo_settings
 from visup.runs.wiring import build_agent, open_video
 from visup.stepping import Stepper
-from visup.stepping.what_if import IdentityIs
+from visup.stepping.what_if import AssumedIdentity
 
 if __name__ == "__main__":
     settings = demo_settings(every=4)
@@ -17,7 +17,7 @@ if __name__ == "__main__":
         it.break_at("identified")
         print("stopped:", *it.step(until="20.0").reasons)
         it.step(until="update")
-        print("inside frame", it.mind.frame_index, "after", it.midway and it.midway.phase.value)
+        print("inside frame", it.mind.frame_index, "after", it.paused and it.paused.phase.value)
 
         # Back, and forth again to the very same.
         first = it.back()
@@ -33,7 +33,7 @@ if __name__ == "__main__":
         print(it.why_not("stage captured"))
 
         # What if it were something else from here on? The course itself stays as it is.
-        branch = it.branch(IdentityIs(1, "spartan"))
+        branch = it.branch(AssumedIdentity(1, "spartan"))
         branch.step(10)
         changed = branch.compare()
         real = it.mind_at(branch.at)

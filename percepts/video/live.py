@@ -88,7 +88,7 @@ class LiveSource(Source):
             return None
         return frame
 
-    def troubles(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[Concern]:
         """Once after it came back: how long nothing was delivered."""
         while self._came_back:
             said = self._came_back.popleft()

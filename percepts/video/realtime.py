@@ -60,7 +60,7 @@ class RealTime(Iterator[Frame], ABC):
             self._recent.popleft()
         return frame
 
-    def troubles(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[Concern]:
         """That frames are dropped, while more than a tenth of those of late were."""
         lost = sum(missed for _, missed in self._recent)
         if lost < SHARE * (lost + len(self._recent)):

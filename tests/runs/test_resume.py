@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tests.paths import ROOT
 import itertools
 import sqlite3
 from collections.abc import Iterator
@@ -14,22 +13,23 @@ import numpy as np
 import pytest
 
 from tests.clips import moving_disc, write_clip
+from tests.paths import ROOT
 from tests.percepts.video.test_live import FakeCapture
 from visup.agent import Frame
+from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
 from visup.agent.storage.codec import packed
-from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.runs.operator import Operator
 from visup.percepts.video.live import LiveSource
-from visup.runs.replay import difference, recorded, replay, settings_for
-from visup.runs.resume import past_of
+from visup.runs.checkpoints import CHECKPOINT
+from visup.runs.monotonic_clock import MonotonicFrames
+from visup.runs.operator import HumanOperator
+from visup.runs.replay import recorded_transcript, replay, settings_for, transcript_diff
+from visup.runs.resume import interrupted_run
 from visup.runs.runner import RunOptions, fresh_folder, supervise
 from visup.runs.settings import WatchSettings
-from visup.runs.checkpoints import STATE
-from visup.runs.monotonic_clock import Steady
 
 BARE = RunOptions(video=False, report=False, state_every_s=0.2)
 
@@ -76,24 +76,24 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     options = RunOptions(video=False, report=False, state_every_s=every)
     broken_run(clip, parts, 27, options)
     if state == "damaged":
-        data = bytearray((parts / STATE).read_bytes())
+        data = bytearray((parts / CHECKPOINT).read_bytes())
         data[len(data) // 2] ^= 1
-        (parts / STATE).write_bytes(data)
-    past = past_of(parts)
+        (parts / CHECKPOINT).write_bytes(data)
+    past = interrupted_run(parts)
     assert (past.state is not None) == (state == "kept")
     result = supervise(past.settings, parts, options=options, past=past)
     assert outcome(parts) == outcome(whole)
     assert any("looked at again" in n for n in result.notes) == (state != "kept")
     assert any("check sum" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is over"):
-        past_of(parts)
+        interrupted_run(parts)
 
 
 def test_a_report_of_a_resumed_run_tells_the_whole(clip: WatchSettings, tmp_path: Path) -> None:
     pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
     options = RunOptions(video=False, state_every_s=0.2)
     broken_run(clip, tmp_path / "run", 30, options)
-    past = past_of(tmp_path / "run")
+    past = interrupted_run(tmp_path / "run")
     result = supervise(past.settings, tmp_path / "run", options=options, past=past)
     assert result.report is not None
     assert "40" in result.report.read_text()
@@ -102,7 +102,7 @@ def test_a_report_of_a_resumed_run_tells_the_whole(clip: WatchSettings, tmp_path
 
 def test_a_run_goes_on_only_with_its_own_video(clip: WatchSettings, tmp_path: Path) -> None:
     broken_run(clip, tmp_path / "run", 20, RunOptions(video=False, report=False, state_every_s=0))
-    past = past_of(tmp_path / "run")
+    past = interrupted_run(tmp_path / "run")
     other = write_clip(tmp_path / "short.avi", moving_disc(9))
     with pytest.raises(SourceError, match="not what was recorded"):
         supervise(WatchSettings(source=str(other)), tmp_path / "run", options=BARE, past=past)
@@ -114,12 +114,12 @@ def test_what_the_operator_said_is_remembered(clip: WatchSettings, tmp_path: Pat
     demo = ROOT / "visup" / "data" / "demo.models"
     settings = WatchSettings(clip.source, models=demo)
     folder = tmp_path / "whole"
-    told = Operator({1: "spartan"})
+    told = HumanOperator({1: "spartan"})
     supervise(settings, fresh_folder(folder, ""), operator=told, options=BARE)
     run = Recording.open(folder)
     (frame,) = run.answers()
     assert run.answers()[frame] == {1: "spartan"}
-    assert not difference(recorded(run), replay(run, settings_for(run)))
+    assert not transcript_diff(recorded_transcript(run), replay(run, settings_for(run)))
     parts = tmp_path / "parts"
 
     def pull(step: Step, frame: Frame) -> None:
@@ -129,17 +129,17 @@ def test_what_the_operator_said_is_remembered(clip: WatchSettings, tmp_path: Pat
     parts.mkdir()
     with pytest.raises(Pulled):
         supervise(settings, parts, operator=told, observers=[pull], options=BARE)
-    past = past_of(parts)
-    supervise(past.settings, parts, operator=Operator(), options=BARE, past=past)
+    past = interrupted_run(parts)
+    supervise(past.settings, parts, operator=HumanOperator(), options=BARE, past=past)
     assert outcome(parts) == outcome(folder)
 
 
 def test_a_folder_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no recorded run"):
-        past_of(tmp_path)
+        interrupted_run(tmp_path)
     Journal(tmp_path / JOURNAL).close()
     with pytest.raises(OutputError, match="nothing was recorded"):
-        past_of(tmp_path)
+        interrupted_run(tmp_path)
 
 
 def test_a_replay_tells_the_same_and_another_rule_is_seen(
@@ -148,19 +148,23 @@ def test_a_replay_tells_the_same_and_another_rule_is_seen(
     supervise(clip, fresh_folder(tmp_path / "run", ""), options=BARE)
     run = Recording.open(tmp_path / "run")
     again = replay(run, settings_for(run), fresh_folder(tmp_path / "again", ""))
-    assert not difference(recorded(run), again)
+    assert not transcript_diff(recorded_transcript(run), again)
     events = [(tmp_path / n / "events.jsonl").read_bytes() for n in ("run", "again")]
     assert events[0] == events[1] != b""
     rules = tmp_path / "own.rules"
     rules.write_text(
         'rule seen(a): warning\n    when in_view(a) > 0.2 s\n    say "{a} {is} seen."\n'
     )
-    warned = difference(recorded(run), replay(run, settings_for(run, rules=(rules,))))
+    warned = transcript_diff(
+        recorded_transcript(run), replay(run, settings_for(run, rules=(rules,)))
+    )
     assert warned.counts()["alerts"][1] > 0
     assert [e["data"]["alert_kind"] for e in warned.new if e["kind"] == "alert"] == ["seen"]
     strict = tmp_path / "strict.task"
     strict.write_text("<go> ::= <near>\n<near> ::= converging(arm, satellite)\n")
-    changed = difference(recorded(run), replay(run, settings_for(run, tasks=(str(strict),))))
+    changed = transcript_diff(
+        recorded_transcript(run), replay(run, settings_for(run, tasks=(str(strict),)))
+    )
     assert changed.verdicts[0] != changed.verdicts[1]
     bound = replace(settings_for(run), actors={"arm": ("a",), "crane": ("b",)})
     with monkeypatch.context() as patched:
@@ -203,7 +207,7 @@ def test_a_disk_that_is_full_for_a_while_is_told_and_nothing_is_lost(
     told = [e for e in run.events() if e["kind"] == "alert"]
     assert any("not being recorded" in e["text"] for e in told)
     again = replay(run, settings_for(run))
-    assert not difference(recorded(run), again)
+    assert not transcript_diff(recorded_transcript(run), again)
 
 
 def test_a_disk_that_stays_full_does_not_hide_the_verdict(
@@ -242,7 +246,7 @@ def test_a_camera_that_drops_comes_back_and_goes_on() -> None:
     troubles = []
     for frame in source:
         frames.append(frame)
-        troubles.append([c.kind for c in source.troubles()])
+        troubles.append([c.kind for c in source.runtime_faults()])
     assert [f.index for f in frames] == list(range(6))
     assert all(a.time < b.time for a, b in itertools.pairwise(frames))
     assert troubles == [[], [], [], ["source_dropped"], [], []]
@@ -266,7 +270,7 @@ def test_a_camera_run_goes_on_with_new_numbers_and_later_times(
     # This camera delivers all its frames at once; each is to be seen.
     broken_run(WatchSettings("0", realtime=False), tmp_path / "run", 27, stateless)
     before = {s["frame_index"]: s for s in Recording.open(tmp_path / "run").summaries()}
-    past = past_of(tmp_path / "run")
+    past = interrupted_run(tmp_path / "run")
     result = supervise(past.settings, tmp_path / "run", options=stateless, past=past)
     run = Recording.open(tmp_path / "run")
     steps = list(run.summaries())
@@ -299,11 +303,11 @@ def times(*given: float) -> Iterator[Frame]:
 def test_time_only_goes_on(
     given: tuple[float, ...], expected: tuple[float, ...], jumps: int
 ) -> None:
-    steady = Steady(times(*given), fps=10.0)
+    steady = MonotonicFrames(times(*given), fps=10.0)
     told: list[float] = []
     kinds: list[str] = []
     for frame in steady:
         told.append(frame.time)
-        kinds += [c.kind for c in steady.troubles()]
+        kinds += [c.kind for c in steady.runtime_faults()]
     assert told == pytest.approx(expected)
     assert kinds == ["clock_jumped"] * jumps

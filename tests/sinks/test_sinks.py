@@ -63,7 +63,7 @@ def test_a_slow_sink_holds_nobody_up_and_what_it_misses_is_counted_and_told() ->
         box.offer(n)
     assert time.perf_counter() - begin < 1.0
     assert box.dropped in (94, 95)  # one may be in the sink's hands already
-    (trouble,) = box.troubles()
+    (trouble,) = box.runtime_faults()
     assert (trouble.kind, trouble.key) == ("sink_failed", "slow:x")
     slow.gate.set()
     box.close()

@@ -14,7 +14,7 @@ from visup.agent.model.errors import RuleError, SettingsError, VisupError
 from visup.agent.model.step import Step
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.queries import explain
-from visup.stepping import stop_of
+from visup.stepping import parse_condition
 
 LONG = 100
 Scan = Callable[[Step | None, Step], bool]
@@ -166,8 +166,8 @@ def test_a_phase_breakpoint_stops_inside_every_step() -> None:
     places = []
     for _ in range(5):
         it.step(10)
-        assert it.midway is not None
-        places.append((it.at, it.midway.phase.value))
+        assert it.paused is not None
+        places.append((it.at, it.paused.phase.value))
     assert places == [(0, "update"), (0, "match"), (1, "update"), (1, "match"), (2, "update")]
 
 
@@ -212,12 +212,12 @@ BAD = {
 def test_what_cannot_be_meant_is_refused_in_words(text: str, said: str) -> None:
     mind = reasoning_course()[-1].mind
     with pytest.raises((SettingsError, RuleError, VisupError)) as fault:
-        stop_of(text, mind)
+        parse_condition(text, mind)
     assert said in str(fault.value)
 
 
 @pytest.mark.parametrize("text", [*SCANS, "change gap(1, 2)"])
 def test_a_condition_reads_its_own_text_back(text: str) -> None:
     mind = reasoning_course()[-1].mind
-    stop = stop_of(text, mind)
-    assert stop_of(stop.text, mind).text == stop.text
+    stop = parse_condition(text, mind)
+    assert parse_condition(stop.text, mind).text == stop.text

@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 
 from tests.stepping.timelines import reasoning_course
 from visup.agent import Truth
-from visup.stepping import MindDiff, difference
+from visup.stepping import MindDiff, mind_diff
 
 STEPS = st.integers(0, 59)
 
 
 def between(a: int, b: int) -> MindDiff:
     course = reasoning_course()
-    return difference(course[a].mind, course[b].mind)
+    return mind_diff(course[a].mind, course[b].mind)
 
 
 @given(a=STEPS, b=STEPS)
@@ -53,7 +53,7 @@ def test_what_appears_changes_and_goes_is_told() -> None:
 def test_of_relations_those_are_told_that_are_true_at_either_end() -> None:
     course = reasoning_course()
     a, b = course[20].mind, course[59].mind
-    told = {c.what for c in difference(a, b).about("relation")}
+    told = {c.what for c in mind_diff(a, b).about("relation")}
     true = [{(r.name, r.objects) for r in m.relations if r.truth is Truth.TRUE} for m in (a, b)]
     expected = {f"{n}({', '.join(map(str, o))})" for n, o in true[0] ^ true[1]}
     assert told >= expected

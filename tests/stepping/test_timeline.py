@@ -24,7 +24,7 @@ from visup.agent.contract.phases import Phase
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.stepping import Mark, Stepper
+from visup.stepping import Bookmark, Stepper
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ MOVES = st.lists(
 def test_every_way_to_a_step_leads_to_the_same_step(
     moves: Sequence[tuple[str, int | Phase]],
 ) -> None:
-    it, marks = plain_stepper(), list[Mark]()
+    it, marks = plain_stepper(), list[Bookmark]()
     for move, much in moves:
         walk(it, move, much, marks)
-        if it.at and it.midway is None:
+        if it.at and it.paused is None:
             assert told(it.last) == plain_course()[it.at - 1]
             assert it.mind is it.agent.mind
     it.go(it.made)
@@ -66,19 +66,19 @@ def test_every_way_to_a_step_leads_to_the_same_step(
     assert it.at == COUNT
 
 
-def walk(it: Stepper, move: str, much: int | Phase, marks: list[Mark]) -> None:
+def walk(it: Stepper, move: str, much: int | Phase, marks: list[Bookmark]) -> None:
     match move, much:
-        case "step", int():
+        case ["step", int()]:
             it.step(much)
-        case "back", int():
-            it.back(min(much, it.at + (it.midway is not None)))
-        case "go", int():
+        case ["back", int()]:
+            it.back(min(much, it.at + (it.paused is not None)))
+        case ["go", int()]:
             it.go(much)
-        case "phase", Phase():
+        case ["phase", Phase()]:
             it.step(until=much)
-        case "branch", int():
+        case ["branch", int()]:
             it.branch().step(much)
-        case "mark", _:
+        case ["mark", _]:
             marks.append(it.snapshot())
         case _ if marks:
             mark = marks[-1]
@@ -131,27 +131,27 @@ def test_a_half_made_step_can_be_looked_at_finished_and_left(phase: Phase) -> No
     stopped = it.step(until=phase)
     assert stopped.reasons == (f"after {phase.value}",)
     if phase is Phase.ACT:
-        assert (it.at, it.midway) == (4, None)
+        assert (it.at, it.paused) == (4, None)
         return
     assert it.at == 3
-    assert it.midway is not None
-    assert it.midway.phase is phase
+    assert it.paused is not None
+    assert it.paused.phase is phase
     counted = it.mind.memory["counting"]
     assert counted == (3 if phase is Phase.PERCEIVE else 4)
     assert it.agent.mind.memory["counting"] == 3
     assert told(it.step().step) == plain_course()[3]
     it.step(until=phase)
     assert told(it.back()) == plain_course()[3]
-    assert it.midway is None
+    assert it.paused is None
 
 
 def test_a_reasoner_that_raises_is_seen_inside_its_step() -> None:
     it = Stepper(Agent([], Reasoners(update=(counting, exploding_at(2)))), frames(5))
     it.step(2)
     stopped = it.step(until="update")
-    assert stopped.midway is not None
-    assert stopped.midway.thought is not None
-    assert [c.kind for c in stopped.midway.thought.concerns] == ["reasoning_failed"]
+    assert stopped.paused is not None
+    assert stopped.paused.thought is not None
+    assert [c.kind for c in stopped.paused.thought.concerns] == ["reasoning_failed"]
     step = it.step().step
     assert step is not None
     assert [a.kind for a in step.mind.alerts] == ["reasoning_failed"]

@@ -10,16 +10,16 @@ from visup.agent.model.errors import SettingsError
 from visup.rules.language.parser import parse_rules
 from visup.stepping import Stepper
 from visup.stepping.what_if import (
-    Belief,
-    IdentityIs,
-    PresenceIs,
-    RelationIs,
+    AssumedIdentity,
+    AssumedPresence,
+    AssumedRelation,
+    Assumption,
     with_relation,
     with_rules,
     with_tasks,
 )
 from visup.tasks import load_tasks
-from visup.terminal.what_if_commands import supposed
+from visup.terminal.what_if_commands import parse_assumption
 
 RULE = parse_rules('rule seen_one(a): info when seen(a) say "{a} is seen."')
 
@@ -33,18 +33,18 @@ def at(number: int = 30) -> Stepper:
 @pytest.mark.parametrize(
     "belief",
     [
-        RelationIs("touching", (1, 3), Truth.TRUE, 1.2),
-        RelationIs("coupled", (1, 2), Truth.TRUE, 1.2),
-        RelationIs("diverging", (1, 3), Truth.FALSE, 1.2),
-        RelationIs("converging", (3, 1), Truth.TRUE, 1.2),
-        RelationIs("touching", (1, 2), Truth.UNKNOWN, 1.2),
-        IdentityIs(2, "arm"),
-        IdentityIs(1, "unknown object"),
-        PresenceIs(3, Presence.LEFT),
-        PresenceIs(1, Presence.HIDDEN),
+        AssumedRelation("touching", (1, 3), Truth.TRUE, 1.2),
+        AssumedRelation("coupled", (1, 2), Truth.TRUE, 1.2),
+        AssumedRelation("diverging", (1, 3), Truth.FALSE, 1.2),
+        AssumedRelation("converging", (3, 1), Truth.TRUE, 1.2),
+        AssumedRelation("touching", (1, 2), Truth.UNKNOWN, 1.2),
+        AssumedIdentity(2, "arm"),
+        AssumedIdentity(1, "unknown object"),
+        AssumedPresence(3, Presence.LEFT),
+        AssumedPresence(1, Presence.HIDDEN),
     ],
 )
-def test_a_branch_holds_to_its_belief_and_the_course_stays(belief: Belief) -> None:
+def test_a_branch_holds_to_its_belief_and_the_course_stays(belief: Assumption) -> None:
     it = at()
     branch = it.branch(belief)
     assert is_so(branch, belief)
@@ -57,10 +57,10 @@ def test_a_branch_holds_to_its_belief_and_the_course_stays(belief: Belief) -> No
     assert real == list(reasoning_bytes()[30:50])
 
 
-def is_so(it: Stepper, belief: Belief) -> bool:
+def is_so(it: Stepper, belief: Assumption) -> bool:
     mind = it.mind
     match belief:
-        case RelationIs(name=name, objects=objects, truth=truth, since=since):
+        case AssumedRelation(name=name, objects=objects, truth=truth, since=since):
             found = mind.relation(name, *objects)
             coupled = name != "coupled" or mind.coupled(*objects) is (truth is Truth.TRUE)
             measured = truth is not Truth.TRUE  # what is measured so anyway has its own time
@@ -70,9 +70,9 @@ def is_so(it: Stepper, belief: Belief) -> bool:
                 and coupled
                 and (measured or found.since == since)
             )
-        case IdentityIs(object_id=number, name=name):
+        case AssumedIdentity(object_id=number, name=name):
             return (mind.objects[number].name, mind.objects[number].confidence) == (name, 1.0)
-        case PresenceIs(object_id=number, presence=presence):
+        case AssumedPresence(object_id=number, presence=presence):
             return mind.objects[number].presence is presence
     return False
 
@@ -137,18 +137,18 @@ def test_a_relation_is_replaced_and_no_other() -> None:
 
 
 GOOD = {
-    "touching 1 2": RelationIs("touching", (1, 2), Truth.TRUE, 2.36),
-    "relation touching(2, 1) false": RelationIs("touching", (2, 1), Truth.FALSE, 2.36),
-    "object 2 arm": IdentityIs(2, "arm"),
-    "object 1 satellite": IdentityIs(1, "spartan"),
-    "object 3 hidden": PresenceIs(3, Presence.HIDDEN),
-    "object 1 unknown": IdentityIs(1, "unknown object"),
+    "touching 1 2": AssumedRelation("touching", (1, 2), Truth.TRUE, 2.36),
+    "relation touching(2, 1) false": AssumedRelation("touching", (2, 1), Truth.FALSE, 2.36),
+    "object 2 arm": AssumedIdentity(2, "arm"),
+    "object 1 satellite": AssumedIdentity(1, "spartan"),
+    "object 3 hidden": AssumedPresence(3, Presence.HIDDEN),
+    "object 1 unknown": AssumedIdentity(1, "unknown object"),
 }
 
 
 @pytest.mark.parametrize("text", list(GOOD))
 def test_beliefs_can_be_told_in_words(text: str) -> None:
-    assert supposed(reasoning_course()[-1].mind, text.split()) == GOOD[text]
+    assert parse_assumption(reasoning_course()[-1].mind, text.split()) == GOOD[text]
 
 
 @pytest.mark.parametrize(
@@ -167,13 +167,15 @@ def test_beliefs_can_be_told_in_words(text: str) -> None:
 )
 def test_what_is_no_belief_is_refused_in_words(text: str, said: str) -> None:
     with pytest.raises(SettingsError) as fault:
-        supposed(reasoning_course()[-1].mind, text.split())
+        parse_assumption(reasoning_course()[-1].mind, text.split())
     assert said in str(fault.value)
 
 
 def test_a_belief_is_retracted() -> None:
     mind = reasoning_course()[-1].mind
-    assert supposed(mind, ["touching", "1", "2"], retract=True) == RelationIs(
+    assert parse_assumption(mind, ["touching", "1", "2"], retract=True) == AssumedRelation(
         "touching", (1, 2), Truth.UNKNOWN, mind.time
     )
-    assert supposed(mind, ["object", "1"], retract=True) == IdentityIs(1, "unknown object")
+    assert parse_assumption(mind, ["object", "1"], retract=True) == AssumedIdentity(
+        1, "unknown object"
+    )

@@ -13,7 +13,7 @@ from visup.evaluation.runtime.soak import scripted
 from visup.evaluation.runtime.stepping import whole
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
-from visup.stepping import GivenFeed, Stepper
+from visup.stepping import ScriptedObservations, Stepper
 
 COUNT = 60
 SETTINGS = WatchSettings(
@@ -41,7 +41,7 @@ def plain_stepper(count: int = COUNT) -> Stepper:
 
 def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> Stepper:
     """Three bodies that are recognised, a task, the shipped rules."""
-    feed = GivenFeed(scripted(count))
+    feed = ScriptedObservations(scripted(count))
     return Stepper(reasoning_agent(SETTINGS), feed, spacing=spacing, latest=latest)
 
 

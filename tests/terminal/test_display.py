@@ -30,7 +30,7 @@ def records() -> list[object]:
         *(step.observation.of("region")[0], step.observation.of("hypothesis")[0]),
         *(step.observation.of("depth")[0], Frame(3, 0.1, np.zeros((4, 6, 3), np.uint8))),
         *(Directive("look_at", "It went there.", {"bbox": (1, 2, 3, 4)}), it.diff(3, 30), stopped),
-        *(halted, halted.midway, it.why("alert 1"), it.diff(3, 30).changes[0]),
+        *(halted, halted.paused, it.why("alert 1"), it.diff(3, 30).changes[0]),
         Percept("lamp", {"on": True, "image": np.zeros((9, 9))}, 0.1, "lamp"),
         Report("lamp", ReportState.FAILED, ("lamp",), (), "ValueError: broken"),
     ]

@@ -16,7 +16,7 @@ def event(text: str, severity: Severity = Severity.INFO, kind: str = "entry") ->
 def printed(*events: Event) -> str:
     out = io.StringIO()
     for it in events:
-        Narrator(Console(file=out, width=80)).tell(it)
+        Narrator(Console(file=out, width=80)).print_event(it)
     return out.getvalue()
 
 

@@ -17,7 +17,7 @@ from visup.agent.storage.jsonable import plain
 from visup.cli import app
 from visup.evaluation.runtime.soak import scripted
 from visup.runs.wiring import reasoning_agent
-from visup.stepping import GivenFeed
+from visup.stepping import ScriptedObservations
 from visup.terminal.prompt import completions, toolbar
 from visup.terminal.session import HELP, Session
 from visup.terminal.session_commands import COMMANDS
@@ -74,7 +74,11 @@ def test_the_end_of_the_source_is_told() -> None:
 
 def reasoning_session(width: int = 80) -> tuple[Session, io.StringIO]:
     out = io.StringIO()
-    it = Session(reasoning_agent(SETTINGS), GivenFeed(scripted(60)), Console(file=out, width=width))
+    it = Session(
+        reasoning_agent(SETTINGS),
+        ScriptedObservations(scripted(60)),
+        Console(file=out, width=width),
+    )
     return it, out
 
 

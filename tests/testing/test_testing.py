@@ -19,9 +19,9 @@ from visup.testing import (
     Scripted,
     ScriptedSource,
     check_behaviour,
+    check_results,
     crossing,
     disc,
-    findings,
     flat,
     region_of,
 )
@@ -88,7 +88,7 @@ class Held:
 
 
 def test_what_cannot_be_sent_to_its_process_is_found() -> None:
-    failed = [f.check for f in findings(Held) if not f.passed]
+    failed = [f.check for f in check_results(Held) if not f.passed]
     assert failed == ["can be sent to a process of its own"]
 
 
@@ -108,7 +108,7 @@ def test_what_is_needed_comes_from_what_is_true() -> None:
         return len(seen.of("region")) + len(seen.of("smell"))
 
     needy = plug(count, needs=("region", "smell"))
-    found = findings(needy, provide={"smell": lambda frame: "roses"})
+    found = check_results(needy, provide={"smell": lambda frame: "roses"})
     assert all(f.passed for f in found)
     assert any(f.detail.endswith("percepts: x") for f in found)
 

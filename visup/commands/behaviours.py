@@ -133,12 +133,12 @@ def _offers(where: str) -> list[Offer]:
 
 
 def _check(console: Console, offer: Offer, values: dict[str, dict[str, object]]) -> bool:
-    from visup.testing import findings
+    from visup.testing import check_results
 
     name = offer.contract.name if offer.contract else offer.where
     given = values.get(name, {})
     offer.make(given)  # what cannot be made at all is an error, not a finding
-    found = findings(lambda: offer.make(given))
+    found = check_results(lambda: offer.make(given))
     console.print(f"{name} ({offer.where})", markup=False, style="bold")
     for finding in found:
         mark = "[green]ok[/green]    " if finding.passed else "[red]failed[/red]"

@@ -28,7 +28,7 @@ EXTRAS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class CheckedPart:
     """One line of the doctor's list.
 
     Attributes:
@@ -57,14 +57,14 @@ def doctor() -> None:
         raise typer.Exit(2)
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[CheckedPart]:
     """Look at Python, the libraries, the extras, the codecs and the shipped files."""
     import platform
 
     import visup
 
-    yield Finding("visup", "ok", visup.__version__)
-    yield Finding("Python", "ok", platform.python_version())
+    yield CheckedPart("visup", "ok", visup.__version__)
+    yield CheckedPart("Python", "ok", platform.python_version())
     for name in CORE:
         yield _library(name, None)
     for extra, names in EXTRAS.items():
@@ -76,24 +76,24 @@ def examine() -> Iterator[Finding]:
     yield _tried("demo clip", _demo)
 
 
-def _library(name: str, extra: str | None) -> Finding:
+def _library(name: str, extra: str | None) -> CheckedPart:
     from importlib.metadata import PackageNotFoundError, version
 
     label = f"{name} ({extra})" if extra else name
     try:
-        return Finding(label, "ok", version(name))
+        return CheckedPart(label, "ok", version(name))
     except PackageNotFoundError:
         if extra:
-            return Finding(label, "missing", f"pip install 'visup[{extra}]'")
-        return Finding(label, "broken", f"pip install {name}")
+            return CheckedPart(label, "missing", f"pip install 'visup[{extra}]'")
+        return CheckedPart(label, "broken", f"pip install {name}")
 
 
-def _tried(what: str, look: Callable[[], str]) -> Finding:
+def _tried(what: str, look: Callable[[], str]) -> CheckedPart:
     """What a look says; whatever it raises is a finding, since finding faults is its purpose."""
     try:
-        return Finding(what, "ok", look())
+        return CheckedPart(what, "ok", look())
     except Exception as fault:
-        return Finding(what, "broken", f"{type(fault).__name__}: {fault}")
+        return CheckedPart(what, "broken", f"{type(fault).__name__}: {fault}")
 
 
 def _codecs() -> str:

@@ -12,7 +12,7 @@ from visup.commands.watch import Actors, Rules, Tasks, Zones
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from visup.runs.replay import Difference, Told
+    from visup.runs.replay import Transcript, TranscriptDiff
 
 
 def replay(
@@ -40,7 +40,7 @@ def replay(
     from rich.console import Console
 
     from visup.agent.storage.journal_reader import Recording
-    from visup.runs.replay import difference, recorded, settings_for
+    from visup.runs.replay import recorded_transcript, settings_for, transcript_diff
     from visup.runs.replay import replay as reason_again
     from visup.runs.runner import fresh_folder
     from visup.runs.settings import parse_actors
@@ -62,7 +62,7 @@ def replay(
         recording,
         settings,
         folder,
-        None if quiet or other else lambda step: narrator.tell_all(step.events),
+        None if quiet or other else lambda step: narrator.print_events(step.events),
     )
     console.print(_speed(told), style="dim")
     if other is None:
@@ -70,18 +70,18 @@ def replay(
 
         console.print(verdict_line(Verdict(told.verdict) if told.verdict else None))
         raise typer.Exit(int(told.failed))
-    changed = difference(recorded(other), told)
+    changed = transcript_diff(recorded_transcript(other), told)
     for text in _lines(changed, quiet):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(int(bool(changed)))
 
 
-def _speed(told: Told) -> str:
+def _speed(told: Transcript) -> str:
     rate = told.steps / told.seconds if told.seconds else 0.0
     return f"{told.steps} frames reasoned about again in {told.seconds:.1f} s ({rate:.0f} a second)"
 
 
-def _lines(changed: Difference, quiet: bool) -> Iterator[str]:
+def _lines(changed: TranscriptDiff, quiet: bool) -> Iterator[str]:
     if not changed:
         yield "Nothing changes."
         return

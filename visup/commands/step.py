@@ -29,7 +29,7 @@ from visup.commands.watch import (
 if TYPE_CHECKING:
     from visup.agent.cycle.agent import Agent
     from visup.runs.settings import WatchSettings
-    from visup.stepping import Feed
+    from visup.stepping import ObservationSource
 
 
 def step(
@@ -86,13 +86,13 @@ _AGAIN = ("source", "task", "rules", "actor", "zones")
 """What a recorded run can be reasoned about again with."""
 
 
-def _recorded(given: dict[str, Any]) -> tuple[Agent, Feed]:
+def _recorded(given: dict[str, Any]) -> tuple[Agent, ObservationSource]:
     from visup.agent.model.errors import SettingsError
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import settings_for
     from visup.runs.settings import parse_actors
     from visup.runs.wiring import reasoning_agent
-    from visup.stepping import RecordedFeed
+    from visup.stepping import RecordedObservations
 
     beyond = [k for k, v in given.items() if k not in _AGAIN and v not in (None, [], 1, False)]
     if beyond:
@@ -108,4 +108,4 @@ def _recorded(given: dict[str, Any]) -> tuple[Agent, Feed]:
         actors=parse_actors(given["actor"] or ()),
         zones=given["zones"],
     )
-    return reasoning_agent(settings), RecordedFeed(recording)
+    return reasoning_agent(settings), RecordedObservations(recording)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from visup.runs.resume import Past
+    from visup.runs.resume import InterruptedRun
     from visup.runs.runner import Progress, RunOptions, RunResult
     from visup.runs.settings import WatchSettings
 
@@ -220,7 +220,7 @@ def watch(
             attention,
             realtime,
         )
-    result = run_and_tell(
+    result = run_and_report(
         settings,
         out,
         quiet=quiet,
@@ -238,17 +238,17 @@ def _answers(given: list[str], path: Path | None) -> dict[int, str]:
     return {**(read_answers(path) if path else {}), **parse_answers(given)}
 
 
-def _past(run: Path, *given: object) -> tuple[WatchSettings, Past]:
+def _past(run: Path, *given: object) -> tuple[WatchSettings, InterruptedRun]:
     """The run that goes on; what it is about was settled when it began."""
     from visup.agent.model.errors import SettingsError
-    from visup.runs.resume import past_of
+    from visup.runs.resume import interrupted_run
 
     if any(given):
         raise SettingsError(
             "a run goes on as it was begun: --resume takes no source, task or other settings",
             hint=f"visup watch --resume {run}",
         )
-    past = past_of(run)
+    past = interrupted_run(run)
     return past.settings, past
 
 
@@ -262,14 +262,14 @@ def demo(
     """
     from visup.runs.demo import demo_settings, free_folder
 
-    result = run_and_tell(demo_settings(every), out or free_folder(Path("demo-run")))
+    result = run_and_report(demo_settings(every), out or free_folder(Path("demo-run")))
     # The clip shows a failed capture: having seen that is the demo's success.
     from visup.agent import Verdict
 
     raise typer.Exit(0 if result.verdict is Verdict.FAILED else 1)
 
 
-def run_and_tell(
+def run_and_report(
     settings: WatchSettings,
     out: Path | None,
     *,
@@ -277,13 +277,13 @@ def run_and_tell(
     as_json: bool = False,
     answers: dict[int, str] | None = None,
     options: RunOptions | None = None,
-    past: Past | None = None,
+    past: InterruptedRun | None = None,
 ) -> RunResult:
     """Run, print the narrative as it goes and the verdict last."""
     from rich.console import Console
     from rich.markup import escape
 
-    from visup.runs.operator import Operator, typed_lines
+    from visup.runs.operator import HumanOperator, typed_lines
     from visup.runs.runner import fresh_folder, supervise
     from visup.terminal.narrator import Narrator
 
@@ -293,7 +293,7 @@ def run_and_tell(
     silent = quiet or as_json
     # Whoever reads events from a pipe does not type answers.
     typed = None if silent or not console.is_terminal else typed_lines()
-    operator = Operator(answers or {}, typed, console.print)
+    operator = HumanOperator(answers or {}, typed, console.print)
     with progress_bar(console, "watching", shown=not silent) as progress:
         result = supervise(
             settings,

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import visup
-from visup.agent.model.step import Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
+from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import StateError, frozen, thawed
 
-STATE = "state.bin"
+CHECKPOINT = "state.bin"
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class Checkpoint:
     """A run after one of its steps.
 
     Attributes:
@@ -32,7 +32,7 @@ class State:
     kept: Mapping[str, Any]
 
 
-class StateKeeper:
+class CheckpointWriter:
     """Keeps the latest state in a file, which is replaced as a whole; the disk is waited for elsewhere.
 
     Args:
@@ -47,7 +47,7 @@ class StateKeeper:
     def __init__(self, folder: Path, every_s: float) -> None:
         self.note: str | None = None
         self.largest = 0
-        self._path = folder / STATE
+        self._path = folder / CHECKPOINT
         self._every_s = every_s
         self._last: float | None = None
         self._disk = ThreadPoolExecutor(max_workers=1, thread_name_prefix="state")
@@ -92,17 +92,17 @@ class StateKeeper:
         )
 
 
-def read_state(folder: Path) -> tuple[State | None, str | None]:
+def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
     """The state in a run folder.
 
     Returns:
         It, or None when there is none that can be used, and then why, when there is one.
     """
     try:
-        told = thawed((folder / STATE).read_bytes())
+        told = thawed((folder / CHECKPOINT).read_bytes())
         if told["visup"] != visup.__version__:
             return None, f"its state is of visup {told['visup']}"
-        return State(int(told["frame_index"]), told["agent"], told["kept"]), None
+        return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None
     except FileNotFoundError:
         return None, None
     except (OSError, OutputError, KeyError, TypeError, ValueError) as fault:

@@ -10,7 +10,7 @@ from visup.agent import Concern, Frame, Severity
 NAME = "clock"
 
 
-class Steady:
+class MonotonicFrames:
     """Frames whose times always grow; those that do not are put one frame after the one before.
 
     Args:
@@ -41,7 +41,7 @@ class Steady:
         self._last = time
         return frame if time == frame.time else Frame(frame.index, time, frame.image)
 
-    def troubles(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[Concern]:
         """Once after a jump: that there was one."""
         said, self._said = self._said, None
         if said:

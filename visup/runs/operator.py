@@ -14,10 +14,10 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 from visup.agent import Frame, Mind
-from visup.agent.model.step import Observer, Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.cycle.answers import model_named
 from visup.agent.model.errors import SettingsError, VisupError
+from visup.agent.model.step import Observer, Step
 
 
 def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, str]:
@@ -85,7 +85,7 @@ def _taken(queue: SimpleQueue[str]) -> list[str]:
 
 
 @dataclass(slots=True)
-class Operator:
+class HumanOperator:
     """Hands answers to an agent.
 
     Attributes:

@@ -9,7 +9,7 @@ from visup.agent.plugins.registry import discover
 from visup.runs.settings import WatchSettings
 
 
-def plug_ins(settings: WatchSettings) -> list[Behaviour]:
+def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
     """The behaviours that a run adds to those of visup: installed ones, then those of files and modules.
 
     Raises:

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import visup
 from visup.agent import Concern, Frame, Severity, TaskBelief
-from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import plain
 from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, Limits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
+from visup.agent.storage.jsonable import plain
 from visup.percepts.video import Source
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
@@ -109,7 +109,7 @@ class Recorder:
         """Take note of a step that the journal holds already."""
         self._derive(step, frame, ["report"])
 
-    def troubles(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[Concern]:
         """What is wrong with recording now."""
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
@@ -207,7 +207,7 @@ class Recorder:
         )
 
 
-def kept_of(recorder: Recorder | None) -> Mapping[str, Any]:
+def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:
     """What a recorder remembers besides the journal, for the state of a run."""
     return recorder.collector.save() if recorder else {}
 

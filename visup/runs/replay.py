@@ -17,9 +17,9 @@ from typing import Any
 import visup
 from visup.agent import Severity, Verdict
 from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import event_line, plain
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
+from visup.agent.storage.jsonable import event_line, plain
 from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict, reasoning_agent
@@ -31,7 +31,7 @@ STAGE = "stage_"
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Transcript:
     """What a run told.
 
     Attributes:
@@ -57,7 +57,7 @@ class Told:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class TranscriptDiff:
     """What differs between two runs, in the order of time; both are empty when nothing does.
 
     Attributes:
@@ -82,7 +82,7 @@ class Difference:
 
 
 @dataclass(slots=True)
-class _Listener:
+class _EventCollector:
     """Gathers what a run tells."""
 
     events: list[Line] = field(default_factory=list)
@@ -115,7 +115,7 @@ def replay(
     settings: WatchSettings,
     out: Path | None = None,
     tell: Callable[[Step], None] | None = None,
-) -> Told:
+) -> Transcript:
     """Reason again.
 
     Args:
@@ -131,7 +131,7 @@ def replay(
         VisupError: The recording is damaged, or a task or rules file is not as it should be.
     """
     agent = reasoning_agent(settings)
-    listener = _Listener()
+    listener = _EventCollector()
     with ExitStack() as stack:
         journal = _journal(recording, settings, out, stack) if out else None
         answers = recording.answers()
@@ -149,17 +149,17 @@ def replay(
             journal.note(verdict=verdict, steps=listener.steps, tasks=agent.mind.tasks)
             export_events(journal.path, journal.path.with_name("events.jsonl"))
             journal.note(ended="complete")
-    return Told(tuple(listener.events), verdict, listener.steps, seconds)
+    return Transcript(tuple(listener.events), verdict, listener.steps, seconds)
 
 
-def recorded(recording: Recording) -> Told:
+def recorded_transcript(recording: Recording) -> Transcript:
     """What a recorded run told."""
     verdict = recording.facts().get("verdict")
     told = verdict if isinstance(verdict, str) else None
-    return Told(tuple(recording.events()), told, recording.count())
+    return Transcript(tuple(recording.events()), told, recording.count())
 
 
-def difference(first: Told, second: Told) -> Difference:
+def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
     """What the second run tells that the first does not, and the other way round.
 
     Events are the same when all that is told of them is. `fault` and trouble outside of the agent count
@@ -173,7 +173,7 @@ def difference(first: Told, second: Told) -> Difference:
         if what != "equal":
             gone += first.events[i0:i1]
             new += second.events[j0:j1]
-    return Difference(tuple(gone), tuple(new), (first.verdict, second.verdict))
+    return TranscriptDiff(tuple(gone), tuple(new), (first.verdict, second.verdict))
 
 
 def group_of(event: Line) -> str:

@@ -15,19 +15,19 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import Frame, Observation, Severity
-from visup.agent.model.step import Step
 from visup.agent.cycle.agent import Agent
-from visup.agent.storage.codec import packed
 from visup.agent.model.errors import OutputError, SourceError
+from visup.agent.model.step import Step
+from visup.agent.storage.codec import packed
 from visup.agent.storage.journal_reader import Recording
 from visup.percepts.video import Source
+from visup.runs.checkpoints import Checkpoint, read_checkpoint
+from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import WatchSettings
-from visup.runs.checkpoints import State, read_state
-from visup.runs.runtime_faults import Troubles
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class InterruptedRun:
     """What is known of the run that goes on.
 
     Attributes:
@@ -42,14 +42,14 @@ class Past:
 
     recording: Recording
     settings: WatchSettings
-    state: State | None
+    state: Checkpoint | None
     why_none: str | None
     steps: int
     grave: bool
     answers: Mapping[int, str]
 
 
-def past_of(run: Path) -> Past:
+def interrupted_run(run: Path) -> InterruptedRun:
     """The past of a run.
 
     Args:
@@ -68,7 +68,7 @@ def past_of(run: Path) -> Past:
             where=str(run),
             hint=f"visup replay {run}",
         )
-    state, why_none = read_state(recording.path.parent)
+    state, why_none = read_checkpoint(recording.path.parent)
     ends = recording.first_and_last()
     if state is not None and (ends is None or not ends[0] - 1 <= state.frame_index <= ends[1]):
         state, why_none = None, "its state is not of this journal"
@@ -82,7 +82,7 @@ def past_of(run: Path) -> Past:
     grave = any(e.get("severity") != Severity.INFO.name.lower() for e in told)
     settings = recorded_settings(facts, str(run))
     answers = _answers(facts, str(run))
-    return Past(recording, settings, state, why_none, recording.count(), grave, answers)
+    return InterruptedRun(recording, settings, state, why_none, recording.count(), grave, answers)
 
 
 def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
@@ -107,8 +107,8 @@ def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
         raise OutputError(f"the run's settings cannot be read ({said})", where=where) from fault
 
 
-def caught_up(
-    agent: Agent, source: Source, past: Past, tell: Callable[[Step, Frame], None]
+def catch_up(
+    agent: Agent, source: Source, past: InterruptedRun, tell: Callable[[Step, Frame], None]
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     """Make an agent what it was after the last recorded step.
 
@@ -165,11 +165,11 @@ def _frame(frames: Iterator[Frame], seen: Observation, source: Source) -> Frame:
 
 
 def _without_troubles(seen: Observation) -> Observation:
-    name = Troubles.contract.name
+    name = RuntimeFaults.contract.name
     return replace(seen, reports=tuple(r for r in seen.reports if r.behaviour != name))
 
 
-def _live(agent: Agent, source: Source, past: Past, after: int) -> Iterator[Frame]:
+def _live(agent: Agent, source: Source, past: InterruptedRun, after: int) -> Iterator[Frame]:
     """Frames of a camera, counted and timed on from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):

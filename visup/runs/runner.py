@@ -9,24 +9,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from visup.agent import Frame, Severity, Verdict
-from visup.agent.model.step import Observer, Step
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
+from visup.agent.model.step import Observer, Step
 from visup.agent.storage.journal import Limits
 from visup.percepts.video import Source
 from visup.percepts.video.live import LiveSource
 from visup.percepts.video.realtime import in_real_time
-from visup.runs.recorder import Recorder, kept_of
-from visup.runs.resume import Past, caught_up
+from visup.runs.checkpoints import CheckpointWriter
+from visup.runs.monotonic_clock import MonotonicFrames
+from visup.runs.recorder import Recorder, recorder_state
+from visup.runs.resume import InterruptedRun, catch_up
+from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import WatchSettings
-from visup.sinks import Sinks
-from visup.runs.checkpoints import StateKeeper
-from visup.runs.monotonic_clock import Steady
 from visup.runs.wiring import build_agent, final_verdict, open_video
-from visup.runs.runtime_faults import Troubles
+from visup.sinks import Sinks
 
 if TYPE_CHECKING:
-    from visup.runs.operator import Operator
+    from visup.runs.operator import HumanOperator
 
 Progress = Callable[[int, int | None], None]
 """Told after each step how many frames are done and how many there are (None when not known)."""
@@ -118,10 +118,10 @@ def supervise(
     *,
     observers: Sequence[Observer] = (),
     progress: Progress | None = None,
-    operator: Operator | None = None,
+    operator: HumanOperator | None = None,
     notice: Callable[[str], None] | None = None,
     options: RunOptions | None = None,
-    past: Past | None = None,
+    past: InterruptedRun | None = None,
 ) -> RunResult:
     """Watch a source from start to end.
 
@@ -142,8 +142,8 @@ def supervise(
         VisupError: Something given is not as it should be.
     """
     options = options or RunOptions()
-    tally = _Tally(past.grave if past else False)
-    troubles = Troubles()
+    tally = _SeverityMonitor(past.grave if past else False)
+    troubles = RuntimeFaults()
     with ExitStack() as stack:
         source = stack.enter_context(open_video(settings))
         agent = build_agent(settings, also=(troubles,), live=source.live)
@@ -151,7 +151,7 @@ def supervise(
         recorder = _recorder(settings, source, folder, options, past is not None, stack)
         sinks = Sinks(options.sinks, settings.source)
         stack.callback(sinks.close)
-        states = StateKeeper(folder, options.state_every_s) if folder else None
+        states = CheckpointWriter(folder, options.state_every_s) if folder else None
         frames: Iterator[Frame] = source
         notes: tuple[str, ...] = ()
         if past:
@@ -161,24 +161,24 @@ def supervise(
         answering = (_attending(operator, agent, recorder, past),) if operator else ()
         agent.observers = (tally, *recording, *observers, sinks, *answering)
         if recorder:
-            troubles.ask(recorder.troubles)
-        troubles.ask(sinks.troubles)
+            troubles.ask(recorder.runtime_faults)
+        troubles.ask(sinks.runtime_faults)
         if isinstance(source, LiveSource):
             source.notify = notify(sinks, notice)
-            troubles.ask(source.troubles)
+            troubles.ask(source.runtime_faults)
         pace = in_real_time(source, frames) if _keeps_pace(settings, source) else None
         if pace:
             stack.callback(pace.close)
-            troubles.ask(pace.troubles)
+            troubles.ask(pace.runtime_faults)
         begin = agent.mind.time if past and past.steps else None
-        steady = Steady(pace or frames, source.fps, begin)
-        troubles.ask(steady.troubles)
+        steady = MonotonicFrames(pace or frames, source.fps, begin)
+        troubles.ask(steady.runtime_faults)
         steps = past.steps if past else 0
         try:
             for step in agent.steps(steady):
                 steps += 1
                 if states:
-                    states.offer(agent, step, lambda: kept_of(recorder))
+                    states.offer(agent, step, lambda: recorder_state(recorder))
                 if progress:
                     progress(steps, _steps_of(source, settings))
         except KeyboardInterrupt:
@@ -199,7 +199,7 @@ def supervise(
 
 
 def _attending(
-    operator: Operator, agent: Agent, recorder: Recorder | None, past: Past | None
+    operator: HumanOperator, agent: Agent, recorder: Recorder | None, past: InterruptedRun | None
 ) -> Observer:
     """The operator of a run, who does not say again what was taken up before the run was killed."""
     if recorder and not past:
@@ -245,12 +245,12 @@ def _recorder(
 
 
 def _caught_up(
-    agent: Agent, source: Source, past: Past, recorder: Recorder | None
+    agent: Agent, source: Source, past: InterruptedRun, recorder: Recorder | None
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     if recorder and past.state:
         recorder.collector.load(past.state.kept)
     tell = recorder.catch_up if recorder else lambda step, frame: None
-    return caught_up(agent, source, past, tell)
+    return catch_up(agent, source, past, tell)
 
 
 def _keeps_pace(settings: WatchSettings, source: Source) -> bool:
@@ -262,7 +262,7 @@ def _steps_of(source: Source, settings: WatchSettings) -> int | None:
     return None if count is None else -(-count // settings.every)
 
 
-class _Tally:
+class _SeverityMonitor:
     """Whether anything grave was told, for runs without a task."""
 
     def __init__(self, grave: bool = False) -> None:

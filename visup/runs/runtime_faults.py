@@ -11,19 +11,19 @@ from typing import Any
 
 from visup.agent import Concern, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
 
-TROUBLE = "trouble"
-Teller = Callable[[], Iterable[Concern]]
+RUNTIME_FAULT = "trouble"
+FaultSource = Callable[[], Iterable[Concern]]
 
 
-class Troubles:
+class RuntimeFaults:
     """A behaviour that asks parts of the product for their troubles before each step."""
 
-    contract = Contract("troubles", gives=(TROUBLE,))
+    contract = Contract("troubles", gives=(RUNTIME_FAULT,))
 
     def __init__(self) -> None:
-        self._tellers: list[Teller] = []
+        self._tellers: list[FaultSource] = []
 
-    def ask(self, teller: Teller) -> None:
+    def ask(self, teller: FaultSource) -> None:
         """Ask also this one from now on."""
         self._tellers.append(teller)
 
@@ -39,9 +39,9 @@ class Troubles:
     ) -> Iterable[Percept]:
         """One percept of kind 'trouble' for each trouble that holds now."""
         now = [concern for teller in self._tellers for concern in teller()]
-        return [Percept(TROUBLE, c, frame.time, self.contract.name) for c in now]
+        return [Percept(RUNTIME_FAULT, c, frame.time, self.contract.name) for c in now]
 
 
-def tell_troubles(mind: Mind, seen: Observation) -> Outcome:
+def runtime_fault_reasoner(mind: Mind, seen: Observation) -> Outcome:
     """The reasoner to it: every trouble is a concern."""
-    return Outcome(mind, concerns=seen.of(TROUBLE))
+    return Outcome(mind, concerns=seen.of(RUNTIME_FAULT))

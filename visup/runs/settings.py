@@ -31,7 +31,7 @@ class WatchSettings:
         fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
         zones: Settings file with zones that rules can name, or None.
         patience_s: How long a camera or stream that drops is tried again, seconds.
-        attention: Whether objects that are known well are matched less often; see `rules/activation/attention.py`.
+        attention: Whether objects that are known well are matched less often (`rules/activation/`).
     """
 
     source: str

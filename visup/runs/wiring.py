@@ -7,27 +7,27 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from visup.agent import Behaviour, Contract, Mind, Severity, Verdict
-from visup.agent.model.step import Observer
+from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
-from visup.agent.contract.limits import Limits
+from visup.agent.model.step import Observer
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.database import ModelDatabase
 from visup.percepts.video import Source, open_source
-from visup.runs.plugins import plug_ins
 from visup.rules.activation.attention import Attend
+from visup.rules.activation.waking import Wake, wakeful, waking_rules
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
-from visup.rules.activation.waking import Wake, wakeful, waking_rules
+from visup.runs.plugins import user_behaviours
+from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
+from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
 from visup.tasks.supervision.supervise import finish, task_reasoner
-from visup.runs.runtime_faults import tell_troubles
-from visup.runs.zones import load_zones
 
 if TYPE_CHECKING:
     from visup.rules.formula.nodes import Rule
@@ -143,7 +143,7 @@ def _behaviours(
             ShapeBehaviour(database),
             DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
         ]
-    return [*seeing, *plug_ins(settings)]
+    return [*seeing, *user_behaviours(settings)]
 
 
 def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
@@ -157,7 +157,7 @@ def _reasoners(
     following = (task_reasoner(tasks),) if tasks else ()
     attending = (Attend(),) if settings.attention else ()
     waking = waking_rules(contracts)
-    match = (*following, *attending, *((Wake(waking),) if waking else ()), tell_troubles)
+    match = (*following, *attending, *((Wake(waking),) if waking else ()), runtime_fault_reasoner)
     return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 

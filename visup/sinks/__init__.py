@@ -1,6 +1,7 @@
 """Sinks: alerts and figures for other programs, outside of the cycle.
 
-Read `outbox.py` (how nothing waits for a sink), then `plain.py`, and `choose.py` (what `--sink` means).
+Read `outbox.py` (how nothing waits for a sink), then `builtin.py` (what needs only Python), and
+`sinks.py` (what `--sink` means).
 """
 
 from visup.sinks.messages import AlertSender

@@ -34,7 +34,7 @@ class JsonLines:
 
     def deliver(self, record: Mapping[str, Any]) -> None:
         """Write one line."""
-        self._stream.write(text_of(record) + "\n")
+        self._stream.write(json_text(record) + "\n")
         self._stream.flush()
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ class Webhook:
         """
         for attempt in range(self._tries):
             try:
-                self._post(text_of(record).encode())
+                self._post(json_text(record).encode())
             except urllib.error.HTTPError as fault:
                 fault.close()
                 if (fault.code < 500 and fault.code != 429) or attempt + 1 == self._tries:
@@ -119,6 +119,6 @@ class Webhook:
             answer.read(1)
 
 
-def text_of(record: Mapping[str, Any]) -> str:
+def json_text(record: Mapping[str, Any]) -> str:
     """A record as one line of JSON."""
     return json.dumps(record, ensure_ascii=False, separators=(",", ":"), sort_keys=True)

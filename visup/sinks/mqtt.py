@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from visup.agent.model.errors import ExtraMissingError, SettingsError
-from visup.sinks.builtin import TIMEOUT_S, text_of
+from visup.sinks.builtin import TIMEOUT_S, json_text
 
 PORT = 1883
 ONCE_AT_LEAST = 1
@@ -49,7 +49,7 @@ class Mqtt:
             self._client.connect(*self._place)
             self._client.loop_start()
             self._connected = True
-        told = self._client.publish(self._topic, text_of(record), qos=ONCE_AT_LEAST)
+        told = self._client.publish(self._topic, json_text(record), qos=ONCE_AT_LEAST)
         told.wait_for_publish(TIMEOUT_S)
         if not told.is_published():
             raise TimeoutError("the broker did not answer")

@@ -76,7 +76,7 @@ class Outbox:
         why = f": {self.fault}" if self.fault else ""
         return f"sink {self.sink.name}: {self.failed} records failed, {self.dropped} dropped{why}"
 
-    def troubles(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[Concern]:
         """What is wrong with the sink now."""
         if self.fault or self.dropped:
             yield Concern(

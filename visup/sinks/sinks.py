@@ -66,9 +66,9 @@ class Sinks:
         """Send a sentence that cannot wait for a step."""
         self._alerts.notice(text)
 
-    def troubles(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[Concern]:
         """What is wrong with sinks now."""
-        return [concern for outbox in self.outboxes for concern in outbox.troubles()]
+        return [concern for outbox in self.outboxes for concern in outbox.runtime_faults()]
 
     def end(self, verdict: Verdict | None, steps: int) -> tuple[str, ...]:
         """Send the verdict, close everything, and say what was not delivered."""

@@ -2,41 +2,48 @@
 
 >>> from visup.evaluation.runtime.soak import scripted
 >>> from visup.runs.settings import WatchSettings
->>> from visup.stepping import GivenFeed, Stepper
+>>> from visup.stepping import ScriptedObservations, Stepper
 >>> from visup.runs.wiring import reasoning_agent
->>> stepper = Stepper(reasoning_agent(WatchSettings("script")), GivenFeed(scripted(100)))
+>>> stepper = Stepper(reasoning_agent(WatchSettings("script")), ScriptedObservations(scripted(100)))
 >>> stepper.step(until="entry").reasons
 ('entry: An object, believed to be the spartan, is in view.',)
 >>> stepper.back(3).frame_index
 6
 
-Read in this order: `history.py` (how all steps are kept), `stops.py` (where to stop), `stepper.py` (the
-debugger), `diff.py`, `whatif.py`, `why.py`, `whynot.py`.
+Read in this order: `history.py` (how all steps are kept), `breakpoints.py` (where to stop), `stepper.py`
+(the debugger), `diff.py` (what differs between two minds), `what_if.py` (branches), and `explanations/`
+(why, and why not).
 """
 
-from visup.stepping.breakpoint_parser import stop_of
-from visup.stepping.breakpoints import Stop
-from visup.stepping.cursor import Mark, Midway, Stopped
-from visup.stepping.diff import Change, MindDiff, difference
-from visup.stepping.observation_sources import Feed, Given, GivenFeed, LiveFeed, RecordedFeed
+from visup.stepping.breakpoint_parser import parse_condition
+from visup.stepping.breakpoints import StopCondition
+from visup.stepping.cursor import Bookmark, PausedStep, StepResult
+from visup.stepping.diff import MindChange, MindDiff, mind_diff
+from visup.stepping.observation_sources import (
+    LiveObservations,
+    ObservationSource,
+    RecordedObservations,
+    ScriptedObservations,
+    StepInput,
+)
 from visup.stepping.stepper import Stepper
-from visup.stepping.watch_expressions import Breakpoint, Watch
+from visup.stepping.watch_expressions import Breakpoint, WatchExpression
 
 __all__ = [
+    "Bookmark",
     "Breakpoint",
-    "Change",
-    "Feed",
-    "Given",
-    "GivenFeed",
-    "LiveFeed",
-    "Mark",
-    "Midway",
+    "LiveObservations",
+    "MindChange",
     "MindDiff",
-    "RecordedFeed",
+    "ObservationSource",
+    "PausedStep",
+    "RecordedObservations",
+    "ScriptedObservations",
+    "StepInput",
+    "StepResult",
     "Stepper",
-    "Stop",
-    "Stopped",
-    "Watch",
-    "difference",
-    "stop_of",
+    "StopCondition",
+    "WatchExpression",
+    "mind_diff",
+    "parse_condition",
 ]

@@ -19,11 +19,11 @@ from visup.stepping.breakpoints import (
     PredicateStop,
     RuleStop,
     StageStop,
-    Stop,
+    StopCondition,
     TimeStop,
     WhenStop,
-    rules,
-    stages,
+    rule_names,
+    stage_names,
 )
 
 EVENT_KINDS = (
@@ -55,7 +55,7 @@ EVENT_KINDS = (
 """What visup itself tells; plug-ins may tell more."""
 
 
-def stop_of(what: str | Phase | Predicate | Stop, mind: Mind) -> Stop:
+def parse_condition(what: str | Phase | Predicate | StopCondition, mind: Mind) -> StopCondition:
     """The condition that is meant.
 
     Args:
@@ -71,13 +71,13 @@ def stop_of(what: str | Phase | Predicate | Stop, mind: Mind) -> Stop:
     if isinstance(what, Phase):
         return PhaseStop(what)
     if not isinstance(what, str):
-        return what if isinstance(what, Stop) else PredicateStop(what)
+        return what if isinstance(what, StopCondition) else PredicateStop(what)
     first, _, rest = what.strip().partition(" ")
     reader = _READERS.get(first) if rest else None
     return reader(rest.strip(), mind) if reader else _guessed(what.strip(), mind)
 
 
-def _guessed(word: str, mind: Mind) -> Stop:
+def _guessed(word: str, mind: Mind) -> StopCondition:
     """What a word means that is told without its kind."""
     try:
         return TimeStop(float(word))
@@ -87,16 +87,16 @@ def _guessed(word: str, mind: Mind) -> Stop:
         return WhenStop(expression(word))
     if word in tuple(Phase):
         return PhaseStop(Phase(word))
-    found: list[Stop] = [StageStop(word)] if word in stages(mind) else []
-    found += [RuleStop(word)] if word in rules(mind) else []
+    found: list[StopCondition] = [StageStop(word)] if word in stage_names(mind) else []
+    found += [RuleStop(word)] if word in rule_names(mind) else []
     if not found or word in EVENT_KINDS:
         found.append(_event(word, mind))
     return found[0] if len(found) == 1 else AnyStop(word, tuple(found))
 
 
-def _event(kind: str, mind: Mind) -> Stop:
+def _event(kind: str, mind: Mind) -> StopCondition:
     """Any word may be a plug-in's kind of event; one that is nearly another word is a slip."""
-    known = [*EVENT_KINDS, *stages(mind), *rules(mind), *Phase]
+    known = [*EVENT_KINDS, *stage_names(mind), *rule_names(mind), *Phase]
     close = get_close_matches(kind, known, 1, 0.8)
     if not kind.isidentifier() or (close and kind not in known):
         raise SettingsError(
@@ -107,22 +107,22 @@ def _event(kind: str, mind: Mind) -> Stop:
     return EventStop(kind)
 
 
-def _rule(text: str, mind: Mind) -> Stop:
+def _rule(text: str, mind: Mind) -> StopCondition:
     name, _, more = text.partition(" ")
-    known = rules(mind)
+    known = rule_names(mind)
     if known and name not in known:
         raise _unknown("rule", name, known)
     return RuleStop(name, more.strip() == "changes")
 
 
-def _stage(name: str, mind: Mind) -> Stop:
-    known = stages(mind)
+def _stage(name: str, mind: Mind) -> StopCondition:
+    known = stage_names(mind)
     if known and name not in known:
         raise _unknown("stage", name, known)
     return StageStop(name)
 
 
-def _phase(name: str, mind: Mind) -> Stop:
+def _phase(name: str, mind: Mind) -> StopCondition:
     if name not in tuple(Phase):
         raise _unknown("phase", name, tuple(Phase))
     return PhaseStop(Phase(name))
@@ -135,7 +135,7 @@ def _number(text: str, kind: str) -> float:
         raise SettingsError(f"'{text}' is no number", expected=f"such as: {kind} 12") from None
 
 
-_READERS: Mapping[str, Callable[[str, Mind], Stop]] = {
+_READERS: Mapping[str, Callable[[str, Mind], StopCondition]] = {
     "phase": _phase,
     "event": lambda text, mind: EventStop(text),
     "rule": _rule,

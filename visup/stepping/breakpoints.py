@@ -20,12 +20,12 @@ Predicate = Callable[[Step], bool]
 
 
 @runtime_checkable
-class Stop(Protocol):
+class StopCondition(Protocol):
     """A condition to stop at."""
 
     @property
     def text(self) -> str:
-        """What `stop_of` reads back."""
+        """What `parse_condition` reads back."""
         ...
 
     def met(self, before: Mind, step: Step) -> str:
@@ -41,11 +41,11 @@ class PhaseStop:
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"phase {self.phase.value}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`; earlier phases are met inside the cycle."""
+        """See `StopCondition`; earlier phases are met inside the cycle."""
         return "after act" if self.phase is Phase.ACT else ""
 
 
@@ -57,11 +57,11 @@ class EventStop:
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"event {self.kind}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return next((f"{e.kind}: {e.text}" for e in step.events if e.kind == self.kind), "")
 
 
@@ -76,22 +76,22 @@ class RuleStop:
 
     name: str
     changes: bool = False
-    _last: _Memo = field(default_factory=lambda: _Memo(), compare=False, repr=False)
+    _last: _VerdictCache = field(default_factory=lambda: _VerdictCache(), compare=False, repr=False)
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"rule {self.name}" + (" changes" if self.changes else "")
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         was = self._last.of(before, self.name)
         now = self._last.of(step.mind, self.name)
-        return _turned(self.name, was, now, self.changes)
+        return _change_text(self.name, was, now, self.changes)
 
 
 @dataclass(slots=True)
-class _Memo:
+class _VerdictCache:
     """The verdicts of the last two minds: the mind after a step is that before the next one."""
 
     _known: list[tuple[Mind, Mapping[tuple[int, ...], Truth]]] = field(default_factory=list)
@@ -100,7 +100,7 @@ class _Memo:
         for known, found in self._known:
             if known is mind:
                 return found
-        self._known = [*self._known[-1:], (mind, judged(mind, rule))]
+        self._known = [*self._known[-1:], (mind, rule_verdicts(mind, rule))]
         return self._known[-1][1]
 
 
@@ -112,14 +112,14 @@ class StageStop:
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"stage {self.stage}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
-        was, now = _standing(before, self.stage), _standing(step.mind, self.stage)
+        """See `StopCondition`."""
+        was, now = _stage_statuses(before, self.stage), _stage_statuses(step.mind, self.stage)
         changed = [task for task in now if now[task] != was.get(task, ("pending", False))]
-        return "; ".join(_told_stage(self.stage, *now[task]) for task in changed)
+        return "; ".join(_stage_text(self.stage, *now[task]) for task in changed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,13 +130,13 @@ class ObjectStop:
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"object {self.object_id}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
-        was = _as_told(before.objects.get(self.object_id))
-        now = _as_told(step.mind.objects.get(self.object_id))
+        """See `StopCondition`."""
+        was = _object_text(before.objects.get(self.object_id))
+        now = _object_text(step.mind.objects.get(self.object_id))
         return f"object {self.object_id}: {was} -> {now}" if was != now else ""
 
 
@@ -148,11 +148,11 @@ class TimeStop:
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"time {self.time:g}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         reached = step.time >= self.time and (before.frame_index < 0 or before.time < self.time)
         return f"{step.time:.2f} s" if reached else ""
 
@@ -165,11 +165,11 @@ class FrameStop:
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"frame {self.frame}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         reached = before.frame_index < self.frame <= step.frame_index
         return f"frame {step.frame_index}" if reached else ""
 
@@ -184,21 +184,23 @@ class WhenStop:
 
     expression: Expression
     changes: bool = False
-    _follow: Following = field(default_factory=lambda: Following(), compare=False, repr=False)
+    _follow: ExpressionMonitor = field(
+        default_factory=lambda: ExpressionMonitor(), compare=False, repr=False
+    )
 
     @property
     def text(self) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return f"{'change' if self.changes else 'when'} {self.expression.text}"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         was, now = self._follow(self.expression, before, step.mind)
         changes = self.changes or self.expression.quantity
         if not changes:
             truths = {k: v for k, v in now.truths.items() if isinstance(v, Truth)}
             old = {k: v for k, v in was.truths.items() if isinstance(v, Truth)} if was else {}
-            return _turned(self.expression.text, old, truths, False)
+            return _change_text(self.expression.text, old, truths, False)
         if was is None:
             return ""
         told = {r.objects: str(r) for r in now.readings}
@@ -214,7 +216,7 @@ class WhenStop:
 
 
 @dataclass(slots=True)
-class Following:
+class ExpressionMonitor:
     """Judges an expression from mind to mind; begins anew at a mind that it did not see coming."""
 
     mind: Mind | None = None
@@ -239,7 +241,7 @@ class PredicateStop:
     text: str = "predicate"
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return self.text if self.predicate(step) else ""
 
 
@@ -248,29 +250,29 @@ class AnyStop:
     """Stops when any of several conditions is met, for words that may mean several."""
 
     text: str
-    stops: tuple[Stop, ...]
+    stops: tuple[StopCondition, ...]
 
     def met(self, before: Mind, step: Step) -> str:
-        """See `Stop`."""
+        """See `StopCondition`."""
         return "; ".join(filter(None, (s.met(before, step) for s in self.stops)))
 
 
-def stages(mind: Mind) -> tuple[str, ...]:
+def stage_names(mind: Mind) -> tuple[str, ...]:
     """The stages of all tasks."""
     return tuple(dict.fromkeys(s.stage for t in mind.tasks for s in t.stages))
 
 
-def rules(mind: Mind) -> tuple[str, ...]:
+def rule_names(mind: Mind) -> tuple[str, ...]:
     """The rules that judge a mind; none before its first step."""
     return tuple(rule.name for rule in rule_memory(mind).rules)
 
 
-def judged(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
+def rule_verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     """What a rule says of every choice of objects; nothing before the first step."""
     return verdicts(mind, name) if rule_memory(mind).now is not None else {}
 
 
-def _turned(
+def _change_text(
     name: str,
     was: Mapping[tuple[int, ...], Truth],
     now: Mapping[tuple[int, ...], Truth],
@@ -289,7 +291,7 @@ def _of(ids: tuple[int, ...]) -> str:
     return f"({', '.join(map(str, ids))})" if ids else ""
 
 
-def _standing(mind: Mind, stage: str) -> dict[str, tuple[str, bool]]:
+def _stage_statuses(mind: Mind, stage: str) -> dict[str, tuple[str, bool]]:
     return {
         task.task: (s.status.value, task.current == stage)
         for task in mind.tasks
@@ -298,11 +300,11 @@ def _standing(mind: Mind, stage: str) -> dict[str, tuple[str, bool]]:
     }
 
 
-def _told_stage(stage: str, status: str, current: bool) -> str:
+def _stage_text(stage: str, status: str, current: bool) -> str:
     return f"stage {stage} is {status}" + (", and current" if current else "")
 
 
-def _as_told(belief: ObjectBelief | None) -> str:
+def _object_text(belief: ObjectBelief | None) -> str:
     if belief is None:
         return "not known"
     return f"{belief.name}, {belief.presence.value}"

@@ -8,11 +8,11 @@ from visup.agent import Observation, Outcome
 from visup.agent.contract.phases import Phase, Snapshot
 from visup.agent.model.notebook import showing
 from visup.agent.model.step import Step
-from visup.stepping.history import History
+from visup.stepping.history import StepHistory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Midway:
+class PausedStep:
     """A step that is stopped inside its cycle.
 
     Attributes:
@@ -27,21 +27,21 @@ class Midway:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stopped:
+class StepResult:
     """Where and why a run of steps ended.
 
     Attributes:
         taken: How many steps were completed.
         steps: The latest of them: as many as the history keeps whole.
         reasons: Which conditions were met; empty when the number of steps was made.
-        midway: The step inside which it stopped, or None.
+        paused: The step inside which it stopped, or None.
         ended: Whether there is nothing more to perceive.
     """
 
     taken: int
     steps: tuple[Step, ...] = ()
     reasons: tuple[str, ...] = ()
-    midway: Midway | None = None
+    paused: PausedStep | None = None
     ended: bool = False
 
     @property
@@ -51,7 +51,7 @@ class Stopped:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mark:
+class Bookmark:
     """A place to go back to, from `Stepper.snapshot`.
 
     Attributes:
@@ -62,7 +62,7 @@ class Mark:
 
     number: int
     was: Snapshot
-    course: History = field(repr=False)
+    course: StepHistory = field(repr=False)
 
 
-showing(Midway, Stopped)
+showing(PausedStep, StepResult)

@@ -12,7 +12,7 @@ Key = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class MindChange:
     """One thing that differs.
 
     Attributes:
@@ -28,8 +28,8 @@ class Change:
     before: str | None
     after: str | None
 
-    def __neg__(self) -> Change:
-        return Change(self.about, self.what, self.after, self.before)
+    def __neg__(self) -> MindChange:
+        return MindChange(self.about, self.what, self.after, self.before)
 
     def __str__(self) -> str:
         if self.before is None:
@@ -51,7 +51,7 @@ class MindDiff:
 
     frames: tuple[int, int]
     times: tuple[float, float]
-    changes: tuple[Change, ...] = ()
+    changes: tuple[MindChange, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.changes)
@@ -59,7 +59,7 @@ class MindDiff:
     def __neg__(self) -> MindDiff:
         return MindDiff(self.frames[::-1], self.times[::-1], tuple(-c for c in self.changes))
 
-    def about(self, *kinds: str) -> tuple[Change, ...]:
+    def about(self, *kinds: str) -> tuple[MindChange, ...]:
         """The changes of some kinds."""
         return tuple(c for c in self.changes if c.about in kinds)
 
@@ -69,7 +69,7 @@ class MindDiff:
         return "\n".join([head, *(f"  {c}" for c in self.changes or ("nothing differs",))])
 
 
-def difference(first: Mind, second: Mind) -> MindDiff:
+def mind_diff(first: Mind, second: Mind) -> MindDiff:
     """What differs between two minds."""
     relations = _true(first) | _true(second)
     was, now = ({**dict(_facts(m)), **_truths(m, relations)} for m in (first, second))
@@ -78,7 +78,7 @@ def difference(first: Mind, second: Mind) -> MindDiff:
         (first.frame_index, second.frame_index),
         (first.time, second.time),
         tuple(
-            Change(*key, was.get(key), now.get(key))
+            MindChange(*key, was.get(key), now.get(key))
             for key in order
             if was.get(key) != now.get(key)
         ),
@@ -167,4 +167,4 @@ def _short(text: str, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-showing(Change, MindDiff)
+showing(MindChange, MindDiff)

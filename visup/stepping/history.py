@@ -17,14 +17,14 @@ from visup.agent import Alert, Event, Observation, Outcome
 from visup.agent.contract.phases import Phase, Snapshot
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.step import Step
-from visup.stepping.observation_log import Tape
+from visup.stepping.observation_log import ObservationLog
 
 SPACING = 12
 LATEST = 100
 
 
 @dataclass(slots=True)
-class History:
+class StepHistory:
     """One course of steps, and a place in it.
 
     Attributes:
@@ -39,7 +39,7 @@ class History:
     """
 
     agent: Agent
-    tape: Tape = field(default_factory=Tape)
+    observations: ObservationLog = field(default_factory=ObservationLog)
     at: int = 0
     begin: int = field(init=False)
     made: int = field(init=False)
@@ -83,7 +83,7 @@ class History:
 
     def forward(self) -> Step:
         """One step on along the tape."""
-        seen = self.tape.seen(self.at)
+        seen = self.observations.seen(self.at)
         *_, (_, thought) = self.phases(seen)
         return self.conclude(seen, thought)
 
@@ -152,5 +152,5 @@ class History:
             self._whole.move_to_end(number)
             return step
         events, alerts = self._told[number - self.begin - 1]
-        seen, mind = self.tape.seen(number - 1), was.mind
+        seen, mind = self.observations.seen(number - 1), was.mind
         return Step(mind.frame_index, mind.time, seen, mind, events, alerts, was.directives)

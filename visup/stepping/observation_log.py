@@ -14,7 +14,7 @@ _LEVEL = 1  # of zlib; see the codec
 
 
 @dataclass(slots=True)
-class Tape:
+class ObservationLog:
     """Observations by number: number n led from step n to step n + 1.
 
     What the journal's form cannot hold (a plug-in's value of a kind of its own) is kept as it is.

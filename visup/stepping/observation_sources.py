@@ -12,7 +12,7 @@ from visup.agent.storage.journal_reader import Recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Given:
+class StepInput:
     """What the next step begins with.
 
     Attributes:
@@ -27,46 +27,46 @@ class Given:
 
 
 @runtime_checkable
-class Feed(Protocol):
+class ObservationSource(Protocol):
     """Gives one observation after the other; it cannot go back."""
 
-    def next(self, agent: Agent) -> Given | None:
+    def next(self, agent: Agent) -> StepInput | None:
         """What comes next, for an agent that is after the latest step; None at the end."""
         ...
 
 
-class LiveFeed:
+class LiveObservations:
     """The agent's behaviours look at frames."""
 
     def __init__(self, frames: Iterable[Frame]) -> None:
         self._frames = iter(frames)
 
-    def next(self, agent: Agent) -> Given | None:
-        """See `Feed`."""
+    def next(self, agent: Agent) -> StepInput | None:
+        """See `ObservationSource`."""
         frame = next(self._frames, None)
-        return None if frame is None else Given(agent.perceive(frame), None, frame)
+        return None if frame is None else StepInput(agent.perceive(frame), None, frame)
 
 
-class RecordedFeed:
+class RecordedObservations:
     """What a run perceived, and what its operator said, from its journal."""
 
     def __init__(self, recording: Recording) -> None:
         self._seen: Iterator[Observation] = recording.observations()
         self._answers = recording.answers()
 
-    def next(self, agent: Agent) -> Given | None:
-        """See `Feed`."""
+    def next(self, agent: Agent) -> StepInput | None:
+        """See `ObservationSource`."""
         seen = next(self._seen, None)
-        return None if seen is None else Given(seen, self._answers.get(seen.frame_index, {}))
+        return None if seen is None else StepInput(seen, self._answers.get(seen.frame_index, {}))
 
 
-class GivenFeed:
+class ScriptedObservations:
     """Observations that are there already, such as scripted ones."""
 
     def __init__(self, seen: Iterable[Observation]) -> None:
         self._seen = iter(seen)
 
-    def next(self, agent: Agent) -> Given | None:
-        """See `Feed`."""
+    def next(self, agent: Agent) -> StepInput | None:
+        """See `ObservationSource`."""
         seen = next(self._seen, None)
-        return None if seen is None else Given(seen)
+        return None if seen is None else StepInput(seen)

@@ -14,29 +14,33 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
 from visup.agent.storage.jsonable import event_line
-from visup.runs.replay import Difference, Told, settings_for
-from visup.runs.replay import difference as told_difference
+from visup.runs.replay import Transcript, TranscriptDiff, settings_for
+from visup.runs.replay import transcript_diff as told_difference
 from visup.runs.wiring import final_verdict, reasoning_agent
-from visup.stepping.breakpoint_parser import stop_of
-from visup.stepping.breakpoints import PhaseStop, Predicate, Stop
-from visup.stepping.cursor import Stopped
-from visup.stepping.diff import MindDiff, difference
+from visup.stepping.breakpoint_parser import parse_condition
+from visup.stepping.breakpoints import PhaseStop, Predicate, StopCondition
+from visup.stepping.cursor import StepResult
+from visup.stepping.diff import MindDiff, mind_diff
 from visup.stepping.explanations import questions as asking
 from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import Reasons
-from visup.stepping.history import LATEST, SPACING, History
-from visup.stepping.observation_sources import Feed, LiveFeed, RecordedFeed
-from visup.stepping.timeline import Course
-from visup.stepping.watch_expressions import Breakpoint, Watch
-from visup.stepping.what_if import Belief, insisted, insisting, without_tasks
+from visup.stepping.history import LATEST, SPACING, StepHistory
+from visup.stepping.observation_sources import (
+    LiveObservations,
+    ObservationSource,
+    RecordedObservations,
+)
+from visup.stepping.timeline import Timeline
+from visup.stepping.watch_expressions import Breakpoint, WatchExpression
+from visup.stepping.what_if import Assumption, assuming_reasoners, with_assumptions, without_tasks
 
 
-class Stepper(Course):
+class Stepper(Timeline):
     """Steps an agent forth and back, stops where it is told to, and looks into its mind.
 
     Args:
         agent: The agent, new or after any step.
-        frames: Frames for its behaviours; or a `Feed`, such as of a recorded run.
+        frames: Frames for its behaviours; or a `ObservationSource`, such as of a recorded run.
         spacing: Steps between two minds that are kept; more of them is less to keep and longer to
             go back.
         latest: How many steps are kept whole.
@@ -49,18 +53,18 @@ class Stepper(Course):
     def __init__(
         self,
         agent: Agent,
-        frames: Iterable[Frame] | Feed,
+        frames: Iterable[Frame] | ObservationSource,
         *,
         spacing: int = SPACING,
         latest: int = LATEST,
     ) -> None:
-        feed = frames if isinstance(frames, Feed) else LiveFeed(frames)
-        self._take(History(agent, spacing=spacing, latest=latest), feed)
+        feed = frames if isinstance(frames, ObservationSource) else LiveObservations(frames)
+        self._take(StepHistory(agent, spacing=spacing, latest=latest), feed)
 
-    def _take(self, history: History, source: Feed | Course) -> None:
+    def _take(self, history: StepHistory, source: ObservationSource | Timeline) -> None:
         super().__init__(history, source)
         self.breakpoints: dict[int, Breakpoint] = {}
-        self.watches: dict[int, Watch] = {}
+        self.watches: dict[int, WatchExpression] = {}
         self._ahead = False
 
     @classmethod
@@ -75,20 +79,22 @@ class Stepper(Course):
             VisupError: There is no such run, or a setting is not as it should be.
         """
         recording = run if isinstance(run, Recording) else Recording.open(run)
-        return cls(reasoning_agent(settings_for(recording, **changed)), RecordedFeed(recording))
+        return cls(
+            reasoning_agent(settings_for(recording, **changed)), RecordedObservations(recording)
+        )
 
     def step(
         self,
         n: int | None = None,
-        until: str | Phase | Predicate | Stop | None = None,
+        until: str | Phase | Predicate | StopCondition | None = None,
         tell: Callable[[Step], None] | None = None,
-    ) -> Stopped:
+    ) -> StepResult:
         """Go on by some steps, or until something is so; breakpoints end it, too.
 
         Args:
             n: How many steps at most; 1 when `until` is left out, else as many as there are. A step
                 inside which it is stopped counts when it is completed.
-            until: See `visup.stepping.breakpoint_parser.stop_of`.
+            until: See `visup.stepping.breakpoint_parser.parse_condition`.
             tell: Told of each step as it is completed.
 
         Returns:
@@ -97,7 +103,7 @@ class Stepper(Course):
         Raises:
             SettingsError: Nothing is meant by `until`.
         """
-        goal = (stop_of(until, self.mind),) if until is not None else ()
+        goal = (parse_condition(until, self.mind),) if until is not None else ()
         most = n if n is not None or goal else 1
         stops = (*goal, *(b.stop for b in self.breakpoints.values() if b.enabled))
         phases = frozenset(s.phase for s in stops if isinstance(s, PhaseStop))
@@ -107,18 +113,18 @@ class Stepper(Course):
             before = self.agent.mind
             step = self._cycle(phases)
             if step is None:
-                halted = self._midway
+                halted = self._paused
                 why = (f"after {halted.phase.value}",) if halted else ()
-                return Stopped(taken, tuple(done), why, halted, halted is None)
+                return StepResult(taken, tuple(done), why, halted, halted is None)
             taken += 1
             if tell:
                 tell(step)
             done = [*done[1 - self._history.latest :], step]
             if reasons := self._reasons(goal, before, step):
-                return Stopped(taken, tuple(done), reasons)
-        return Stopped(taken, tuple(done))
+                return StepResult(taken, tuple(done), reasons)
+        return StepResult(taken, tuple(done))
 
-    def _reasons(self, goal: Sequence[Stop], before: Mind, step: Step) -> tuple[str, ...]:
+    def _reasons(self, goal: Sequence[StopCondition], before: Mind, step: Step) -> tuple[str, ...]:
         """Why to stop after a step; every condition is asked, for some remember."""
         found = [s.met(before, step) for s in goal]
         for b in self.breakpoints.values():
@@ -145,9 +151,9 @@ class Stepper(Course):
 
     # Where to stop, what to watch
 
-    def break_at(self, what: str | Phase | Predicate | Stop) -> Breakpoint:
-        """Set a breakpoint; see `visup.stepping.breakpoint_parser.stop_of`."""
-        made = Breakpoint(max(self.breakpoints, default=0) + 1, stop_of(what, self.mind))
+    def break_at(self, what: str | Phase | Predicate | StopCondition) -> Breakpoint:
+        """Set a breakpoint; see `visup.stepping.breakpoint_parser.parse_condition`."""
+        made = Breakpoint(max(self.breakpoints, default=0) + 1, parse_condition(what, self.mind))
         self.breakpoints[made.id] = made
         return made
 
@@ -173,7 +179,7 @@ class Stepper(Course):
             raise SettingsError(f"there is no breakpoint {number}", expected=known)
         return self.breakpoints[number]
 
-    def watch(self, text: str, *, breaks: bool = False) -> Watch:
+    def watch(self, text: str, *, breaks: bool = False) -> WatchExpression:
         """Judge an expression of the rule language after each step.
 
         Args:
@@ -183,7 +189,7 @@ class Stepper(Course):
         Raises:
             RuleError: It cannot be read.
         """
-        made = Watch.of(max(self.watches, default=0) + 1, text, breaks)
+        made = WatchExpression.of(max(self.watches, default=0) + 1, text, breaks)
         if self.mind.frame_index >= 0:
             made.look(self.mind, self.mind)
         self.watches[made.id] = made
@@ -204,7 +210,7 @@ class Stepper(Course):
     @property
     def may_answer(self) -> bool:
         """Whether the operator of this course can still speak: it is neither past nor recorded."""
-        return self.at == self.made and not isinstance(self._feed, RecordedFeed)
+        return self.at == self.made and not isinstance(self._feed, RecordedObservations)
 
     def answer(self, object_id: int, name: str) -> None:
         """Say what an object is, as the operator of this run; where steps follow, branch first.
@@ -213,13 +219,13 @@ class Stepper(Course):
             SettingsError: Later steps were made, or nobody knows such an object or name.
         """
         if not self.may_answer:
-            recorded = isinstance(self._feed, RecordedFeed)
+            recorded = isinstance(self._feed, RecordedObservations)
             other = "later steps were made without this answer"
             what = "the operator of a recorded run has spoken" if recorded else other
             raise SettingsError(what, hint="branch, and answer there")
         self.agent.answer(object_id, name)
 
-    def branch(self, *beliefs: Belief, reasoners: Reasoners | None = None) -> Stepper:
+    def branch(self, *beliefs: Assumption, reasoners: Reasoners | None = None) -> Stepper:
         """Another course from here on, with what is insisted upon; this one stays as it is.
 
         It perceives the very same; when it comes to the end of what was perceived, this course goes
@@ -230,15 +236,15 @@ class Stepper(Course):
             reasoners: What reasons there; as here when left out.
         """
         reasoners = reasoners or self.agent.reasoners
-        other = replace_agent(self.agent, insisting(reasoners, beliefs))
+        other = replace_agent(self.agent, assuming_reasoners(reasoners, beliefs))
         here = self._history.here
         swapped = reasoners.match != self.agent.reasoners.match
-        mind = insisted(without_tasks(here.mind) if swapped else here.mind, beliefs)
+        mind = with_assumptions(without_tasks(here.mind) if swapped else here.mind, beliefs)
         other.restore(replace(here, mind=mind))
         history = self._history
-        course = History(
+        course = StepHistory(
             other,
-            history.tape,
+            history.observations,
             self.at,
             {n: said for n, said in history.answers.items() if n >= self.at},
             history.spacing,
@@ -249,7 +255,7 @@ class Stepper(Course):
         made._last = self._last
         return made
 
-    def compare(self) -> Difference:
+    def compare(self) -> TranscriptDiff:
         """What this branch tells differently from the course that it left, over the same steps.
 
         Returns:
@@ -272,7 +278,7 @@ class Stepper(Course):
     def diff(self, first: int, second: int | None = None) -> MindDiff:
         """What differs between the minds after two steps; the second one is here when left out."""
         there = self.mind if second is None else self.mind_at(second)
-        return difference(self.mind_at(first), there)
+        return mind_diff(self.mind_at(first), there)
 
     # Why
 
@@ -307,9 +313,9 @@ class Stepper(Course):
         self.agent.close()
 
 
-def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Told:
+def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Transcript:
     verdict = final_verdict(mind).value if mind.tasks else None
-    return Told(tuple(event_line(e) for _, e in events), verdict, mind.frame_index)
+    return Transcript(tuple(event_line(e) for _, e in events), verdict, mind.frame_index)
 
 
 def replace_agent(agent: Agent, reasoners: Reasoners) -> Agent:

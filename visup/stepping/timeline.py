@@ -9,12 +9,12 @@ from visup.agent import Event, Frame, Mind, Observation, Outcome
 from visup.agent.contract.phases import Phase
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.stepping.cursor import Mark, Midway
-from visup.stepping.history import History
-from visup.stepping.observation_sources import Feed
+from visup.stepping.cursor import Bookmark, PausedStep
+from visup.stepping.history import StepHistory
+from visup.stepping.observation_sources import ObservationSource
 
 
-class Course:
+class Timeline:
     """An agent with its history, a place in it, and what gives it more.
 
     Args:
@@ -26,13 +26,13 @@ class Course:
         parent: The course that this one branched off, or None.
     """
 
-    def __init__(self, history: History, source: Feed | Course) -> None:
+    def __init__(self, history: StepHistory, source: ObservationSource | Timeline) -> None:
         self.agent = history.agent
-        self.parent = source if isinstance(source, Course) else None
-        self._feed = source if not isinstance(source, Course) else None
+        self.parent = source if isinstance(source, Timeline) else None
+        self._feed = source if not isinstance(source, Timeline) else None
         self._history = history
         self._frame: Frame | None = None
-        self._midway: Midway | None = None
+        self._paused: PausedStep | None = None
         self._rest: Iterator[tuple[Phase, Outcome]] = iter(())
         self._last: Step | None = None
 
@@ -41,7 +41,7 @@ class Course:
     @property
     def mind(self) -> Mind:
         """What is believed here; half-made when stopped inside a step."""
-        thought = self._midway.thought if self._midway else None
+        thought = self._paused.thought if self._paused else None
         return self.agent.mind if thought is None else thought.mind
 
     @property
@@ -60,9 +60,9 @@ class Course:
         return self._history.begin
 
     @property
-    def midway(self) -> Midway | None:
+    def paused(self) -> PausedStep | None:
         """The step inside which it is stopped, or None."""
-        return self._midway
+        return self._paused
 
     @property
     def last(self) -> Step | None:
@@ -74,20 +74,20 @@ class Course:
     def _cycle(self, phases: frozenset[Phase]) -> Step | None:
         """On to the end of a step, or None: stopped inside it, or nothing more is perceived."""
         before = self.agent.mind
-        if self._midway is None:
+        if self._paused is None:
             seen = self._perceived()
             if seen is None:
                 return None
-            self._midway, self._rest = Midway(Phase.PERCEIVE, seen), self._history.phases(seen)
+            self._paused, self._rest = PausedStep(Phase.PERCEIVE, seen), self._history.phases(seen)
             if Phase.PERCEIVE in phases:
                 return None
-        midway = self._midway
+        paused = self._paused
         for phase, thought in self._rest:
-            self._midway = midway = Midway(phase, midway.seen, thought)
+            self._paused = paused = PausedStep(phase, paused.seen, thought)
             if phase in phases:
                 return None
-        assert midway.thought is not None
-        step = self._history.conclude(midway.seen, midway.thought)
+        assert paused.thought is not None
+        step = self._history.conclude(paused.seen, paused.thought)
         self._arrive(step)
         frame, self._frame = self._frame, None
         for observer in self.agent.observers if frame is not None else ():
@@ -102,19 +102,19 @@ class Course:
     def _perceived(self) -> Observation | None:
         """What the next step begins with: from the tape, or new."""
         history = self._history
-        if history.at < len(history.tape):
-            return history.tape.seen(history.at)
+        if history.at < len(history.observations):
+            return history.observations.seen(history.at)
         if self.parent is not None:
-            while len(history.tape) <= history.at:
+            while len(history.observations) <= history.at:
                 if not self.parent._look_ahead():
                     return None
             if said := self.parent._history.answers.get(history.at):
                 history.answers[history.at] = said
-            return history.tape.seen(history.at)
+            return history.observations.seen(history.at)
         given = self._feed.next(self.agent) if self._feed else None
         if given is None:
             return None
-        history.tape.add(given.seen)
+        history.observations.add(given.seen)
         if given.answers is not None:
             history.answers[history.at] = given.answers
         self._frame = given.frame
@@ -122,13 +122,13 @@ class Course:
 
     def _look_ahead(self) -> bool:
         """One more step at the end of this course, for a branch; the place stays."""
-        paused = self._midway, self._rest, self._last
+        place = self._paused, self._rest, self._last
         made = self.made
         with self._history.elsewhere():
             self._drop()
             self._last = self._history.go(made)
             self._cycle(frozenset())
-        self._midway, self._rest, self._last = paused
+        self._paused, self._rest, self._last = place
         return self.made > made
 
     def _look_again(self) -> None:
@@ -140,7 +140,7 @@ class Course:
 
     def _drop(self) -> None:
         """Forget the half-made step, if there is one; what was perceived stays on the tape."""
-        self._midway, self._rest = None, iter(())
+        self._paused, self._rest = None, iter(())
 
     # Back
 
@@ -150,7 +150,7 @@ class Course:
         Returns:
             The step after which it is now, or None where the course begins.
         """
-        return self.go(self.at - n + (self._midway is not None))
+        return self.go(self.at - n + (self._paused is not None))
 
     def go(self, number: int) -> Step | None:
         """Be after step `number`; later ones are made if need be, and breakpoints are not looked at.
@@ -176,17 +176,17 @@ class Course:
             SettingsError: The source ends before.
         """
         made = range(self.begin + 1, self.made + 1)
-        place = bisect_left(made, seconds, key=lambda n: self.seen_at(n).time)
+        place = bisect_left(made, seconds, key=lambda n: self.observation_at(n).time)
         step = self.go(made[place] if place < len(made) else self.made)
         while self.mind.time < seconds or self.at == self.begin:
             step = self.go(self.at + 1)
         return step
 
-    def snapshot(self) -> Mark:
+    def snapshot(self) -> Bookmark:
         """This place, to come back to with `restore`; a few references, no copy."""
-        return Mark(self.at, self._history.here, self._history)
+        return Bookmark(self.at, self._history.here, self._history)
 
-    def restore(self, mark: Mark) -> None:
+    def restore(self, mark: Bookmark) -> None:
         """Be again where a snapshot was taken.
 
         Raises:
@@ -225,6 +225,6 @@ class Course:
         """Number of the step and event, for all that was told so far, also after this place."""
         return self._history.told(first, last)
 
-    def seen_at(self, number: int) -> Observation:
+    def observation_at(self, number: int) -> Observation:
         """What was perceived in a step; numbers begin at 1, with what was seen before any branch."""
-        return self._history.tape.seen(number - 1)
+        return self._history.observations.seen(number - 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from visup.agent.model.mind import Mind
 from visup.agent.model.step import Step
 from visup.rules.safety.expression import ExpressionResult, ExpressionValue, expression
-from visup.stepping.breakpoints import Following, Stop, WhenStop
+from visup.stepping.breakpoints import ExpressionMonitor, StopCondition, WhenStop
 
 
 @dataclass(slots=True)
@@ -22,7 +22,7 @@ class Breakpoint:
     """
 
     id: int
-    stop: Stop
+    stop: StopCondition
     enabled: bool = True
     hits: int = 0
 
@@ -32,7 +32,7 @@ class Breakpoint:
 
 
 @dataclass(slots=True)
-class Watch:
+class WatchExpression:
     """An expression that is judged after each step.
 
     Attributes:
@@ -46,10 +46,10 @@ class Watch:
     stop: WhenStop
     breaks: bool = False
     judged: ExpressionResult | None = None
-    _follow: Following = field(default_factory=Following, repr=False)
+    _follow: ExpressionMonitor = field(default_factory=ExpressionMonitor, repr=False)
 
     @classmethod
-    def of(cls, number: int, text: str, breaks: bool) -> Watch:
+    def of(cls, number: int, text: str, breaks: bool) -> WatchExpression:
         """A watch on an expression.
 
         Raises:

@@ -36,12 +36,12 @@ from visup.tasks.supervision.supervise import MEMORY, task_reasoner
 if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
 
-Belief = Callable[[Mind], Mind]
+Assumption = Callable[[Mind], Mind]
 """Gives a mind in which it is so; what it is about may not be there."""
 
 
 @dataclass(frozen=True, slots=True)
-class RelationIs:
+class AssumedRelation:
     """A relation is true, false or unknown, since a time in seconds.
 
     Where one answer of several excludes the others (converging, keeping their distance, diverging),
@@ -54,7 +54,7 @@ class RelationIs:
     since: float
 
     def __call__(self, mind: Mind) -> Mind:
-        """See `Belief`."""
+        """See `Assumption`."""
         if not all(i in mind.objects for i in self.objects):
             return mind
         found = mind.relation(self.name, *self.objects)
@@ -75,14 +75,14 @@ class RelationIs:
 
 
 @dataclass(frozen=True, slots=True)
-class IdentityIs:
+class AssumedIdentity:
     """An object is of a model; 'unknown object' for none of them."""
 
     object_id: int
     name: str
 
     def __call__(self, mind: Mind) -> Mind:
-        """See `Belief`."""
+        """See `Assumption`."""
         belief = mind.objects.get(self.object_id)
         if belief is None or (belief.name == self.name and belief.confidence == 1.0):
             return mind
@@ -92,14 +92,14 @@ class IdentityIs:
 
 
 @dataclass(frozen=True, slots=True)
-class PresenceIs:
+class AssumedPresence:
     """An object is seen, hidden, or has left."""
 
     object_id: int
     presence: Presence
 
     def __call__(self, mind: Mind) -> Mind:
-        """See `Belief`."""
+        """See `Assumption`."""
         belief = mind.objects.get(self.object_id)
         if belief is None or belief.presence is self.presence:
             return mind
@@ -107,41 +107,41 @@ class PresenceIs:
 
 
 @dataclass(frozen=True, slots=True)
-class Insisting:
+class AssumingReasoner:
     """A reasoner after which some beliefs are made so again."""
 
     reasoner: Reasoner
-    beliefs: tuple[Belief, ...]
+    beliefs: tuple[Assumption, ...]
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """See `Reasoner`."""
         outcome = self.reasoner(mind, observation)
-        told = tuple(e for e in outcome.events if not any(_denied(b, e) for b in self.beliefs))
-        return replace(outcome, mind=insisted(outcome.mind, self.beliefs), events=told)
+        told = tuple(e for e in outcome.events if not any(_contradicts(b, e) for b in self.beliefs))
+        return replace(outcome, mind=with_assumptions(outcome.mind, self.beliefs), events=told)
 
 
-def _denied(belief: Belief, event: Event) -> bool:
+def _contradicts(belief: Assumption, event: Event) -> bool:
     """Whether an event tells of what is insisted not to happen."""
-    if not isinstance(belief, RelationIs) or belief.name != "coupled":
+    if not isinstance(belief, AssumedRelation) or belief.name != "coupled":
         return False
     other = "decoupled" if belief.truth is Truth.TRUE else "coupled"
     return event.kind == other and set(event.objects) == set(belief.objects)
 
 
-def insisted(mind: Mind, beliefs: Iterable[Belief]) -> Mind:
+def with_assumptions(mind: Mind, beliefs: Iterable[Assumption]) -> Mind:
     """The mind with some beliefs."""
     for belief in beliefs:
         mind = belief(mind)
     return mind
 
 
-def insisting(reasoners: Reasoners, beliefs: Sequence[Belief]) -> Reasoners:
+def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> Reasoners:
     """Reasoners that hold to some beliefs."""
     if not beliefs:
         return reasoners
 
     def wrapped(some: tuple[Reasoner, ...]) -> tuple[Reasoner, ...]:
-        return tuple(Insisting(t, tuple(beliefs)) for t in some)
+        return tuple(AssumingReasoner(t, tuple(beliefs)) for t in some)
 
     return Reasoners(
         wrapped(reasoners.update), wrapped(reasoners.cogitate), wrapped(reasoners.match)

@@ -36,10 +36,10 @@ from visup.agent import (
     TaskBelief,
 )
 from visup.agent.model.step import Step
-from visup.stepping.cursor import Midway, Stopped
-from visup.stepping.diff import Change, MindDiff
+from visup.stepping.cursor import PausedStep, StepResult
+from visup.stepping.diff import MindChange, MindDiff
 from visup.stepping.explanations.evidence import Why, worded
-from visup.terminal.narrator import line
+from visup.terminal.narrator import event_row
 from visup.terminal.tables import (
     alert_line,
     alerts_list,
@@ -101,7 +101,7 @@ def _brief(value: object, most: int = 60) -> str:
 @shown.register
 def _(record: Step) -> RenderableType:
     head = Text(f"step of frame {record.frame_index}, {record.time:.2f} s", style="bold")
-    told: list[RenderableType] = [line(e) for e in worded_once(record.events)]
+    told: list[RenderableType] = [event_row(e) for e in worded_once(record.events)]
     told = told or [Text("nothing was told", style="dim")]
     asked = [shown(d) for d in record.directives]
     return Group(head, *told, objects_table(record.mind.objects.values()), *asked)
@@ -179,7 +179,7 @@ def _(record: Percept) -> RenderableType:
 
 @shown.register
 def _(record: Event) -> RenderableType:
-    return line(record)
+    return event_row(record)
 
 
 @shown.register
@@ -244,21 +244,21 @@ def _(record: MindDiff) -> RenderableType:
 
 
 @shown.register
-def _(record: Change) -> RenderableType:
+def _(record: MindChange) -> RenderableType:
     text = str(record)
     return Text(text, style=_MARKS[text[0]])
 
 
 @shown.register
-def _(record: Midway) -> RenderableType:
+def _(record: PausedStep) -> RenderableType:
     head = f"inside frame {record.seen.frame_index}, after {record.phase.value}"
     told = record.thought.events if record.thought else ()
-    return Group(Text(head, style="bold"), *(line(e) for e in told))
+    return Group(Text(head, style="bold"), *(event_row(e) for e in told))
 
 
 @shown.register
-def _(record: Stopped) -> RenderableType:
-    told = [line(e) for step in record.steps for e in worded_once(step.events)]
+def _(record: StepResult) -> RenderableType:
+    told = [event_row(e) for step in record.steps for e in worded_once(step.events)]
     why = [Text(f"stopped: {reason}", style="bold") for reason in record.reasons]
     end = [Text("the source has ended", style="yellow")] if record.ended else []
     return Group(*told, *why, *end, Text(f"{record.taken} steps", style="dim"))

@@ -47,22 +47,22 @@ class Narrator:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Print the events of one step."""
-        self.tell_all(step.events)
+        self.print_events(step.events)
 
-    def tell_all(self, events: Sequence[Event]) -> None:
+    def print_events(self, events: Sequence[Event]) -> None:
         """Print the events of one step."""
         for event in events if self.as_json else worded_once(events):
-            self.tell(event)
+            self.print_event(event)
 
-    def tell(self, event: Event) -> None:
+    def print_event(self, event: Event) -> None:
         """Print one event."""
         if self.as_json:
             print(json.dumps(event_line(event), ensure_ascii=False, sort_keys=True), flush=True)
         else:
-            self.console.print(line(event))
+            self.console.print(event_row(event))
 
 
-def line(event: Event) -> Table:
+def event_row(event: Event) -> Table:
     """One event as a row: time, mark, sentence; long sentences go on below themselves."""
     style = STYLE[event.severity]
     row = Table.grid(padding=(0, 1), expand=False)

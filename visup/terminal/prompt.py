@@ -13,7 +13,7 @@ from visup.agent.contract.phases import Phase
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import RULES
 from visup.stepping.breakpoint_parser import EVENT_KINDS
-from visup.stepping.breakpoints import rules, stages
+from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import questions as asking
 from visup.terminal.session import Session
 from visup.terminal.session_commands import COMMANDS
@@ -31,7 +31,7 @@ def _objects(session: Session) -> list[str]:
 
 def _names(session: Session) -> list[str]:
     mind = session.stepper.mind
-    return [*stages(mind), *rules(mind)]
+    return [*stage_names(mind), *rule_names(mind)]
 
 
 _WORDS: Mapping[str, Words] = {
@@ -103,7 +103,7 @@ def toolbar(session: Session) -> str:
     """Where the session is, in one line of at most 80 characters."""
     stepper = session.stepper
     branch = f"  branch from {stepper.begin}" if len(session.courses) > 1 else ""
-    inside = f"  after {stepper.midway.phase.value}" if stepper.midway else ""
+    inside = f"  after {stepper.paused.phase.value}" if stepper.paused else ""
     place = f" step {stepper.at} of {stepper.made}{inside}{branch}  {stepper.mind.time:.2f} s"
     return f"{place}  Tab completes, 'help step' explains"[:80]
 

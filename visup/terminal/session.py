@@ -12,10 +12,10 @@ from visup.agent import Frame, Observation
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
-from visup.stepping import Feed, Mark, Stepper, Stopped, stop_of
-from visup.stepping.breakpoints import FrameStop, Stop, TimeStop
+from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
+from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
 from visup.terminal.display import shown
-from visup.terminal.narrator import line
+from visup.terminal.narrator import event_row
 from visup.terminal.session_commands import COMMANDS, HELP
 from visup.terminal.tables import (
     alerts_list,
@@ -27,7 +27,7 @@ from visup.terminal.tables import (
     relations_table,
     tasks_tree,
 )
-from visup.terminal.what_if_commands import supposed, swapped
+from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
 from visup.wording import worded_once
 
 __all__ = ["HELP", "Session"]
@@ -48,11 +48,14 @@ class Session:
     """
 
     def __init__(
-        self, agent: Agent, frames: Iterable[Frame] | Feed, console: Console | None = None
+        self,
+        agent: Agent,
+        frames: Iterable[Frame] | ObservationSource,
+        console: Console | None = None,
     ) -> None:
         self.courses = [Stepper(agent, frames)]
         self.console = console or Console(highlight=False)
-        self._marks: dict[str, Mark] = {}
+        self._marks: dict[str, Bookmark] = {}
         self._commands: dict[str, Callable[[Sequence[str]], Answer]] = {
             "step": self._step,
             "run": self._run,
@@ -123,12 +126,12 @@ class Session:
             if command in ("quit", "exit", "q"):
                 break
             last = command
-            answer = self.obey(command)
+            answer = self.execute(command)
             if answer is not None:
                 self.console.print(answer)
         return 0
 
-    def obey(self, command: str) -> Answer:
+    def execute(self, command: str) -> Answer:
         """Carry out one command; a unique beginning of its name will do."""
         word, *rest = command.split()
         if word.endswith("!"):
@@ -155,13 +158,13 @@ class Session:
         return self._advance(None, what or _never)
 
     def _advance(self, count: int | None, what: str | Callable[[Step], bool]) -> Answer:
-        stop: Stop | None = stop_of(what, self.stepper.mind) if what else None
+        stop: StopCondition | None = parse_condition(what, self.stepper.mind) if what else None
         if stop is not None and self._is_past(stop):
             return _amiss(f"{stop.text} is past: 'go' and 'back' lead there")
         stopped = self.stepper.step(count, stop, self._tell)
         return self._place(stopped)
 
-    def _is_past(self, stop: Stop) -> bool:
+    def _is_past(self, stop: StopCondition) -> bool:
         mind = self.stepper.mind
         if mind.frame_index < 0:
             return False
@@ -171,9 +174,9 @@ class Session:
 
     def _tell(self, step: Step) -> None:
         for event in worded_once(step.events):
-            self.console.print(line(event))
+            self.console.print(event_row(event))
 
-    def _place(self, stopped: Stopped | None = None) -> RenderableType:
+    def _place(self, stopped: StepResult | None = None) -> RenderableType:
         """Where the session is: why it stopped, what is watched, frame and time."""
         mind, lines = self.stepper.mind, []
         if stopped is not None:
@@ -193,8 +196,8 @@ class Session:
         """What is to be known of the place besides frame and time."""
         stepper = self.stepper
         told = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
-        if stepper.midway:
-            told.append(f"; inside the step, after {stepper.midway.phase.value}")
+        if stepper.paused:
+            told.append(f"; inside the step, after {stepper.paused.phase.value}")
         if len(self.courses) > 1:
             told.append(f"; branch from step {stepper.begin}")
         return "".join(told)
@@ -276,13 +279,13 @@ class Session:
     # What if
 
     def _suppose(self, words: Sequence[str], *, retract: bool) -> Answer:
-        belief = supposed(self.stepper.mind, words, self.agent.models, retract=retract)
+        belief = parse_assumption(self.stepper.mind, words, self.agent.models, retract=retract)
         return self._begin(self.stepper.branch(belief))
 
     def _use(self, words: Sequence[str]) -> Answer:
         if len(words) != 2 or words[0] not in ("rules", "task"):
             return _amiss(_usage("use"))
-        reasoners = swapped(self.agent.reasoners, words[0], words[1])
+        reasoners = replaced_reasoners(self.agent.reasoners, words[0], words[1])
         return self._begin(self.stepper.branch(reasoners=reasoners))
 
     def _begin(self, branch: Stepper) -> Answer:
@@ -328,9 +331,9 @@ class Session:
 
     def _seen(self) -> Observation | None:
         """What was perceived in this step."""
-        midway, last = self.stepper.midway, self.stepper.last
-        if midway is not None:
-            return midway.seen
+        paused, last = self.stepper.paused, self.stepper.last
+        if paused is not None:
+            return paused.seen
         return None if last is None else last.observation
 
     def _candidates(self, words: Sequence[str]) -> Answer:
@@ -345,7 +348,7 @@ class Session:
         told = list(self.stepper.told(last=self.stepper.at))[-most:]
         rows = Table.grid(padding=(0, 1))
         for number, event in told:
-            rows.add_row(Text(f"step {number}", style="dim"), line(event))
+            rows.add_row(Text(f"step {number}", style="dim"), event_row(event))
         return rows if told else Text("none yet")
 
     def _directives(self, words: Sequence[str]) -> Answer:

@@ -14,10 +14,10 @@ from visup.agent.model.mind import UNKNOWN_OBJECT
 from visup.rules.language.parser import load_rules
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.what_if import (
-    Belief,
-    IdentityIs,
-    PresenceIs,
-    RelationIs,
+    AssumedIdentity,
+    AssumedPresence,
+    AssumedRelation,
+    Assumption,
     with_rules,
     with_tasks,
 )
@@ -27,9 +27,9 @@ _TRUTHS = tuple(t.value for t in Truth)
 _PRESENCES = tuple(p.value for p in Presence)
 
 
-def supposed(
+def parse_assumption(
     mind: Mind, words: Sequence[str], models: Iterable[str] = (), *, retract: bool = False
-) -> Belief:
+) -> Assumption:
     """The belief that some words tell.
 
     Args:
@@ -52,7 +52,7 @@ def supposed(
 _EXPECTED = "such as: touching 1 2 true, object 1 arm, object 2 hidden"
 
 
-def _relation(mind: Mind, words: list[str], retract: bool) -> Belief:
+def _relation(mind: Mind, words: list[str], retract: bool) -> Assumption:
     name, *rest = words
     ids = tuple(int(w) for w in rest if w.isdecimal())
     known = {*RELATION_NAMES, *(r.name for r in mind.relations)}
@@ -66,20 +66,20 @@ def _relation(mind: Mind, words: list[str], retract: bool) -> Belief:
     if len(ids) != 2 or (rest[-1] not in _TRUTHS and not rest[-1].isdecimal()):
         what = f"'{' '.join(words)}' is no relation of two objects"
         raise SettingsError(what, expected=_EXPECTED)
-    return RelationIs(name, ids, Truth(truth), mind.time)
+    return AssumedRelation(name, ids, Truth(truth), mind.time)
 
 
-def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: bool) -> Belief:
+def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: bool) -> Assumption:
     if not words or not words[0].isdecimal() or (len(words) < 2 and not retract):
         raise SettingsError("what of which object?", expected=_EXPECTED)
     object_id = int(words[0])
     _known(mind, object_id)
     if retract:
-        return IdentityIs(object_id, UNKNOWN_OBJECT)
+        return AssumedIdentity(object_id, UNKNOWN_OBJECT)
     said = " ".join(words[1:])
     if said in _PRESENCES:
-        return PresenceIs(object_id, Presence(said))
-    return IdentityIs(object_id, understood(mind, object_id, said, models))
+        return AssumedPresence(object_id, Presence(said))
+    return AssumedIdentity(object_id, understood(mind, object_id, said, models))
 
 
 def _known(mind: Mind, object_id: int) -> None:
@@ -88,7 +88,7 @@ def _known(mind: Mind, object_id: int) -> None:
         raise SettingsError(f"there is no object {object_id}", expected=known)
 
 
-def swapped(reasoners: Reasoners, kind: str, place: str) -> Reasoners:
+def replaced_reasoners(reasoners: Reasoners, kind: str, place: str) -> Reasoners:
     """Reasoners with other rules or another task.
 
     Args:

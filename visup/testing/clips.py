@@ -19,7 +19,7 @@ FPS = 25.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class LabelledFrame:
     """A frame with what is true of it.
 
     Attributes:
@@ -62,14 +62,18 @@ def region_of(
     )
 
 
-def disc(frames: int = 20, size: Size = SIZE, fps: float = FPS, seed: int = 0) -> list[Shot]:
+def disc(
+    frames: int = 20, size: Size = SIZE, fps: float = FPS, seed: int = 0
+) -> list[LabelledFrame]:
     """A bright disc that goes from left to right over a textured ground."""
     radius, speed = size[1] / 6, size[0] / 2 / max(frames, 1)
     paths = [lambda n: (size[0] / 4 + speed * n, size[1] / 2)]
     return _discs(paths, radius, frames, size, fps, seed)
 
 
-def crossing(frames: int = 20, size: Size = SIZE, fps: float = FPS, seed: int = 0) -> list[Shot]:
+def crossing(
+    frames: int = 20, size: Size = SIZE, fps: float = FPS, seed: int = 0
+) -> list[LabelledFrame]:
     """Two discs that meet; the second one hides the first."""
     radius, speed = size[1] / 6, size[0] / 2 / max(frames, 1)
     paths = [
@@ -79,20 +83,22 @@ def crossing(frames: int = 20, size: Size = SIZE, fps: float = FPS, seed: int = 
     return _discs(paths, radius, frames, size, fps, seed)
 
 
-def flat(level: int, frames: int = 5, size: Size = SIZE, fps: float = FPS) -> list[Shot]:
+def flat(level: int, frames: int = 5, size: Size = SIZE, fps: float = FPS) -> list[LabelledFrame]:
     """Nothing but one grey level: 0 is a black image, 255 a white one."""
     image = np.full((size[1], size[0], 3), level, np.uint8)
-    return [Shot(Frame(n, n / fps, image.copy())) for n in range(frames)]
+    return [LabelledFrame(Frame(n, n / fps, image.copy())) for n in range(frames)]
 
 
-def noise(frames: int = 5, size: Size = SIZE, fps: float = FPS, seed: int = 0) -> list[Shot]:
+def noise(
+    frames: int = 5, size: Size = SIZE, fps: float = FPS, seed: int = 0
+) -> list[LabelledFrame]:
     """Nothing but noise."""
     rng = np.random.default_rng(seed)
     images = rng.integers(0, 256, (frames, size[1], size[0], 3), dtype=np.uint8)
-    return [Shot(Frame(n, n / fps, image)) for n, image in enumerate(images)]
+    return [LabelledFrame(Frame(n, n / fps, image)) for n, image in enumerate(images)]
 
 
-CLIPS: Mapping[str, Callable[[], list[Shot]]] = MappingProxyType(
+CLIPS: Mapping[str, Callable[[], list[LabelledFrame]]] = MappingProxyType(
     {
         "a disc that moves": disc,
         "two discs that cross": crossing,
@@ -114,7 +120,7 @@ def _discs(
     size: Size,
     fps: float,
     seed: int,
-) -> list[Shot]:
+) -> list[LabelledFrame]:
     """Discs over a ground; later ones are in front."""
     rng = np.random.default_rng(seed)
     ground = cv2.GaussianBlur(
@@ -133,7 +139,7 @@ def _discs(
         image += rng.normal(0, 1.0, image.shape)
         grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
         shots.append(
-            Shot(
+            LabelledFrame(
                 Frame(n, n / fps, np.repeat(grey[..., None], 3, axis=2)),
                 tuple(
                     region_of(mask, i + 1, _velocity(path, n, fps))

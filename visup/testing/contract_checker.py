@@ -23,14 +23,14 @@ from visup.agent.execution.worker import packed_bytes
 from visup.agent.model.errors import BehaviourError, VisupError
 from visup.agent.plugins.loader import checked
 from visup.rules.activation.waking import waking_rules
-from visup.testing.clips import CLIPS, Shot
-from visup.testing.scripted import Says, stand_ins
+from visup.testing.clips import CLIPS, LabelledFrame
+from visup.testing.scripted import Script, stub_behaviours
 
 Make = Callable[[], Behaviour]
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class CheckResult:
     """What one check found.
 
     Attributes:
@@ -45,7 +45,7 @@ class Finding:
 
 
 @dataclass(slots=True)
-class _Outing:
+class _ClipRun:
     """One run over a clip."""
 
     percepts: list[Percept] = field(default_factory=list)
@@ -58,8 +58,8 @@ class _Outing:
 def check_behaviour(
     behaviour: Behaviour | Make,
     *,
-    clips: Mapping[str, Sequence[Shot]] | None = None,
-    provide: Mapping[str, Says] | None = None,
+    clips: Mapping[str, Sequence[LabelledFrame]] | None = None,
+    provide: Mapping[str, Script] | None = None,
 ) -> None:
     """Fail, as a test does, unless a behaviour keeps its contract.
 
@@ -72,92 +72,96 @@ def check_behaviour(
     Raises:
         AssertionError: It does not; the message lists every check that failed.
     """
-    failed = [f for f in findings(behaviour, clips=clips, provide=provide) if not f.passed]
+    failed = [f for f in check_results(behaviour, clips=clips, provide=provide) if not f.passed]
     if failed:
         raise AssertionError("\n".join(f"{f.check}: {f.detail}" for f in failed))
 
 
-def findings(
+def check_results(
     behaviour: Behaviour | Make,
     *,
-    clips: Mapping[str, Sequence[Shot]] | None = None,
-    provide: Mapping[str, Says] | None = None,
-) -> list[Finding]:
+    clips: Mapping[str, Sequence[LabelledFrame]] | None = None,
+    provide: Mapping[str, Script] | None = None,
+) -> list[CheckResult]:
     """What every check found; see `check_behaviour`."""
     make = _maker(behaviour)
     try:
         first = checked(make(), "the behaviour")
         shots = {name: clip() for name, clip in CLIPS.items()} | dict(clips or {})
-        stand_ins(first.contract.needs, [], provide)
+        stub_behaviours(first.contract.needs, [], provide)
     except VisupError as fault:
-        return [Finding("it can be plugged in", False, str(fault))]
-    found = [Finding("it can be plugged in", True, _declared(first.contract))]
+        return [CheckResult("it can be plugged in", False, str(fault))]
+    found = [CheckResult("it can be plugged in", True, _declared(first.contract))]
     outings = {}
     for name, clip in shots.items():
-        outings[name] = _outing(make, clip, provide)
+        outings[name] = _run_clip(make, clip, provide)
         errors = outings[name].errors
-        found.append(Finding(f"runs on {name}", not errors, errors[0] if errors else ""))
-    found += _conduct(first.contract, make, shots, outings, provide)
+        found.append(CheckResult(f"runs on {name}", not errors, errors[0] if errors else ""))
+    found += _contract_results(first.contract, make, shots, outings, provide)
     return found
 
 
-def _conduct(
+def _contract_results(
     contract: Contract,
     make: Make,
-    shots: Mapping[str, Sequence[Shot]],
-    outings: Mapping[str, _Outing],
-    provide: Mapping[str, Says] | None,
-) -> Iterator[Finding]:
+    shots: Mapping[str, Sequence[LabelledFrame]],
+    outings: Mapping[str, _ClipRun],
+    provide: Mapping[str, Script] | None,
+) -> Iterator[CheckResult]:
     percepts = [p for outing in outings.values() for p in outing.percepts]
     kinds = sorted({p.kind for p in percepts})
     told = f"{len(percepts)} percepts: {', '.join(kinds)}" if kinds else "nothing, on any clip"
-    yield Finding("what it reported", True, told)
+    yield CheckResult("what it reported", True, told)
     wrote = [name for name, outing in outings.items() if outing.wrote]
-    yield Finding("leaves frames as they are", not wrote, f"it wrote to {wrote}" if wrote else "")
+    yield CheckResult(
+        "leaves frames as they are", not wrote, f"it wrote to {wrote}" if wrote else ""
+    )
     changed = [name for name, o in outings.items() if o.packed != _packed(o.percepts)]
     said = f"percepts of earlier frames changed later, on {changed}: report copies"
-    yield Finding("leaves what it reported as it is", not changed, said if changed else "")
+    yield CheckResult("leaves what it reported as it is", not changed, said if changed else "")
     if contract.deterministic:
         differs = [
             name
             for name in shots
-            if _outing(make, shots[name], provide).packed != outings[name].packed
+            if _run_clip(make, shots[name], provide).packed != outings[name].packed
         ]
         said = f"a second run reported something else on {differs}; or declare deterministic=False"
-        yield Finding("is deterministic", not differs, said if differs else "")
+        yield CheckResult("is deterministic", not differs, said if differs else "")
     if contract.cost_ms is not None:
         taken = max(median(o.times_ms) for o in outings.values() if o.times_ms)
         said = f"{taken:.3g} ms a run, declared are {contract.cost_ms:g} ms"
-        yield Finding("keeps its budget", taken <= contract.cost_ms, said)
+        yield CheckResult("keeps its budget", taken <= contract.cost_ms, said)
     if contract.isolate:
         yield _sendable(make)
     if contract.awake:
         yield _wakes(contract)
 
 
-def _wakes(contract: Contract) -> Finding:
+def _wakes(contract: Contract) -> CheckResult:
     said = "says when it is awake"
     try:
         waking_rules([contract])
     except BehaviourError as fault:
-        return Finding(said, False, str(fault))
-    return Finding(said, True, contract.awake)
+        return CheckResult(said, False, str(fault))
+    return CheckResult(said, True, contract.awake)
 
 
-def _sendable(make: Make) -> Finding:
+def _sendable(make: Make) -> CheckResult:
     behaviour = make()
     try:
         parcel(behaviour, behaviour.contract)
     except BehaviourError as fault:
-        return Finding("can be sent to a process of its own", False, str(fault))
-    return Finding("can be sent to a process of its own", True)
+        return CheckResult("can be sent to a process of its own", False, str(fault))
+    return CheckResult("can be sent to a process of its own", True)
 
 
-def _outing(make: Make, shots: Sequence[Shot], provide: Mapping[str, Says] | None) -> _Outing:
+def _run_clip(
+    make: Make, shots: Sequence[LabelledFrame], provide: Mapping[str, Script] | None
+) -> _ClipRun:
     """Run a fresh behaviour over a clip, here and without limits of time."""
-    outing, behaviour = _Outing(), make()
+    outing, behaviour = _ClipRun(), make()
     own = behaviour.contract.name
-    others = stand_ins(behaviour.contract.needs, shots, provide)
+    others = stub_behaviours(behaviour.contract.needs, shots, provide)
     here = Limits(hang_s=None, here=True, wakeful=frozenset({own}))
     slots = in_order([*others, behaviour], here)
     for shot in shots:

@@ -19,9 +19,9 @@ from visup.agent import (
 )
 from visup.agent.model.errors import BehaviourError, SettingsError
 from visup.percepts.video.base import Ending, Source
-from visup.testing.clips import Shot
+from visup.testing.clips import LabelledFrame
 
-Says = Callable[[Frame], object]
+Script = Callable[[Frame], object]
 """What is perceived of a frame: one value, or a list of them; None for nothing."""
 
 
@@ -35,7 +35,7 @@ class Scripted:
         declared: Other fields of its contract.
     """
 
-    def __init__(self, name: str, gives: tuple[str, ...], says: Says, **declared: Any) -> None:
+    def __init__(self, name: str, gives: tuple[str, ...], says: Script, **declared: Any) -> None:
         self.contract = Contract(name, gives, **declared)
         self.says = says
         self.directives: list[tuple[Directive, ...]] = []
@@ -82,10 +82,10 @@ class ScriptedSource(Source):
         self._script = iter(())
 
 
-def stand_ins(
+def stub_behaviours(
     kinds: Iterable[str],
-    shots: Sequence[Shot],
-    provide: Mapping[str, Says] | None = None,
+    shots: Sequence[LabelledFrame],
+    provide: Mapping[str, Script] | None = None,
 ) -> list[Behaviour]:
     """Behaviours that give what others need, from what is true of a clip.
 
@@ -98,7 +98,7 @@ def stand_ins(
         BehaviourError: A kind is not known.
     """
     truth = {shot.frame.index: shot for shot in shots}
-    known: dict[str, Says] = {
+    known: dict[str, Script] = {
         "region": lambda f: list(truth[f.index].regions),
         "hypothesis": lambda f: [
             Hypothesis(r.id, "disc", 0, 0.9, 0.0, 1.0) for r in truth[f.index].regions

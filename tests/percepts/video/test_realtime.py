@@ -76,14 +76,14 @@ def test_the_newest_frame_that_is_due_is_given(steps: list[int], work: list[int]
 def test_whoever_is_quick_misses_nothing_and_nothing_is_told() -> None:
     seen, played = watched([k / 25 for k in range(50)], [0.01])
     assert [k for k, _ in seen] == list(range(50))
-    assert list(played.troubles()) == []
+    assert list(played.runtime_faults()) == []
     assert played.note() is None
 
 
 @pytest.mark.parametrize(("cost", "severity"), [(0.1, Severity.INFO), (1.2, Severity.WARNING)])
 def test_that_frames_are_dropped_is_told(cost: float, severity: Severity) -> None:
     _, played = watched([k / 25 for k in range(200)], [cost])
-    (said,) = played.troubles()
+    (said,) = played.runtime_faults()
     assert (said.kind, said.severity) == ("frames_dropped", severity)
     assert "of the last" in said.cause
     assert played.note() == (
@@ -95,7 +95,7 @@ def test_what_was_dropped_long_ago_is_told_no_more() -> None:
     times = [k / 25 for k in range(400)]
     _, played = watched(times, [0.1] * 50 + [0.0] * 400)
     assert played.dropped > 50
-    assert list(played.troubles()) == []
+    assert list(played.runtime_faults()) == []
 
 
 class Steps(Source):

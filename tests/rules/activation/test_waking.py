@@ -19,7 +19,7 @@ from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
-from visup.testing import Shot, crossing
+from visup.testing import LabelledFrame, crossing
 
 NEAR = "exists b: gap(a, b) < 30 px"
 CLIP = crossing(frames=60)
@@ -30,7 +30,7 @@ class Eye:
 
     contract = Contract("eye", gives=("region",))
 
-    def __init__(self, shots: Sequence[Shot] = CLIP) -> None:
+    def __init__(self, shots: Sequence[LabelledFrame] = CLIP) -> None:
         self.shots = shots
 
     def perceive(

@@ -16,7 +16,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.rules.identity.questions import wording
 from visup.rules.reasoners import default_reasoners
-from visup.runs.operator import Operator, parse_answers
+from visup.runs.operator import HumanOperator, parse_answers
 
 BLANK = np.broadcast_to(np.zeros((1, 1, 1), np.uint8), (SIZE[1], SIZE[0], 3))
 Said = dict[int, list[tuple[str, float]]]
@@ -121,15 +121,15 @@ def test_what_is_typed_or_given_beforehand_reaches_the_mind() -> None:
     typed = [[], ["nonsense\n"], ["1=guitar\n"]]
     said: list[str] = []
     agent = agent_of(doubtful)
-    operator = Operator(typed=lambda: typed.pop(0) if typed else [], tell=said.append)
+    operator = HumanOperator(typed=lambda: typed.pop(0) if typed else [], tell=said.append)
     agent.observers = (operator.attend(agent),)
     assert steps(agent, 0, 60)[-1].mind.answers == {1: "guitar"}
     assert "cannot be read" in said[0]
     early = agent_of(doubtful)
-    early.observers = (Operator({1: "arm"}).attend(early),)
+    early.observers = (HumanOperator({1: "arm"}).attend(early),)
     assert steps(early, 0, 60)[-1].mind.answers == {1: "rms_arm"}
     with pytest.raises(SettingsError):
-        Operator({1: "nobody"}).attend(agent_of(doubtful))
+        HumanOperator({1: "nobody"}).attend(agent_of(doubtful))
 
 
 @pytest.mark.parametrize("line", ["arm", "=arm", "x=arm", "2="])

@@ -28,7 +28,7 @@ def test_an_alert_goes_back_to_the_percepts_of_the_frame_that_opened_it(it: Step
     assert [p.time for p in why.percepts] == [0.6] * len(found)
     assert [v.id for v in found if isinstance(v, Region)] == [2]
     assert {v.name for v in found if isinstance(v, Hypothesis)} == {"hubble", "arm"}
-    seen = it.seen_at(16)
+    seen = it.observation_at(16)
     assert {id(type(v)) for v in found} <= {id(type(v)) for k in KINDS for v in seen.of(k)}
 
 

@@ -1,1 +1,1 @@
-"""eval."""
+"""`visup eval`: figures against ground truth, as tables and as JSON."""

@@ -152,9 +152,9 @@ def checked(folder: Path, json_file: Path | None) -> None:
     writable(json_file)
 
 
-def told(word: str) -> _Told:
+def told(word: str) -> ProgressLine:
     """A line of progress on standard error: call it with what is being done."""
-    return _Told(word)
+    return ProgressLine(word)
 
 
 def writable(json_file: Path | None) -> None:
@@ -169,7 +169,7 @@ def writable(json_file: Path | None) -> None:
         raise OutputError("its folder does not exist", where=str(json_file))
 
 
-class _Told:
+class ProgressLine:
     """A line of progress on standard error, replaced as items are done."""
 
     def __init__(self, word: str) -> None:
@@ -178,11 +178,12 @@ class _Told:
         self._status = Console(stderr=True).status(word)
         self._word = word
 
-    def __enter__(self) -> _Told:
+    def __enter__(self) -> ProgressLine:
         self._status.start()
         return self
 
     def __call__(self, text: str) -> None:
+        """Say what is being done."""
         self._status.update(f"{self._word}: {text}")
 
     def __exit__(self, *_: object) -> None:

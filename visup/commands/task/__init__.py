@@ -1,1 +1,1 @@
-"""task."""
+"""`visup task`: check, format, show and simulate task files, and serve them to editors."""

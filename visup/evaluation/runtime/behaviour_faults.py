@@ -34,7 +34,7 @@ from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.inputs_missing import percepts_read
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.reasoners import default_reasoners
-from visup.testing import Scripted, Shot, crossing
+from visup.testing import LabelledFrame, Scripted, crossing
 
 COUNT = 1000
 FRAMES = 45
@@ -215,7 +215,7 @@ def _pair(name: str, takes: Sequence[str], yes: str, no: str) -> list[str]:
 
 
 @cache
-def _shots() -> list[Shot]:
+def _shots() -> list[LabelledFrame]:
     return crossing(FRAMES, fps=FPS)
 
 

@@ -22,7 +22,7 @@ from rich.console import Console
 
 from visup.agent.model.errors import OutputError, SettingsError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text
-from visup.runs.resume import past_of
+from visup.runs.resume import interrupted_run
 from visup.runs.runner import RunOptions, supervise
 from visup.runs.settings import WatchSettings
 from visup.terminal.narrator import Narrator
@@ -134,7 +134,7 @@ def _trial(
     tally.kills += 1
     _kill(_begin(settings, folder, every), float(rng.uniform(0.0, whole_s)))
     try:
-        past_of(folder)
+        interrupted_run(folder)
     except OutputError as nothing:
         if "is over" not in nothing.what:
             tally.early += 1
@@ -173,7 +173,7 @@ def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
 def _resume(folder: Path, every: float) -> int | None:
     """A process that goes on with a run, or None when the run is over."""
     try:
-        past = past_of(folder)
+        past = interrupted_run(folder)
     except OutputError:
         return None
     return _forked(folder, lambda console: _supervise(past.settings, folder, every, console, True))
@@ -182,7 +182,7 @@ def _resume(folder: Path, every: float) -> int | None:
 def _supervise(
     settings: WatchSettings, folder: Path, every: float, console: Console, resume: bool
 ) -> None:
-    past = past_of(folder) if resume else None
+    past = interrupted_run(folder) if resume else None
     options = RunOptions(video=False, report=False, state_every_s=every)
     supervise(settings, folder, observers=[Narrator(console, True)], options=options, past=past)
 

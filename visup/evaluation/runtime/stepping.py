@@ -24,7 +24,7 @@ from visup.evaluation.runtime.soak import rss_mb, scripted
 from visup.rules.relations.reasoner import RELATIONS
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
-from visup.stepping import GivenFeed, Stepper
+from visup.stepping import ScriptedObservations, Stepper
 
 BACK = 500
 BACK_MS = 200.0
@@ -110,7 +110,7 @@ def missed(figures: dict[str, Any]) -> list[str]:
 
 
 def _stepper(steps: int) -> Stepper:
-    return Stepper(_agent(), GivenFeed(_own(seen) for seen in scripted(steps)))
+    return Stepper(_agent(), ScriptedObservations(_own(seen) for seen in scripted(steps)))
 
 
 def _agent() -> Any:

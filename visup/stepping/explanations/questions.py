@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from visup.agent import Mind, Presence, Reasoner
 from visup.agent.model.errors import SettingsError
 from visup.rules.predicates.snapshot import RELATION_NAMES
-from visup.stepping.breakpoints import rules, stages
+from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import why_not as whynot
 from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import Reasons
@@ -90,13 +90,13 @@ def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> Asked:
     if about in known:
         return _complete(Asked(about, names[1] if len(names) > 1 else "", ids), text)
     for kind, table in (
-        ("stage", stages(mind)),
-        ("rule", rules(mind)),
+        ("stage", stage_names(mind)),
+        ("rule", rule_names(mind)),
         ("relation", RELATION_NAMES),
     ):
         if about in table:
             return Asked(kind, about, ids)
-    tables = (*known, *stages(mind), *rules(mind), *RELATION_NAMES)
+    tables = (*known, *stage_names(mind), *rule_names(mind), *RELATION_NAMES)
     close = get_close_matches(about, tables, 1, 0.6)
     raise SettingsError(
         f"nothing is asked by '{text}'",

@@ -43,7 +43,7 @@ class Course(Protocol):
     def mind(self) -> Mind: ...  # noqa: D102
 
     def mind_at(self, number: int) -> Mind: ...  # noqa: D102
-    def seen_at(self, number: int) -> Observation: ...  # noqa: D102
+    def observation_at(self, number: int) -> Observation: ...  # noqa: D102
     def told(self, first: int = 1, last: int | None = None) -> Any: ...  # noqa: D102
 
 
@@ -125,7 +125,7 @@ class Reasons:
         return Why("because", (*stated, *self._objects(event.objects)))
 
     def _failed(self) -> tuple[Why, ...]:
-        seen = self.course.seen_at(self.number)
+        seen = self.course.observation_at(self.number)
         bad = (r for r in seen.reports if r.state not in (ReportState.RAN, ReportState.RESTED))
         return tuple(
             Why(f"{r.behaviour} {r.state.value}: {r.error}", (), seen.frame_index, seen.time)
@@ -227,7 +227,7 @@ class Reasons:
         """The latest percepts that say what it looks like."""
         number = self._step_of(b.last_seen)
         for back in range(number, max(self.course.begin, number - LOOK_BACK), -1):
-            seen = self.course.seen_at(back)
+            seen = self.course.observation_at(back)
             found = of_region(seen, b.region.id, names=True)
             named = tuple(w for w in found if w.percept and w.percept.kind != "region")
             if named:
@@ -237,7 +237,7 @@ class Reasons:
     def _sight(self, object_id: int) -> Why:
         """When an object was seen last, and as which region."""
         b = self._belief(object_id)
-        seen = self.course.seen_at(self._step_of(b.last_seen))
+        seen = self.course.observation_at(self._step_of(b.last_seen))
         who = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
         text = f"{who}, first seen at {b.first_seen:.2f} s, was last seen at {b.last_seen:.2f} s"
         return Why(text, of_region(seen, b.region.id))
@@ -337,7 +337,7 @@ class Reasons:
             return (self.relation(str(data["relation"]), event.objects),)
         if event.kind in ("identified", "question", "answer"):
             return tuple(self.identity(i) for i in event.objects)
-        seen = self.course.seen_at(self.number)
+        seen = self.course.observation_at(self.number)
         other = (
             ()
             if event.objects
@@ -357,7 +357,7 @@ class Reasons:
     def _step_of(self, time: float) -> int:
         """The step of the frame at a time, or the first after it that is known."""
         numbers = range(self.course.begin + 1, self.number + 1)
-        place = bisect_left(numbers, time, key=lambda n: self.course.seen_at(n).time)
+        place = bisect_left(numbers, time, key=lambda n: self.course.observation_at(n).time)
         return numbers[min(place, len(numbers) - 1)]
 
     @property
