@@ -28,7 +28,7 @@ from visup.agent.model.records import (
     Percept,
     Region,
 )
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.model_database import ModelDatabase
 
 FOV_VERTICAL_DEG = 40.0
 """Vertical field of view assumed when none is told."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from visup.agent import Contract, Directive, Frame, HealthStatus, Observation, Percept
 from visup.percepts.motion.features.settings import MotionSettings
-from visup.percepts.motion.output.backward_tracking import LookBack
+from visup.percepts.motion.output.backward_tracking import BackwardTracker
 from visup.percepts.motion.segmenter import MotionSegmenter
 
 HARMED = frozenset(HealthStatus) - {HealthStatus.OK, HealthStatus.DROPPED}
@@ -25,7 +25,7 @@ class MotionBehaviour:
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
         self._segmenter = MotionSegmenter(settings)
-        self._back = LookBack()
+        self._back = BackwardTracker()
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""

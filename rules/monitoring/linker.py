@@ -15,12 +15,19 @@ from visup.rules.formula.nodes import Predicate
 from visup.rules.formula.terms import Measure
 from visup.rules.monitoring import vm
 from visup.rules.monitoring.compiler import Operation, Program
-from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Arrays, Interval
+from visup.rules.monitoring.intervals import (
+    FALSE,
+    TRUE,
+    UNKNOWN,
+    Arrays,
+    Interval,
+)
 from visup.rules.monitoring.operators import (
     LONG_AGO,
     SAMPLE_HOLD,
     BooleanWindow,
     HysteresisLatch,
+    PointOperator,
     SampleAndHold,
     SlidingCount,
     SlidingWindow,
@@ -114,22 +121,21 @@ class LinkedProgram:
         Returns:
             States after; the arena holds the intervals of all steps.
         """
-        then, before, windows = states.then, states.moments, list(states.windows)
+        then, before = states.then, states.moments
         if then is not None and now - then > SAMPLE_HOLD:
             before = self.memory.silenced(before, then + SAMPLE_HOLD)
         code, numbers, n, moment = self._code, self._numbers, self.n, float(now)
-        after, begin = np.empty_like(before), 0
+        after = np.empty_like(before) if before.size else before
+        windows, begin = list(states.windows), 0
         changed = before is not states.moments
         for end, stage in zip(self._ends, self._stages, strict=True):
-            if vm.run(code, numbers, begin, end, n, moment, facts, arena, before, after):
+            if begin < end and vm.run(
+                code, numbers, begin, end, n, moment, facts, arena, before, after
+            ):
                 changed = True
             begin = end
             for slot in stage.windows:
-                w = self._windows[slot]
-                # What is remembered must not change when the arena does.
-                parts = [arena[read].reshape(2, -1).copy() for read in w.reads]
-                windows[slot], value = w.step(windows[slot], now, *parts)
-                arena[w.place].reshape(2, -1)[:] = value
+                windows[slot] = self._windows[slot].update(windows[slot], now, arena)
         return States(now, after if changed else states.moments, tuple(windows))
 
     def interval(self, step: int, rows: tuple[int, ...], arena: Floats) -> Interval:
@@ -146,14 +152,15 @@ class LinkedProgram:
         stage = max((self._ready[r] for r in step.reads), default=0)
         if isinstance(step.operator, SlidingWindow | SlidingCount):
             self._stage(stage).windows.append(len(self._windows))
-            starts = [self._wide(r, step.axes) for r in step.reads]
+            reads = tuple(self._wide(r, step.axes) for r in step.reads)
             self._windows.append(
                 WindowSlot(
                     step.operator,
                     step.operator.on(_ON),
                     len(step.axes),
-                    tuple(slice(at, at + 2 * cells) for at in starts),
-                    slice(self.places[number], self.places[number] + 2 * cells),
+                    reads,
+                    self.places[number],
+                    cells,
                 )
             )
             stage += 1
@@ -182,9 +189,7 @@ class LinkedProgram:
             if step.operator is None:
                 row[vm.OP] = _KINDS[step.kind]
             else:
-                operator = cast(
-                    "BooleanWindow | Unbounded | HysteresisLatch | SampleAndHold", step.operator
-                )
+                operator = cast("PointOperator", step.operator)
                 row[vm.OP], span, fills = _moment(operator)
                 row[vm.STATE], numbers = self._kept, (span, 0.0)
                 self._moments.append(PointSlot(operator, len(step.axes), self._kept, fills))
@@ -221,9 +226,7 @@ class LinkedProgram:
         pairs.append(numbers)
 
 
-def _moment(
-    operator: BooleanWindow | Unbounded | HysteresisLatch | SampleAndHold,
-) -> tuple[int, float, tuple[float, ...]]:
+def _moment(operator: PointOperator) -> tuple[int, float, tuple[float, ...]]:
     """How the virtual machine does an operator, its span, and what its state is before the first sample."""
     match operator:
         case BooleanWindow(kind=kind, high=high):

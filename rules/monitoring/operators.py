@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from visup.rules.formula.units import ticks
-from visup.rules.monitoring.intervals import EQUAL, FALSE, TRUE, UNKNOWN, Algebra, Interval, Scalars
+from visup.rules.monitoring.intervals import EQUAL, UNKNOWN, Algebra, Interval
 from visup.rules.monitoring.sliding import Fold, Queue, SlidingState, initial, mapped, slide
 
 SAMPLE_HOLD = ticks(0.5)
@@ -39,27 +39,6 @@ SelectObjects = Callable[[Any, Interval], Any]
 """(intervals, what those of new objects are) -> intervals of the objects there are now."""
 
 
-class TemporalOperator(Protocol):
-    """What remembers something of one formula or quantity from sample to sample."""
-
-    def on(self, algebra: Scalars) -> Update:
-        """How it takes in the values of its parts at a sample."""
-
-    @property
-    def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
-
-
-class WindowedOperator(Protocol):
-    """An operator that keeps a whole window."""
-
-    def on(self, algebra: Algebra) -> Update:
-        """See `TemporalOperator`."""
-
-    def rows(self, state: Any, pick: SelectObjects) -> Any:
-        """The same state for other objects; the new ones have no past."""
-
-
 @dataclass(frozen=True)
 class SlidingWindow:
     """The least or the greatest over a window, and `since` within one.
@@ -75,7 +54,7 @@ class SlidingWindow:
     high: int
 
     def on(self, algebra: Algebra) -> Update:
-        """See `TemporalOperator`."""
+        """How it takes in the values of its parts at a sample."""
         fold, low, high = self._fold(algebra), self.low, self.high
         nothing = algebra.constant(UNKNOWN)
         unknown = (nothing, nothing) if self._pair else nothing
@@ -118,11 +97,11 @@ class SlidingWindow:
 
     @property
     def kept(self) -> int:
-        """See `TemporalOperator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return (2 if self._pair else 1) * (2 * max_samples(self.high) + 2)
 
     def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
-        """See `WindowedOperator`."""
+        """The same state for other objects; the new ones have no past."""
         if self._pair:
             return mapped(state, lambda v: (pick(v[0], UNKNOWN), pick(v[1], UNKNOWN)))
         return mapped(state, lambda v: pick(v, UNKNOWN))
@@ -140,21 +119,10 @@ class BooleanWindow:
     kind: str
     high: int
 
-    def on(self, algebra: Scalars) -> Update:
-        """See `TemporalOperator`; of single intervals it is a window like any other."""
-        return SlidingWindow(self.kind, 0, self.high).on(algebra)
-
     @property
     def kept(self) -> int:
-        """See `TemporalOperator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 1
-
-
-class UnboundedState(NamedTuple):
-    """Time of the last sample, and the fold of all samples."""
-
-    then: int
-    value: Any
 
 
 @dataclass(frozen=True)
@@ -167,32 +135,9 @@ class Unbounded:
 
     kind: str
 
-    def on(self, algebra: Scalars) -> Update:
-        """See `TemporalOperator`."""
-        least, most = algebra.least, algebra.most
-
-        def join(before: Interval, values: tuple[Interval, ...]) -> Interval:
-            if self.kind == "since":
-                return most(values[1], least(before, values[0]))
-            return (least if self.kind == "always" else most)(before, values[0])
-
-        def step(state: UnboundedState | None, now: int, *values: Interval) -> tuple[Any, Any]:
-            before = self.empty if state is None else state.value
-            if state is not None and now - state.then > SAMPLE_HOLD:
-                before = join(before, (UNKNOWN,) * len(values))
-            value = join(before, values)
-            return UnboundedState(now, value), value
-
-        return step
-
-    @property
-    def empty(self) -> Interval:
-        """What it comes to before the first sample."""
-        return TRUE if self.kind == "always" else FALSE
-
     @property
     def kept(self) -> int:
-        """See `TemporalOperator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 1
 
 
@@ -236,7 +181,7 @@ class SlidingCount:
     samples: bool
 
     def on(self, algebra: Algebra) -> Update:
-        """See `TemporalOperator`."""
+        """How it takes in the values of its part at a sample."""
         a, maybe = algebra, algebra.constant(MAYBE)
         # Counted in whole samples or microseconds, so that what just suffices is told exactly.
         enough = -self.least if self.samples else -round(self.least * self.span)
@@ -274,11 +219,11 @@ class SlidingCount:
 
     @property
     def kept(self) -> int:
-        """See `TemporalOperator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 2 * ((self.span if self.samples else max_samples(self.span)) + 2)
 
     def rows(self, state: CountState, pick: SelectObjects) -> CountState:
-        """See `WindowedOperator`."""
+        """The same state for other objects; the new ones have no past."""
 
         def total(clock: int, value: Any) -> Any:
             return pick(value, (0.0, float(clock - state.born)))
@@ -295,13 +240,6 @@ class SlidingCount:
         )
 
 
-class HoldState(NamedTuple):
-    """What was known last, and when; microseconds."""
-
-    value: Interval
-    time: int
-
-
 @dataclass(frozen=True)
 class SampleAndHold:
     """`last(x, 0.5 s)`: what was known last, while it is not too old.
@@ -312,19 +250,9 @@ class SampleAndHold:
 
     age: int
 
-    def on(self, algebra: Scalars) -> Update:
-        """See `TemporalOperator`."""
-
-        def step(state: HoldState | None, now: int, value: Interval) -> tuple[Any, Any]:
-            old = state or HoldState(UNKNOWN, LONG_AGO)
-            kept = HoldState(value, now) if value != UNKNOWN else old
-            return kept, kept.value if now - kept.time <= self.age else UNKNOWN
-
-        return step
-
     @property
     def kept(self) -> int:
-        """See `TemporalOperator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 2
 
 
@@ -332,16 +260,15 @@ class SampleAndHold:
 class HysteresisLatch:
     """A comparison with two thresholds: the second one counts from when it is true to when it is false."""
 
-    def on(self, algebra: Scalars) -> Update:
-        """See `TemporalOperator`; the values are those by the threshold to enter and to leave."""
-
-        def step(state: bool | None, now: int, enter: Interval, leave: Interval) -> tuple[Any, Any]:
-            result = leave if state else enter
-            return result[0] > 0 or (bool(state) and result[1] >= 0), result
-
-        return step
-
     @property
     def kept(self) -> int:
-        """See `TemporalOperator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 1
+
+
+PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch
+"""Operators whose state is a few numbers for each choice of objects."""
+WindowOperator = SlidingWindow | SlidingCount
+"""Operators that retain a whole window."""
+TemporalOperator = PointOperator | WindowOperator
+"""What remembers something of one formula or quantity from sample to sample."""

@@ -13,11 +13,10 @@ from visup.rules.monitoring.intervals import Interval, IntervalArray
 from visup.rules.monitoring.operators import (
     SAMPLE_HOLD,
     BooleanWindow,
-    HysteresisLatch,
-    SampleAndHold,
+    PointOperator,
     Unbounded,
     Update,
-    WindowedOperator,
+    WindowOperator,
 )
 from visup.rules.monitoring.vm import Floats
 
@@ -47,7 +46,7 @@ class PointSlot:
         fills: What each of its parts, one number for each choice of objects, is before the first sample.
     """
 
-    operator: BooleanWindow | Unbounded | HysteresisLatch | SampleAndHold
+    operator: PointOperator
     axes: int
     begin: int
     fills: tuple[float, ...]
@@ -61,15 +60,26 @@ class WindowSlot:
         operator: The operator.
         step: How it takes in a sample.
         axes: How many axes its objects have.
-        reads: Where the intervals of its parts stand.
-        place: Where its own stand.
+        reads: Where the intervals of its parts begin.
+        place: Where its own begin.
+        cells: How many intervals each of these has.
     """
 
-    operator: WindowedOperator
+    operator: WindowOperator
     step: Update
     axes: int
-    reads: tuple[slice, ...]
-    place: slice
+    reads: tuple[int, ...]
+    place: int
+    cells: int
+
+    def update(self, state: Any, now: int, arena: Floats) -> Any:
+        """The state after a sample, whose intervals it writes."""
+        at, size = self.place, 2 * self.cells
+        # What is retained must not change when the arena does.
+        parts = [arena[r : r + size].reshape(2, -1).copy() for r in self.reads]
+        state, value = self.step(state, now, *parts)
+        arena[at : at + size].reshape(2, -1)[:] = value
+        return state
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +148,9 @@ class StateLayout:
             then,
             after,
             tuple(
-                None if s is None else w.operator.rows(s, _picker(chosen[w.axes], self.n**w.axes))
+                s
+                if s is None or not w.axes
+                else w.operator.rows(s, _picker(chosen[w.axes], self.n**w.axes))
                 for s, w in zip(windows, self.windows, strict=True)
             ),
         )

@@ -22,8 +22,7 @@ from visup.rules.formula.nodes import (
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import TICKS, Number
 from visup.rules.monitoring.compiler import Scope, ValueRef
-from visup.rules.monitoring.intervals import UNKNOWN, Interval
-from visup.rules.monitoring.monitor import verdict
+from visup.rules.monitoring.intervals import UNKNOWN, Interval, verdict
 from visup.rules.predicates.vocabulary import RULES
 from visup.rules.safety.compiled_rules import CompiledRules, scope_of
 from visup.rules.safety.verdicts import Evaluation

@@ -23,8 +23,7 @@ from visup.agent.model.errors import ManyErrors, Place, RuleError
 from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
-from visup.rules.monitoring.intervals import Interval
-from visup.rules.monitoring.monitor import verdict
+from visup.rules.monitoring.intervals import Interval, verdict
 from visup.rules.monitoring.operators import MIN_SPACING
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.snapshot import Snapshot

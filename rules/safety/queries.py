@@ -10,7 +10,7 @@ from itertools import product
 from visup.agent import Mind, Truth
 from visup.agent.model.errors import RuleError
 from visup.rules.formula.nodes import Rule
-from visup.rules.monitoring.monitor import verdict
+from visup.rules.monitoring.intervals import verdict
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.compiled_rules import compile_rules
 from visup.rules.safety.explain import RuleExplanation, explain_rule

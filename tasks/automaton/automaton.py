@@ -13,16 +13,16 @@ from itertools import count
 from typing import TypeVar
 
 from visup.tasks.automaton.derivatives import (
+    Derivative,
     Leaf,
-    Move,
     State,
-    Step,
+    TaskStep,
     begin,
+    depth,
+    derivatives,
     enter,
-    form,
     leaves,
-    moves,
-    nested,
+    structural_key,
     with_leaves,
 )
 from visup.tasks.grammar.nodes import Task
@@ -31,14 +31,14 @@ V = TypeVar("V")
 W = TypeVar("W")
 END = -1
 """In place of a node: the course is over."""
-WAYS_A_NODE = 10
+TRANSITIONS_PER_NODE = 10
 DEEPEST = 60  # courses around a step; each takes some of the depth that Python allows
 NEW = -1
 """In place of a step that is carried over: it begins by the way."""
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class Transition:
     """One way to go on from a node.
 
     Attributes:
@@ -64,9 +64,9 @@ class Automaton:
     def __init__(self, task: Task) -> None:
         self._task = task
         self._states: list[State[int]] = []
-        self._steps: list[tuple[Step, ...]] = []
+        self._steps: list[tuple[TaskStep, ...]] = []
         self._numbers: dict[object, int] = {}
-        self._ways: dict[int, tuple[Way, ...]] = {}
+        self._ways: dict[int, tuple[Transition, ...]] = {}
         entered = list(enter(task, begin(task), NEW, 0.0))
         self.start = tuple((self._number(s), 1.0 / len(entered)) for s in entered)
         """Nodes in which the task may begin, each with its share; `END` where it may be left out."""
@@ -74,11 +74,11 @@ class Automaton:
     def __len__(self) -> int:
         return len(self._states)
 
-    def steps(self, node: int) -> tuple[Step, ...]:
+    def steps(self, node: int) -> tuple[TaskStep, ...]:
         """The steps under way, in the order of the text; none at the end."""
         return () if node == END else self._steps[node]
 
-    def ways(self, node: int) -> tuple[Way, ...]:
+    def transitions(self, node: int) -> tuple[Transition, ...]:
         """All ways to go on; none at the end."""
         if node == END:
             return ()
@@ -88,7 +88,7 @@ class Automaton:
 
     def node(self, state: State[W]) -> int:
         """The number of a state, whatever is kept about its steps."""
-        return self._number(kept(state, [Leaf(x.step, NEW) for x in leaves(state)]))
+        return self._number(with_payloads(state, [Leaf(x.step, NEW) for x in leaves(state)]))
 
     def state(self, node: int) -> State[int]:
         """The state of a node; about each step its position is kept."""
@@ -104,37 +104,41 @@ class Automaton:
         found = {n: None for n, _ in self.start if n != END}
         seen = 0
         for done, node in enumerate(_growing(found)):
-            if seen > WAYS_A_NODE * most:
+            if seen > TRANSITIONS_PER_NODE * most:
                 return list(found)[:done]  # the ways of the others are better not worked out
-            if nested(self._states[node]) > DEEPEST:
+            if depth(self._states[node]) > DEEPEST:
                 continue
-            seen += len(self.ways(node))
-            for way in self.ways(node):
-                if way.target != END and len(found) < most:
-                    found.setdefault(way.target)
+            seen += len(self.transitions(node))
+            for transition in self.transitions(node):
+                if transition.target != END and len(found) < most:
+                    found.setdefault(transition.target)
         return list(found)
 
     def _number(self, state: State[int] | None) -> int:
         if state is None:
             return END
-        key = form(state)
+        key = structural_key(state)
         if key not in self._numbers:
             self._numbers[key] = len(self._states)
             self._states.append(_numbered(state))
             self._steps.append(tuple(x.step for x in leaves(state)))
         return self._numbers[key]
 
-    def _worked_out(self, node: int) -> tuple[Way, ...]:
-        found = [self._way(m) for m in moves(self._task, self._states[node], NEW, 0.0)]
+    def _worked_out(self, node: int) -> tuple[Transition, ...]:
+        found = [self._way(m) for m in derivatives(self._task, self._states[node], NEW, 0.0)]
         alike = Counter(w.left for w in found)
         return tuple(replace(w, share=1.0 / alike[w.left]) for w in found)
 
-    def _way(self, move: Move[int]) -> Way:
-        carried = () if move.state is None else tuple(x.watch for x in leaves(move.state))
-        return Way(self._number(move.state), tuple(x.watch for x in move.left), carried, 1.0)
+    def _way(self, derivative: Derivative[int]) -> Transition:
+        carried = (
+            () if derivative.state is None else tuple(x.payload for x in leaves(derivative.state))
+        )
+        return Transition(
+            self._number(derivative.state), tuple(x.payload for x in derivative.left), carried, 1.0
+        )
 
 
-def kept(state: State[W], new: list[Leaf[V]]) -> State[V]:
+def with_payloads(state: State[W], new: list[Leaf[V]]) -> State[V]:
     """A state with other things kept about its steps."""
     # The tree is rebuilt from its leaves, so that nothing of the old kind remains in it.
     return with_leaves(state, iter(new))  # type: ignore[arg-type]
@@ -143,7 +147,7 @@ def kept(state: State[W], new: list[Leaf[V]]) -> State[V]:
 def _numbered(state: State[int]) -> State[int]:
     """A state each of whose steps keeps its own position."""
     places = count()
-    return with_leaves(state, (replace(x, watch=next(places)) for x in leaves(state)))
+    return with_leaves(state, (replace(x, payload=next(places)) for x in leaves(state)))
 
 
 def _growing(found: dict[int, None]) -> Iterator[int]:

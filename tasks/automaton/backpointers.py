@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from visup.tasks.automaton.derivatives import Step
+from visup.tasks.automaton.derivatives import TaskStep
 
 MOST_BEHIND = 32  # at least so many steps are remembered, and less than twice as many
 
 
 @dataclass(frozen=True, slots=True)
-class Trail:
+class Backpointer:
     """A step that lies behind, with those before it: the best way to a place.
 
     Attributes:
@@ -21,9 +21,9 @@ class Trail:
         length: How many steps lie behind, with those forgotten.
     """
 
-    step: Step
+    step: TaskStep
     left: float
-    before: Trail | None
+    before: Backpointer | None
     length: int
 
 
@@ -37,7 +37,7 @@ class Revision:
         revised: When that was taken back, seconds.
     """
 
-    step: Step
+    step: TaskStep
     told: float
     revised: float
 
@@ -48,21 +48,25 @@ class Revision:
         )
 
 
-def longer(trail: Trail | None, left: tuple[Step, ...], now: float) -> Trail | None:
+def extended(
+    backpointer: Backpointer | None, left: tuple[TaskStep, ...], now: float
+) -> Backpointer | None:
     """A trail with some steps more that were left now; what lies too far back is forgotten."""
     for step in left:
-        trail = Trail(step, now, trail, trail.length + 1 if trail else 1)
-    if trail is not None and trail.length % MOST_BEHIND == 0:
-        return _cut(trail, MOST_BEHIND)
-    return trail
+        backpointer = Backpointer(
+            step, now, backpointer, backpointer.length + 1 if backpointer else 1
+        )
+    if backpointer is not None and backpointer.length % MOST_BEHIND == 0:
+        return _cut(backpointer, MOST_BEHIND)
+    return backpointer
 
 
-def _cut(trail: Trail, most: int) -> Trail:
-    before = None if trail.before is None or most <= 1 else _cut(trail.before, most - 1)
-    return replace(trail, before=before)
+def _cut(backpointer: Backpointer, most: int) -> Backpointer:
+    before = None if backpointer.before is None or most <= 1 else _cut(backpointer.before, most - 1)
+    return replace(backpointer, before=before)
 
 
-def revised(old: Trail | None, new: Trail | None, now: float) -> Iterator[Revision]:
+def revisions(old: Backpointer | None, new: Backpointer | None, now: float) -> Iterator[Revision]:
     """Steps that lay behind by the best way before, and do not by the best way now, the last first."""
     while old is not None and old is not new:
         while new is not None and new.length > old.length:
@@ -75,7 +79,7 @@ def revised(old: Trail | None, new: Trail | None, now: float) -> Iterator[Revisi
         old = old.before
 
 
-def _same(one: Trail | None, other: Trail | None) -> bool:
+def _same(one: Backpointer | None, other: Backpointer | None) -> bool:
     """Whether two trails of one length pass through the same steps, as far as they are remembered."""
     while one is not None and other is not None and one is not other:
         if one.step != other.step:

@@ -19,7 +19,7 @@ K = TypeVar("K", bound=Hashable)
 
 
 @dataclass(frozen=True, slots=True)
-class Weighed(Generic[H]):
+class Weighted(Generic[H]):
     """What is remembered by a hypothesis, with its weights.
 
     Attributes:
@@ -28,13 +28,13 @@ class Weighed(Generic[H]):
         best: Probability of the best way to it, relative to the best of all.
     """
 
-    what: H
+    value: H
     mass: float
     best: float
 
 
 @dataclass(frozen=True, slots=True)
-class Settled(Generic[K, H]):
+class Pruned(Generic[K, H]):
     """The belief after one step.
 
     Attributes:
@@ -44,12 +44,12 @@ class Settled(Generic[K, H]):
             was seen before.
     """
 
-    kept: Mapping[K, Weighed[H]] = field(default_factory=dict)
+    retained: Mapping[K, Weighted[H]] = field(default_factory=dict)
     dropped: float = 0.0
     evidence: float = 0.0
 
 
-def merged(grown: Iterable[tuple[K, H, float, float]]) -> dict[K, Weighed[H]]:
+def merged(grown: Iterable[tuple[K, H, float, float]]) -> dict[K, Weighted[H]]:
     """Ways by where they lead: masses add up, the best way is remembered.
 
     Args:
@@ -64,10 +64,10 @@ def merged(grown: Iterable[tuple[K, H, float, float]]) -> dict[K, Weighed[H]]:
             found[key] = (what, mass + other[1], best)
         else:
             found[key] = (other[0], mass + other[1], other[2])
-    return {key: Weighed(*values) for key, values in found.items()}
+    return {key: Weighted(*values) for key, values in found.items()}
 
 
-def settled(found: Mapping[K, Weighed[H]], most: int, least: float) -> Settled[K, H]:
+def pruned(found: Mapping[K, Weighted[H]], most: int, least: float) -> Pruned[K, H]:
     """The heaviest hypotheses, with masses that sum to 1.
 
     Args:
@@ -77,7 +77,7 @@ def settled(found: Mapping[K, Weighed[H]], most: int, least: float) -> Settled[K
     """
     total = sum(w.mass for w in found.values())
     if total <= 0.0:
-        return Settled()
+        return Pruned()
     kept = {k: w for k, w in found.items() if w.mass >= least * total}
     if len(kept) > most:
         heavy = heapq.nlargest(most, kept.items(), key=lambda item: item[1].mass)
@@ -85,5 +85,5 @@ def settled(found: Mapping[K, Weighed[H]], most: int, least: float) -> Settled[K
     remains = sum(w.mass for w in kept.values())
     highest = max(w.best for w in kept.values())
     scale = 1.0 / highest if highest > 0.0 else 0.0
-    even = {k: Weighed(w.what, w.mass / remains, w.best * scale) for k, w in kept.items()}
-    return Settled(even, max(0.0, 1.0 - remains / total), total)
+    even = {k: Weighted(w.value, w.mass / remains, w.best * scale) for k, w in kept.items()}
+    return Pruned(even, max(0.0, 1.0 - remains / total), total)

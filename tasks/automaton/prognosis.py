@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from visup.tasks.automaton.automaton import END, Automaton, Way
-from visup.tasks.automaton.derivatives import Step
-from visup.tasks.automaton.stage_hmm import WAITING, Process
-from visup.tasks.automaton.transitions import Place
+from visup.tasks.automaton.automaton import END, Automaton, Transition
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.stage_hmm import WAITING, StageHmm
+from visup.tasks.automaton.transitions import HiddenState
 
 MOST_NODES = 1_000  # beyond so many nodes success is counted as none
 SMALLEST = 1e-9  # ways less likely than this are not followed
 SWEEPS = 500
 
 
-class Foresight:
+class Prognosis:
     """What the model expects of the rest of a task.
 
     The fate of each step, whether it is left at last or lost, is taken to be independent of how
@@ -23,33 +23,33 @@ class Foresight:
 
     Args:
         automaton: The states of the course.
-        process: The probabilities.
+        hmm: The probabilities.
         most: So many nodes are looked at to tell success, breadth first.
     """
 
-    def __init__(self, automaton: Automaton, process: Process, most: int = MOST_NODES) -> None:
+    def __init__(self, automaton: Automaton, hmm: StageHmm, most: int = MOST_NODES) -> None:
         self._automaton = automaton
         self._most = most
-        self._process = process
+        self._process = hmm
         self._hopes: dict[int, float] | None = None
         self._next: dict[int, Mapping[str, float]] = {}
 
-    def success(self, place: Place) -> float:
+    def success(self, state: HiddenState) -> float:
         """Probability that the course reaches its end from a place.
 
         Of a task with more states than are looked at it is a lower bound: beyond them nothing is
         counted.
         """
-        if place.node == END:
+        if state.node == END:
             return 1.0
         if self._hopes is None:
             self._hopes = self._solved()
-        steps = self._automaton.steps(place.node)
-        hope = self._hopes.get(place.node)
+        steps = self._automaton.steps(state.node)
+        hope = self._hopes.get(state.node)
         if hope is None:
             # Come to only by following the task far: as from the state itself, looked at anew.
-            hope = self._hoped(place.node, self._hopes)
-        fates = (self._process.fate(s, p) for s, p in zip(steps, place.phases, strict=True))
+            hope = self._hoped(state.node, self._hopes)
+        fates = (self._process.fate(s, p) for s, p in zip(steps, state.phases, strict=True))
         return hope * math.prod(fates)
 
     def next_stages(self, node: int) -> Mapping[str, float]:
@@ -63,22 +63,22 @@ class Foresight:
     def _follow(
         self, node: int, here: set[str], chance: float, found: dict[str, float], depth: int
     ) -> None:
-        for way, share in self._shares(node):
+        for transition, share in self._shares(node):
             likely = chance * share
             if likely < SMALLEST or depth > 60:
                 continue
-            entered = [s.stage for s in begun_by(self._automaton, way)]
+            entered = [s.stage for s in begun_by(self._automaton, transition)]
             fresh = dict.fromkeys(s for s in entered if s not in here)
             for stage in fresh:
                 found[stage] = found.get(stage, 0.0) + likely
-            if not fresh and way.target != END:
-                self._follow(way.target, here, likely, found, depth + 1)
+            if not fresh and transition.target != END:
+                self._follow(transition.target, here, likely, found, depth + 1)
 
-    def _shares(self, node: int) -> list[tuple[Way, float]]:
+    def _shares(self, node: int) -> list[tuple[Transition, float]]:
         """The ways on from a node, each with its share once its steps may be left."""
-        ways = self._automaton.ways(node)
-        total = sum(w.share for w in ways)
-        return [(w, w.share / total) for w in ways]
+        transitions = self._automaton.transitions(node)
+        total = sum(w.share for w in transitions)
+        return [(w, w.share / total) for w in transitions]
 
     def _solved(self) -> dict[int, float]:
         """For each node the probability to reach the end, apart from the fates of its own steps."""
@@ -95,16 +95,18 @@ class Foresight:
         return hopes
 
     def _hoped(self, node: int, hopes: Mapping[int, float]) -> float:
-        return sum(share * self._after(way, hopes) for way, share in self._shares(node))
+        return sum(
+            share * self._after(transition, hopes) for transition, share in self._shares(node)
+        )
 
-    def _after(self, way: Way, hopes: Mapping[int, float]) -> float:
-        if way.target == END:
+    def _after(self, transition: Transition, hopes: Mapping[int, float]) -> float:
+        if transition.target == END:
             return 1.0
-        fates = (self._process.fate(s, WAITING) for s in begun_by(self._automaton, way))
-        return hopes.get(way.target, 0.0) * math.prod(fates)
+        fates = (self._process.fate(s, WAITING) for s in begun_by(self._automaton, transition))
+        return hopes.get(transition.target, 0.0) * math.prod(fates)
 
 
-def begun_by(automaton: Automaton, way: Way) -> list[Step]:
+def begun_by(automaton: Automaton, transition: Transition) -> list[TaskStep]:
     """The steps that begin by a way."""
-    steps = automaton.steps(way.target)
-    return [s for s, c in zip(steps, way.carried, strict=True) if c < 0]
+    steps = automaton.steps(transition.target)
+    return [s for s, c in zip(steps, transition.carried, strict=True) if c < 0]

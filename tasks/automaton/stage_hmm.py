@@ -30,10 +30,10 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from functools import cached_property
 
-from visup.tasks.automaton.derivatives import Step
+from visup.tasks.automaton.derivatives import TaskStep
 
 
-class Seen(IntEnum):
+class ActionStatus(IntEnum):
     """What is seen of an action between its actors."""
 
     HOLDS = 0
@@ -42,7 +42,7 @@ class Seen(IntEnum):
     UNKNOWN = 3
 
 
-class Kind(Enum):
+class PhaseKind(Enum):
     """What the phase of a step is, whatever its number."""
 
     WAITING = "waiting"
@@ -56,7 +56,7 @@ WAITING = 0
 
 
 @dataclass(frozen=True)
-class Process:
+class StageHmm:
     """The probabilities of the model; rates per second.
 
     Attributes:
@@ -91,56 +91,58 @@ class Process:
     pass_over: float = 5e-4
     look_s: float = 0.4
 
-    def count(self, step: Step) -> int:
+    def count(self, step: TaskStep) -> int:
         """Number of phases in which a step goes on."""
         return 1 if step.hold_s is None else self.phases
 
-    def kind(self, step: Step, phase: int) -> Kind:
+    def kind(self, step: TaskStep, phase: int) -> PhaseKind:
         """What a phase of a step is."""
         if phase == WAITING:
-            return Kind.WAITING
+            return PhaseKind.WAITING
         beyond = phase - self.count(step)
-        return Kind.GOING if beyond <= 0 else Kind.FAILING if beyond == 1 else Kind.LOST
+        return (
+            PhaseKind.GOING if beyond <= 0 else PhaseKind.FAILING if beyond == 1 else PhaseKind.LOST
+        )
 
-    def exits(self, step: Step, phase: int) -> tuple[tuple[int, float], ...]:
+    def exits(self, step: TaskStep, phase: int) -> tuple[tuple[int, float], ...]:
         """Phases that may come next while the step stays under way, each with its rate."""
         last = self.count(step)
         match self.kind(step, phase):
-            case Kind.WAITING:
+            case PhaseKind.WAITING:
                 return ((1, self.begin),)
-            case Kind.GOING if phase < last:
+            case PhaseKind.GOING if phase < last:
                 assert step.hold_s is not None  # only a `for` makes several phases
                 return ((phase + 1, last / max(step.hold_s, 1e-9)), (last + 1, self.fail))
-            case Kind.GOING:
+            case PhaseKind.GOING:
                 return ((last + 1, self.fail),)
-            case Kind.FAILING:
+            case PhaseKind.FAILING:
                 return ((1, self.recover), (last + 2, self.lose))
         return ()
 
-    def changes(self, step: Step, phase: int, dt: float) -> Iterator[tuple[int, float]]:
+    def changes(self, step: TaskStep, phase: int, dt: float) -> Iterator[tuple[int, float]]:
         """Phases after `dt` seconds, each with its probability; they sum to 1."""
         return within(dt, phase, self.exits(step, phase))
 
-    def leaving(self, step: Step, phase: int) -> float:
+    def leaving(self, step: TaskStep, phase: int) -> float:
         """Rate at which the course goes on from a step in a phase."""
-        if self.kind(step, phase) is Kind.LOST:
+        if self.kind(step, phase) is PhaseKind.LOST:
             return 0.0
         return self.leave if phase == self.count(step) else self.skip
 
     @cached_property
-    def chances(self) -> dict[Kind, tuple[float, float, float]]:
+    def chances(self) -> dict[PhaseKind, tuple[float, float, float]]:
         """For each kind of phase the probability to see HOLDS, NEITHER and CONTRARY."""
         noise, rest = self.spurious, 1.0 - self.missing - self.spurious
         idle = (noise, 1.0 - 2 * noise, noise)
         bad = (noise, self.missing, rest)
         return {
-            Kind.WAITING: idle,
-            Kind.GOING: bad[::-1],
-            Kind.FAILING: bad,
-            Kind.LOST: bad,
+            PhaseKind.WAITING: idle,
+            PhaseKind.GOING: bad[::-1],
+            PhaseKind.FAILING: bad,
+            PhaseKind.LOST: bad,
         }
 
-    def likelihood(self, kind: Kind, seen: Seen, confidence: float = 1.0) -> float:
+    def likelihood(self, kind: PhaseKind, seen: ActionStatus, confidence: float = 1.0) -> float:
         """How much likelier something is seen of a step in such a phase than of an idle action.
 
         Args:
@@ -148,42 +150,42 @@ class Process:
             seen: What is seen.
             confidence: 0 to 1: with the rest of it, anything might have been seen alike.
         """
-        if seen is Seen.UNKNOWN:
+        if seen is ActionStatus.UNKNOWN:
             return 1.0
         blur = (1.0 - confidence) / 3
-        of, idle = self.chances[kind][seen], self.chances[Kind.WAITING][seen]
+        of, idle = self.chances[kind][seen], self.chances[PhaseKind.WAITING][seen]
         return (confidence * of + blur) / (confidence * idle + blur)
 
-    def fit(self, seen: Seen, confidence: float, dt: float) -> float:
+    def fit(self, seen: ActionStatus, confidence: float, dt: float) -> float:
         """How well something seen for `dt` seconds fits a step that should go on; 1 at best.
 
         The likelihood of what is seen against that of seeing it hold, one look in `look_s`. Where
         nothing is seen it fits as well as looks at what is going on do on average, so that a course
         of which nothing can be seen is not held against one that is seen to go on.
         """
-        blur, going = (1.0 - confidence) / 3, self.chances[Kind.GOING]
-        whole = confidence * going[Seen.HOLDS] + blur
-        if seen is Seen.UNKNOWN:
-            ratio = sum(p * p for p in going) / going[Seen.HOLDS]
+        blur, going = (1.0 - confidence) / 3, self.chances[PhaseKind.GOING]
+        whole = confidence * going[ActionStatus.HOLDS] + blur
+        if seen is ActionStatus.UNKNOWN:
+            ratio = sum(p * p for p in going) / going[ActionStatus.HOLDS]
         else:
             ratio = (confidence * going[seen] + blur) / whole
         return float(ratio ** (dt / self.look_s))
 
-    def fate(self, step: Step, phase: int) -> float:
+    def fate(self, step: TaskStep, phase: int) -> float:
         """Probability that a step in a phase is left at all, and not lost before."""
         return self._fates(step.hold_s)[phase]
 
     def _fates(self, hold_s: float | None) -> Sequence[float]:
         found = self._known_fates.get(hold_s)
         if found is None:
-            found = self._known_fates[hold_s] = self._solved(Step("", (), "", hold_s))
+            found = self._known_fates[hold_s] = self._solved(TaskStep("", (), "", hold_s))
         return found
 
     @cached_property
     def _known_fates(self) -> dict[float | None, Sequence[float]]:
         return {}
 
-    def _solved(self, step: Step) -> Sequence[float]:
+    def _solved(self, step: TaskStep) -> Sequence[float]:
         """For each phase the probability to be left at last; a linear system, solved by sweeps."""
         last = self.count(step)
         fates = [0.0] * (last + 3)
@@ -210,7 +212,9 @@ def within(
         yield from ((to, gone * rate / total) for to, rate in exits)
 
 
-DEFAULT_PROCESS = Process()
+DEFAULT_HMM = StageHmm()
 
-SUPERVISED = Process(begin=0.1, fail=0.02, recover=0.05, lose=0.125, missing=0.37, spurious=0.075)
+SUPERVISION_HMM = StageHmm(
+    begin=0.1, fail=0.02, recover=0.05, lose=0.125, missing=0.37, spurious=0.075
+)
 """Of relations in the mind, which are true for a while, then neither for a while, and then again."""

@@ -1,6 +1,6 @@
 """How likely each place in a task leads to each other in some seconds, worked out when needed.
 
-A place is a node of the automaton with the phase of each step under way (`Place`). What leads from
+A place is a node of the automaton with the phase of each step under way (`HiddenState`). What leads from
 one to the next is the product of the phases' changes, and then the choice of a way on, or of none.
 """
 
@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
-from visup.tasks.automaton.automaton import END, NEW, Automaton, Way
-from visup.tasks.automaton.derivatives import Step
-from visup.tasks.automaton.stage_hmm import WAITING, Kind, Process
+from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.stage_hmm import WAITING, PhaseKind, StageHmm
 
 MOST_SPANS = 64  # so many different times between frames are remembered
 SPAN_DIGITS = 4  # times between frames are told apart to a tenth of a millisecond
 
 
-class Place(NamedTuple):
+class HiddenState(NamedTuple):
     """Where a task may be: a node, and the phase of each of its steps."""
 
     node: int
@@ -28,7 +28,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class HiddenTransition:
     """One way from a place to the next.
 
     Attributes:
@@ -37,35 +37,35 @@ class Passage:
         left: The steps that are over by it.
     """
 
-    to: Place
+    to: HiddenState
     chance: float
-    left: tuple[Step, ...] = ()
+    left: tuple[TaskStep, ...] = ()
 
 
-Asked = tuple[tuple[tuple[str, tuple[str, ...]], Kind], ...]
+Required = tuple[tuple[tuple[str, tuple[str, ...]], PhaseKind], ...]
 """What is to be seen at a place: each action with its actors, and how it stands."""
 
 
-class Transitions:
+class HiddenTransitions:
     """Passages between the places of a task.
 
     Args:
         automaton: The states of its course.
-        process: The probabilities.
+        hmm: The probabilities.
     """
 
-    def __init__(self, automaton: Automaton, process: Process) -> None:
+    def __init__(self, automaton: Automaton, hmm: StageHmm) -> None:
         self.automaton = automaton
-        self.process = process
-        self._passages: dict[float, dict[Place, tuple[Passage, ...]]] = {}
-        self._asked: dict[Place, Asked] = {}
+        self.hmm = hmm
+        self._passages: dict[float, dict[HiddenState, tuple[HiddenTransition, ...]]] = {}
+        self._asked: dict[HiddenState, Required] = {}
 
-    def begin(self) -> Iterator[tuple[Place, float]]:
+    def begin(self) -> Iterator[tuple[HiddenState, float]]:
         """Places in which the task may begin, each with its probability."""
         for node, share in self.automaton.start:
-            yield Place(node, (WAITING,) * len(self.automaton.steps(node))), share
+            yield HiddenState(node, (WAITING,) * len(self.automaton.steps(node))), share
 
-    def after(self, dt: float) -> dict[Place, tuple[Passage, ...]]:
+    def after(self, dt: float) -> dict[HiddenState, tuple[HiddenTransition, ...]]:
         """The passages that are known for a time between frames; `passages` adds to them."""
         span = round(dt, SPAN_DIGITS)
         if span not in self._passages:
@@ -74,68 +74,74 @@ class Transitions:
             self._passages[span] = {}
         return self._passages[span]
 
-    def passages(self, place: Place, dt: float) -> tuple[Passage, ...]:
+    def transitions(self, state: HiddenState, dt: float) -> tuple[HiddenTransition, ...]:
         """All passages from a place in `dt` seconds; their probabilities sum to 1."""
         known = self.after(dt)
-        if place not in known:
-            known[place] = _merged(self._passed(place, round(dt, SPAN_DIGITS)))
-        return known[place]
+        if state not in known:
+            known[state] = _merged(self._passed(state, round(dt, SPAN_DIGITS)))
+        return known[state]
 
-    def asked(self, place: Place) -> Asked:
+    def required(self, state: HiddenState) -> Required:
         """What is to be seen at a place; an action that several steps ask for is told once."""
-        if place not in self._asked:
-            found: dict[tuple[str, tuple[str, ...]], Kind] = {}
-            for step, phase in zip(self.automaton.steps(place.node), place.phases, strict=True):
-                kind, key = self.process.kind(step, phase), (step.action, step.actors)
+        if state not in self._asked:
+            found: dict[tuple[str, tuple[str, ...]], PhaseKind] = {}
+            for step, phase in zip(self.automaton.steps(state.node), state.phases, strict=True):
+                kind, key = self.hmm.kind(step, phase), (step.action, step.actors)
                 found[key] = min(kind, found.get(key, kind), key=CLEAREST.index)
-            told = tuple((k, kind) for k, kind in found.items() if kind is not Kind.WAITING)
-            self._asked[place] = told
-        return self._asked[place]
+            told = tuple((k, kind) for k, kind in found.items() if kind is not PhaseKind.WAITING)
+            self._asked[state] = told
+        return self._asked[state]
 
-    def _passed(self, place: Place, dt: float) -> Iterator[Passage]:
-        steps = self.automaton.steps(place.node)
+    def _passed(self, state: HiddenState, dt: float) -> Iterator[HiddenTransition]:
+        steps = self.automaton.steps(state.node)
         changes = [
-            tuple(self.process.changes(s, p, dt)) for s, p in zip(steps, place.phases, strict=True)
+            tuple(self.hmm.changes(s, p, dt)) for s, p in zip(steps, state.phases, strict=True)
         ]
         for changed in product(*changes):
             phases = tuple(phase for phase, _ in changed)
             chance = math.prod(p for _, p in changed)
-            yield from self._gone_on(Place(place.node, phases), chance, dt)
+            yield from self._gone_on(HiddenState(state.node, phases), chance, dt)
 
-    def _gone_on(self, place: Place, chance: float, dt: float) -> Iterator[Passage]:
+    def _gone_on(self, state: HiddenState, chance: float, dt: float) -> Iterator[HiddenTransition]:
         """A place where phases have changed already, and the ways on from it."""
-        node, phases = place
-        ways = self.automaton.ways(node)
-        rates = [self.rate(node, phases, w) for w in ways]
+        node, phases = state
+        transitions = self.automaton.transitions(node)
+        rates = [self.rate(node, phases, w) for w in transitions]
         total = sum(rates)
         gone = -math.expm1(-total * dt)
-        yield Passage(place, chance * (1.0 - gone))
+        yield HiddenTransition(state, chance * (1.0 - gone))
         if gone > 0.0:
             steps = self.automaton.steps(node)
-            for way, rate in zip(ways, rates, strict=True):
+            for transition, rate in zip(transitions, rates, strict=True):
                 if rate > 0.0:
-                    left = tuple(steps[i] for i in way.left)
-                    yield Passage(_target(way, phases), chance * gone * rate / total, left)
+                    left = tuple(steps[i] for i in transition.left)
+                    yield HiddenTransition(
+                        _target(transition, phases), chance * gone * rate / total, left
+                    )
 
-    def rate(self, node: int, phases: tuple[int, ...], way: Way) -> float:
+    def rate(self, node: int, phases: tuple[int, ...], transition: Transition) -> float:
         """Rate of a way on: as slow as the slowest step that it leaves."""
         steps = self.automaton.steps(node)
-        return way.share * min(self.process.leaving(steps[i], phases[i]) for i in way.left)
+        return transition.share * min(
+            self.hmm.leaving(steps[i], phases[i]) for i in transition.left
+        )
 
 
-CLEAREST = (Kind.GOING, Kind.FAILING, Kind.LOST, Kind.WAITING)
+CLEAREST = (PhaseKind.GOING, PhaseKind.FAILING, PhaseKind.LOST, PhaseKind.WAITING)
 
 
-def _target(way: Way, phases: tuple[int, ...]) -> Place:
-    if way.target == END:
-        return Place(END, ())
-    return Place(way.target, tuple(WAITING if c == NEW else phases[c] for c in way.carried))
+def _target(transition: Transition, phases: tuple[int, ...]) -> HiddenState:
+    if transition.target == END:
+        return HiddenState(END, ())
+    return HiddenState(
+        transition.target, tuple(WAITING if c == NEW else phases[c] for c in transition.carried)
+    )
 
 
-def _merged(passages: Iterator[Passage]) -> tuple[Passage, ...]:
-    found: dict[tuple[Place, tuple[Step, ...]], float] = {}
-    for passage in passages:
-        if passage.chance > 0.0:
-            key = (passage.to, passage.left)
-            found[key] = found.get(key, 0.0) + passage.chance
-    return tuple(Passage(to, chance, left) for (to, left), chance in found.items())
+def _merged(passages: Iterator[HiddenTransition]) -> tuple[HiddenTransition, ...]:
+    found: dict[tuple[HiddenState, tuple[TaskStep, ...]], float] = {}
+    for transition in passages:
+        if transition.chance > 0.0:
+            key = (transition.to, transition.left)
+            found[key] = found.get(key, 0.0) + transition.chance
+    return tuple(HiddenTransition(to, chance, left) for (to, left), chance in found.items())

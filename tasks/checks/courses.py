@@ -61,7 +61,7 @@ class CourseCheck:
     def faults(self) -> Iterator[Diagnostic]:
         """All faults of the courses."""
         yield from self.endless()
-        yield from self.signs()
+        yield from self.conditions()
         yield from self.counts()
         yield from self.clauses()
         yield from self.together()
@@ -162,13 +162,13 @@ class CourseCheck:
             return (fact.name, {*fact.actors}) == (said.name, {*said.actors})
         return self.contradict(said, fact)
 
-    def signs(self) -> Iterator[Diagnostic]:
+    def conditions(self) -> Iterator[Diagnostic]:
         """Signs said twice, or that hold for nothing in particular."""
         for course in self.courses:
             if not isinstance(course, Conditioned):
                 continue
             told: set[str] = set()
-            for sign in course.signs:
+            for sign in course.conditions:
                 if sign.kind in told:
                     what = f"`{sign.kind} when` is said twice"
                     hint = "join the conditions with `or` or `and`"

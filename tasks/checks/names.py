@@ -52,7 +52,7 @@ class NameCheck:
     @cached_property
     def comparisons(self) -> list[Comparison]:
         """Every comparison of the file."""
-        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.signs)
+        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in self.task.invariants]
         found = [c for c in self.courses if isinstance(c, Comparison)]
         return found + [f for c in conditions for f in facts_of(c) if isinstance(f, Comparison)]
@@ -72,7 +72,7 @@ class NameCheck:
             if isinstance(course, Timed):
                 yield from ((c.duration, TIME) for c in course.clauses)
             if isinstance(course, Conditioned):
-                yield from ((s.lasting.duration, TIME) for s in course.signs if s.lasting)
+                yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
         for comparison in self.comparisons:

@@ -84,7 +84,7 @@ class _Semantics:
         """Every action that the file names, with its actors: (action, actors, place)."""
         task = self.parsed.task
         facts = [c for _, c in self.courses if isinstance(c, Action | Comparison)]
-        signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.signs)
+        signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
         facts += [f for c in conditions for f in facts_of(c)]
         actions = map(action_of, facts)

@@ -38,7 +38,7 @@ Clause: TypeAlias = Hold | Deadline
 
 
 @dataclass(frozen=True, slots=True)
-class WhenClause:
+class StageCondition:
     """`fails when diverging(a, b) for 2 s`: by what an action begins, ends, progresses or fails.
 
     Attributes:
@@ -125,11 +125,11 @@ class Conditioned:
     """`a begins when b fails when c`: a course with signs of its own."""
 
     item: Course
-    signs: tuple[WhenClause, ...]
+    conditions: tuple[StageCondition, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return " ".join([_within(self.item, CLAUSED), *map(str, self.signs)])
+        return " ".join([_within(self.item, CLAUSED), *map(str, self.conditions)])
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,10 +34,10 @@ from visup.tasks.grammar.nodes import (
     Sequence,
     Span,
     Stage,
+    StageCondition,
     Task,
     Timed,
     Together,
-    WhenClause,
     ZoneDeclaration,
 )
 
@@ -212,10 +212,10 @@ class _TaskBuilder(Transformer[Token, Any]):
     def deadline(self, items: list[Any]) -> Deadline:
         return Deadline(items[1], _over(_of(items[0]), items[1].span))
 
-    def sign(self, items: list[Any]) -> WhenClause:
+    def sign(self, items: list[Any]) -> StageCondition:
         kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
         lasting = items[2] if len(items) > 2 else None
-        return WhenClause(kind, items[1], lasting, _over(_of(items[0]), items[-1].span))
+        return StageCondition(kind, items[1], lasting, _over(_of(items[0]), items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:
         span = _over(_of(items[0]), _of(items[-1]))

@@ -129,7 +129,7 @@ def _names(task: Task, node: Course) -> tuple[str, ...]:
     match node:
         case Action() | Comparison():
             return fact_key(task, node)[1]
-        case Conditioned(signs=signs):
+        case Conditioned(conditions=signs):
             facts = (f for s in signs for f in facts_of(s.condition))
             return tuple(a for f in facts for a in fact_key(task, f)[1])
         case Reference(stage=name):

@@ -10,10 +10,18 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from visup.tasks.automaton.automaton import END, NEW, Automaton, kept
-from visup.tasks.automaton.derivatives import Leaf, State, Step, begin, enter, leaves, moves
+from visup.tasks.automaton.automaton import END, NEW, Automaton, with_payloads
+from visup.tasks.automaton.derivatives import (
+    Leaf,
+    State,
+    TaskStep,
+    begin,
+    derivatives,
+    enter,
+    leaves,
+)
 from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
-from visup.tasks.verification.verify import Watch, entered
+from visup.tasks.verification.step_monitor import StepMonitor, entered
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +38,8 @@ class Onward:
         fresh: Positions of the steps that begin by it.
     """
 
-    left: tuple[Leaf[Watch], ...]
-    entered: tuple[Step, ...]
+    left: tuple[Leaf[StepMonitor], ...]
+    entered: tuple[TaskStep, ...]
     share: float
     state: State[int] | None
     node: int
@@ -46,7 +54,7 @@ class Onward:
 @dataclass(frozen=True, slots=True)
 class _Way:
     left: tuple[int, ...]
-    entered: tuple[Step, ...]
+    entered: tuple[TaskStep, ...]
     share: float
     state: State[int] | None
     node: int
@@ -68,15 +76,15 @@ class Paths:
         self._known: dict[int, list[_Way]] = {}
         self._starts: list[tuple[State[int], int]] = []
 
-    def begin(self, now: float) -> list[tuple[State[Watch], int]]:
+    def begin(self, now: float) -> list[tuple[State[StepMonitor], int]]:
         """The states in which the task may begin now, each with its number."""
         fresh = entered(now)
         return [
-            (kept(state, [Leaf(x.step, fresh) for x in leaves(state)]), node)
+            (with_payloads(state, [Leaf(x.step, fresh) for x in leaves(state)]), node)
             for state, node in self._beginnings(now)
         ]
 
-    def first_steps(self) -> Iterator[Step]:
+    def first_steps(self) -> Iterator[TaskStep]:
         """The steps with which the task may begin."""
         return (x.step for state, _ in self._beginnings(0.0) for x in leaves(state))
 
@@ -89,7 +97,7 @@ class Paths:
             self._starts = found
         return found
 
-    def onward(self, state: State[Watch], node: int, now: float) -> list[Onward]:
+    def onward(self, state: State[StepMonitor], node: int, now: float) -> list[Onward]:
         """All ways on from a state.
 
         Args:
@@ -97,35 +105,40 @@ class Paths:
             node: Its number.
             now: Seconds, from which each `within` counts.
         """
-        ways = self._known.get(node)
-        if ways is None:
-            ways = self._worked_out(state, now)
+        transitions = self._known.get(node)
+        if transitions is None:
+            transitions = self._worked_out(state, now)
             if not self._timed:
-                self._known[node] = ways
+                self._known[node] = transitions
         here = leaves(state)
         return [
             Onward(tuple(here[i] for i in w.left), w.entered, w.share, w.state, w.node, w.fresh)
-            for w in ways
+            for w in transitions
         ]
 
-    def taken(self, way: Onward, state: State[Watch], fresh: Watch) -> tuple[State[Watch], int]:
+    def taken(
+        self, transition: Onward, state: State[StepMonitor], fresh: StepMonitor
+    ) -> tuple[State[StepMonitor], int]:
         """Where a way leads that is no end, with what is kept of the steps carried over."""
-        assert way.state is not None
+        assert transition.state is not None
         here = leaves(state)
-        new = (Leaf(x.step, fresh) if x.watch == NEW else here[x.watch] for x in leaves(way.state))
-        return kept(way.state, list(new)), way.node
+        new = (
+            Leaf(x.step, fresh) if x.payload == NEW else here[x.payload]
+            for x in leaves(transition.state)
+        )
+        return with_payloads(transition.state, list(new)), transition.node
 
-    def _worked_out(self, state: State[Watch], now: float) -> list[_Way]:
+    def _worked_out(self, state: State[StepMonitor], now: float) -> list[_Way]:
         places = iter(range(len(leaves(state))))
-        numbered = kept(state, [Leaf(x.step, next(places)) for x in leaves(state)])
+        numbered = with_payloads(state, [Leaf(x.step, next(places)) for x in leaves(state)])
         found = []
-        for move in moves(self._task, numbered, NEW, now):
-            after = leaves(move.state) if move.state is not None else ()
-            fresh = tuple(i for i, x in enumerate(after) if x.watch == NEW)
-            node = END if move.state is None else self._automaton.node(move.state)
+        for derivative in derivatives(self._task, numbered, NEW, now):
+            after = leaves(derivative.state) if derivative.state is not None else ()
+            fresh = tuple(i for i, x in enumerate(after) if x.payload == NEW)
+            node = END if derivative.state is None else self._automaton.node(derivative.state)
             begun = tuple(after[i].step for i in fresh)
-            left = tuple(x.watch for x in move.left)
-            found.append(_Way(left, begun, 1.0, move.state, node, fresh))
+            left = tuple(x.payload for x in derivative.left)
+            found.append(_Way(left, begun, 1.0, derivative.state, node, fresh))
         alike = Counter(w.left for w in found)
         return [
             _Way(w.left, w.entered, 1.0 / alike[w.left], w.state, w.node, w.fresh) for w in found

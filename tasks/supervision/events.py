@@ -19,9 +19,9 @@ from visup.rules.wording.sentences import describe
 from visup.tasks.automaton.backpointers import Revision
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import stages_inside
-from visup.tasks.supervision.inference import Activity
 from visup.tasks.supervision.sentences import stage_sentence, verdict_sentence
-from visup.tasks.verification.verify import BAD
+from visup.tasks.supervision.task_inference import TaskActivity
+from visup.tasks.verification.step_monitor import BAD
 
 KINDS = {
     Status.PROGRESSING: "stage_progressing",
@@ -64,13 +64,15 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
 
 
 def activity_events(
-    before: Activity, now: Activity, belief: TaskBelief, mind: Mind
+    before: TaskActivity, now: TaskActivity, belief: TaskBelief, mind: Mind
 ) -> Iterator[Event]:
     """Events of a task that is inferred to be going on, or not to be after all."""
-    if before.audible == now.audible:
+    if before.reportable == now.reportable:
         return
-    kind = "task_active" if now.audible else "task_inactive"
-    said = "appears to be going on" if now.audible else "is not what is going on, as it now appears"
+    kind = "task_active" if now.reportable else "task_inactive"
+    said = (
+        "appears to be going on" if now.reportable else "is not what is going on, as it now appears"
+    )
     chance = f"{now.chance:.0%}".replace("%", " %")
     yield Event(
         kind,
@@ -78,7 +80,7 @@ def activity_events(
         mind.frame_index,
         f"Task `{belief.task}` {said} ({chance}).",
         _objects(belief),
-        now.chance if now.audible else 1.0 - now.chance,
+        now.chance if now.reportable else 1.0 - now.chance,
         data={"task": belief.task},
     )
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from visup.agent import TaskBelief
-from visup.tasks.supervision.hypotheses import Reading
-from visup.tasks.supervision.inference import ALONE, Activity
+from visup.tasks.supervision.hypotheses import TaskHypothesis
+from visup.tasks.supervision.task_inference import ALONE, TaskActivity
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class TaskMemory:
 
     Attributes:
         time: Seconds of the step in which it was last followed.
-        readings: The courses followed; empty until its first actors are found.
+        hypotheses: The courses followed; empty until its first actors are found.
         belief: What was last believed.
         interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
             unexpected object that turns out to be one of the actors.
@@ -31,7 +31,7 @@ class TaskMemory:
     """
 
     time: float
-    readings: tuple[Reading, ...]
+    hypotheses: tuple[TaskHypothesis, ...]
     belief: TaskBelief
     interrupted: str = ""
     strangers: tuple[int, ...] = ()
@@ -40,6 +40,6 @@ class TaskMemory:
     rival: tuple[int | None, ...] = ()
     rival_since: float = 0.0
     lasting: tuple[tuple[str, float], ...] = ()
-    activity: Activity = ALONE
+    activity: TaskActivity = ALONE
     gain: float = 0.0
     inferred: float = 0.0

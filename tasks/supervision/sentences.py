@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.automaton.derivatives import Step
-from visup.tasks.verification.verify import Watch
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.verification.step_monitor import StepMonitor
 
 
 def names(words: Sequence[str]) -> str:
@@ -17,45 +17,47 @@ def names(words: Sequence[str]) -> str:
 
 
 def evidence(
-    step: Step, meaning: ActionDefinition, watch: Watch, now: float, actions: Words
+    step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor, now: float, actions: Words
 ) -> str:
     """Why a step stands as it does: one clause, without capital and full stop.
 
     Args:
         step: The step.
         meaning: Its action.
-        watch: What is kept about it.
+        monitor: What is kept about it.
         now: Seconds.
         actions: All actions, for their words.
     """
     who, have = names(step.actors), "has" if len(step.actors) == 1 else "have"
-    match watch.status:
-        case Status.FAILED if watch.late:
+    match monitor.status:
+        case Status.FAILED if monitor.late:
             due = next(d for d in step.deadlines if now > d.at)
             return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
-        case Status.FAILING | Status.FAILED if watch.contrary is not None:
-            what = _say(watch.contrary, actions)
+        case Status.FAILING | Status.FAILED if monitor.contrary is not None:
+            what = _say(monitor.contrary, actions)
             return (
-                f"{who} {have} been {what} since {watch.contrary_since:.1f} s; "
+                f"{who} {have} been {what} since {monitor.contrary_since:.1f} s; "
                 f"`{step.stage}` asks for {step.action}"
             )
-        case Status.FAILING | Status.FAILED if watch.fault is not None:
-            was, what = ("was" if have == "has" else "were"), _say(watch.fault, actions)
+        case Status.FAILING | Status.FAILED if monitor.fault is not None:
+            was, what = ("was" if have == "has" else "were"), _say(monitor.fault, actions)
             return (
-                f"{who} {was} {what} at {watch.fault_since:.1f} s and {have} not recovered; "
+                f"{who} {was} {what} at {monitor.fault_since:.1f} s and {have} not recovered; "
                 f"`{step.stage}` asks for {step.action}"
             )
-        case Status.PROGRESSING if watch.helped_since is not None:
-            what = _say(watch.helped_by or "", actions)
-            return f"{who} {have} been {what} since {max(0.0, watch.helped_since):.1f} s"
-        case Status.STALLED if watch.helped_at is not None:
-            return f"{who} {have} not been {meaning.text} since {watch.helped_at:.1f} s"
-        case Status.UNKNOWN if watch.unseen_since is not None:
-            return f"{who} could not be observed since {watch.unseen_since:.1f} s"
+        case Status.PROGRESSING if monitor.helped_since is not None:
+            what = _say(monitor.helped_by or "", actions)
+            return f"{who} {have} been {what} since {max(0.0, monitor.helped_since):.1f} s"
+        case Status.STALLED if monitor.helped_at is not None:
+            return f"{who} {have} not been {meaning.text} since {monitor.helped_at:.1f} s"
+        case Status.UNKNOWN if monitor.unseen_since is not None:
+            return f"{who} could not be observed since {monitor.unseen_since:.1f} s"
     return f"{who} should be {meaning.text}"
 
 
-def outcome(step: Step, meaning: ActionDefinition, watch: Watch, now: float) -> tuple[Status, str]:
+def outcome(
+    step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor, now: float
+) -> tuple[Status, str]:
     """How a step that has been left ended, and why.
 
     Returns:
@@ -63,21 +65,21 @@ def outcome(step: Step, meaning: ActionDefinition, watch: Watch, now: float) -> 
         it was seen not to hold; UNKNOWN when it could not be seen, or may have been before.
     """
     who, was = names(step.actors), "was" if len(step.actors) == 1 else "were"
-    if watch.late:
+    if monitor.late:
         due = next(d for d in step.deadlines if now > d.at)
         return Status.FAILED, f"`{due.stage}` should be over within {due.seconds:g} s, and was not"
-    if step.hold_s is not None and not watch.fulfilled:
+    if step.hold_s is not None and not monitor.fulfilled:
         return Status.FAILED, f"{who} should be {meaning.text} for {step.hold_s:g} s, and {was} not"
-    end = step.sign("ends")
-    if end is not None and not watch.fulfilled:
-        if watch.denied:
+    end = step.condition("ends")
+    if end is not None and not monitor.fulfilled:
+        if monitor.denied:
             return Status.FAILED, f"`{step.stage}` ends when {end.condition}, which was not so"
         return Status.UNKNOWN, f"whether {end.condition} could not be seen"
-    if meaning.lasts and watch.begun is None:
+    if meaning.lasts and monitor.begun is None:
         return Status.UNKNOWN, f"{who} {was} never seen {meaning.text}, but what follows was seen"
-    if meaning.lasts or watch.held:
+    if meaning.lasts or monitor.held:
         return Status.DONE, f"{who} {was} {meaning.text} until {now:.1f} s"
-    if watch.broken_since is not None:
+    if monitor.broken_since is not None:
         return Status.FAILED, f"{who} should be {meaning.text}, and {was} not"
     return Status.UNKNOWN, f"whether {who} {was} {meaning.text} could not be seen"
 

@@ -1,7 +1,7 @@
 """Supervision of tasks: the reasoner of the cycle's match phase (paper, sections 6 and 7.4).
 
 In each step the actors of every task are matched to objects, what is seen of them is taken into
-the readings of the task, and the best reading says which stage is under way, how it stands, what
+the hypotheses of the task, and the best hypothesis says which stage is under way, how it stands, what
 should be seen next and what the verdict is.
 """
 
@@ -27,19 +27,18 @@ from visup.agent import (
 from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
-from visup.tasks.automaton.backpointers import Revision, revised
+from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import stage_names
-from visup.tasks.supervision.belief import Scene, believe, hushed
+from visup.tasks.supervision.belief import TaskSnapshot, suppressed, task_belief
 from visup.tasks.supervision.events import (
     activity_events,
     revision_events,
     stage_concerns,
     stage_events,
 )
-from visup.tasks.supervision.hypotheses import Follower, Reading
-from visup.tasks.supervision.inference import ALONE, Activity, weighed
+from visup.tasks.supervision.hypotheses import HypothesisTracker, TaskHypothesis
 from visup.tasks.supervision.invariants import (
     broken_since,
     invariant_concerns,
@@ -48,14 +47,15 @@ from visup.tasks.supervision.invariants import (
 )
 from visup.tasks.supervision.matching import match, strength, unexplained
 from visup.tasks.supervision.memory import TaskMemory
+from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
-from visup.tasks.verification.verify import BAD
+from visup.tasks.verification.step_monitor import BAD
 
 MEMORY = "tasks"
 OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
 LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
-SILENT_S = 0.2  # a task that is not told about is looked at no more often than this
+UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often than this
 
 
 def task_reasoner(
@@ -78,15 +78,15 @@ def task_reasoner(
         'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
         'verdict', and concerns 'stage_failing' and 'invariant_broken'.
     """
-    followers = tuple(_follower(t, actions or known_actions(), settings) for t in tasks)
+    trackers = tuple(_follower(t, actions or known_actions(), settings) for t in tasks)
 
     def think(mind: Mind, observation: Observation) -> Outcome:
-        before = _recall(mind, followers)
-        each = zip(followers, before, strict=True)
+        before = _recall(mind, trackers)
+        each = zip(trackers, before, strict=True)
         seen = tuple(_follow(f, m, mind) if _due(m, mind.time) else m for f, m in each)
         new = _inferred(before, seen, mind.time)
         believed = mind.remember(MEMORY, new, tasks=tuple(m.belief for m in new))
-        steps = list(zip(followers, before, new, strict=True))
+        steps = list(zip(trackers, before, new, strict=True))
         events = tuple(e for step in steps for e in _events(*step, mind))
         return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))
 
@@ -110,25 +110,25 @@ def finish(belief: TaskBelief) -> Verdict:
 
 def _follower(
     task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
-) -> Follower:
+) -> HypothesisTracker:
     words = task_vocabulary(task, actions)
-    follower = Follower(task, words.meanings, settings, words.looks)
-    follower.success(follower.start(0.0))  # so that no step has to work out the whole course
-    return follower
+    tracker = HypothesisTracker(task, words.meanings, settings, words.looks)
+    tracker.success(tracker.start(0.0))  # so that no step has to work out the whole course
+    return tracker
 
 
-def _recall(mind: Mind, followers: tuple[Follower, ...]) -> tuple[TaskMemory, ...]:
+def _recall(mind: Mind, trackers: tuple[HypothesisTracker, ...]) -> tuple[TaskMemory, ...]:
     kept = mind.memory.get(MEMORY, ())
-    if [m.belief.task for m in kept] == [f.task.name for f in followers]:
+    if [m.belief.task for m in kept] == [f.task.name for f in trackers]:
         return tuple(kept)
-    activity = ALONE if len(followers) == 1 else Activity()
-    return tuple(_blank(f, mind.time, activity) for f in followers)
+    activity = ALONE if len(trackers) == 1 else TaskActivity()
+    return tuple(_blank(f, mind.time, activity) for f in trackers)
 
 
-def _blank(follower: Follower, now: float, activity: Activity) -> TaskMemory:
-    stages = tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(follower.task))
-    belief = TaskBelief(follower.task.name, Verdict.UNKNOWN, stages, active=activity.chance)
-    broken = (None,) * len(follower.task.invariants)
+def _blank(tracker: HypothesisTracker, now: float, activity: TaskActivity) -> TaskMemory:
+    stages = tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(tracker.task))
+    belief = TaskBelief(tracker.task.name, Verdict.UNKNOWN, stages, active=activity.chance)
+    broken = (None,) * len(tracker.task.invariants)
     return TaskMemory(now, (), belief, broken_since=broken, activity=activity, inferred=now)
 
 
@@ -138,7 +138,7 @@ def _due(memory: TaskMemory, now: float) -> bool:
     One that is told about is, in each step. Those that are not are looked at together, so that none
     of some rivals has a lead, at their own pace: it costs that one of them is told so much later.
     """
-    return memory.activity.audible or not 0.0 < now - memory.time < SILENT_S - 1e-9
+    return memory.activity.reportable or not 0.0 < now - memory.time < UNREPORTED_S - 1e-9
 
 
 def _inferred(
@@ -151,7 +151,7 @@ def _inferred(
     cast = [
         frozenset(b.object_id for b in m.belief.bindings if b.object_id is not None) for m in seen
     ]
-    activities = weighed(
+    activities = updated_activities(
         [m.activity for m in before],
         [m.gain * dt for m in seen],
         cast,
@@ -159,15 +159,17 @@ def _inferred(
         [a.belief.verdict in OVER or _ends(a, b) for a, b in zip(before, seen, strict=True)],
     )
     each = zip(before, seen, activities, strict=True)
-    return tuple([_heard(old.belief, new, activity, now) for old, new, activity in each])
+    return tuple([_with_activity(old.belief, new, activity, now) for old, new, activity in each])
 
 
 def _ends(before: TaskMemory, now: TaskMemory) -> bool:
     """Whether a task that was told about has just ended."""
-    return before.activity.audible and now.belief.verdict in OVER
+    return before.activity.reportable and now.belief.verdict in OVER
 
 
-def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity, now: float) -> TaskMemory:
+def _with_activity(
+    told: TaskBelief, memory: TaskMemory, activity: TaskActivity, now: float
+) -> TaskMemory:
     """A memory with its activity; of a task that is not going on nothing is believed but that.
 
     What was told to go wrong, or of how a task ended, stays told whatever goes on after it. So does
@@ -177,40 +179,40 @@ def _heard(told: TaskBelief, memory: TaskMemory, activity: Activity, now: float)
         return replace(memory, inferred=now)
     belief = replace(memory.belief, active=activity.chance)
     over = told.verdict in OVER or any(s.status in BAD for s in told.stages)
-    if activity.audible or over or memory.interrupted:
+    if activity.reportable or over or memory.interrupted:
         return replace(memory, activity=activity, belief=belief, inferred=now)
-    readings = memory.readings
+    hypotheses = memory.hypotheses
     if memory.activity.begun and not activity.begun:
-        readings = ()  # a rival has ended; what follows is another matter
-    if any(x.watch.status in BAD for r in readings[:1] for x in leaves(r.state)):
-        readings = ()  # if it begins yet, it begins from its beginning
-    belief = hushed(belief, activity)
-    return replace(memory, activity=activity, belief=belief, readings=readings, inferred=now)
+        hypotheses = ()  # a rival has ended; what follows is another matter
+    if any(x.payload.status in BAD for r in hypotheses[:1] for x in leaves(r.state)):
+        hypotheses = ()  # if it begins yet, it begins from its beginning
+    belief = suppressed(belief, activity)
+    return replace(memory, activity=activity, belief=belief, hypotheses=hypotheses, inferred=now)
 
 
-def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:
-    """One step of one task: bind its actors, follow its readings, judge."""
-    settings, now = follower.settings, mind.time
-    bindings, rival, rival_since = _bind(follower, memory, mind)
-    scene = Scene(mind, bindings, follower, dict(memory.lasting))
-    readings, gain = memory.readings or _start(follower, scene), 0.0
-    if readings:
-        dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.readings else 0.0
-        readings = follower.follow(readings, scene.see, now, dt)
-        gain = follower.gain(readings[0], scene.see) if memory.readings else 0.0
-    broken = broken_since(follower, scene, memory)
-    strange = _strange(follower, scene, memory)
+def _follow(tracker: HypothesisTracker, memory: TaskMemory, mind: Mind) -> TaskMemory:
+    """One step of one task: bind its actors, follow its hypotheses, judge."""
+    settings, now = tracker.settings, mind.time
+    bindings, rival, rival_since = _bind(tracker, memory, mind)
+    scene = TaskSnapshot(mind, bindings, tracker, dict(memory.lasting))
+    hypotheses, gain = memory.hypotheses or _start(tracker, scene), 0.0
+    if hypotheses:
+        dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.hypotheses else 0.0
+        hypotheses = tracker.follow(hypotheses, scene.see, now, dt)
+        gain = tracker.gain(hypotheses[0], scene.see) if memory.hypotheses else 0.0
+    broken = broken_since(tracker, scene, memory)
+    strange = _strange(tracker, scene, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
     if {b.object_id for b in bindings} & set(strangers):
         interrupted, strangers = "", ()
     if not interrupted:
-        interrupted, strangers = _interrupted(follower, scene, memory, broken)
-    belief = believe(follower, scene, readings, interrupted)
+        interrupted, strangers = _interrupted(tracker, scene, memory, broken)
+    belief = task_belief(tracker, scene, hypotheses, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     belief = replace(belief, unexplained=lasting)
     return TaskMemory(
         now,
-        readings,
+        hypotheses,
         belief,
         interrupted,
         strangers,
@@ -225,42 +227,46 @@ def _follow(follower: Follower, memory: TaskMemory, mind: Mind) -> TaskMemory:
     )
 
 
-def _events(follower: Follower, memory: TaskMemory, new: TaskMemory, mind: Mind) -> Iterator[Event]:
+def _events(
+    tracker: HypothesisTracker, memory: TaskMemory, new: TaskMemory, mind: Mind
+) -> Iterator[Event]:
     """What is told of one task after a step."""
     yield from activity_events(memory.activity, new.activity, new.belief, mind)
-    if not new.activity.audible and memory.activity.audible:
+    if not new.activity.reportable and memory.activity.reportable:
         return  # that it is not going on says all
-    yield from stage_events(memory.belief, new.belief, mind, follower.task)
+    yield from stage_events(memory.belief, new.belief, mind, tracker.task)
     yield from revision_events(memory.belief, new.belief, _revised(memory, new), mind)
-    yield from invariant_events(follower, memory, new, mind)
+    yield from invariant_events(tracker, memory, new, mind)
 
 
-def _concerns(follower: Follower, memory: TaskMemory) -> Iterator[Concern]:
+def _concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[Concern]:
     yield from stage_concerns(memory.belief)
-    yield from invariant_concerns(follower, memory)
+    yield from invariant_concerns(tracker, memory)
 
 
 def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
-    """Steps that lay behind by the reading told before and do not by the one told now."""
-    if not memory.readings or not new.readings:
+    """Steps that lay behind by the hypothesis told before and do not by the one told now."""
+    if not memory.hypotheses or not new.hypotheses:
         return ()
-    return tuple(revised(memory.readings[0].trail, new.readings[0].trail, new.time))
+    return tuple(
+        revisions(memory.hypotheses[0].backpointer, new.hypotheses[0].backpointer, new.time)
+    )
 
 
 def _bind(
-    follower: Follower, memory: TaskMemory, mind: Mind
+    tracker: HypothesisTracker, memory: TaskMemory, mind: Mind
 ) -> tuple[tuple[Binding, ...], tuple[int | None, ...], float]:
     """The bindings now, and the rival matching with the time since when it has been better.
 
     A matching that takes an actor from an object that is still there must last to be believed.
     """
     before = memory.belief.bindings
-    found = match(follower.task, mind, before, _current_actors(memory), follower.settings)
+    found = match(tracker.task, mind, before, _current_actors(memory), tracker.settings)
     if not any(_changes_hands(a, b, mind) for a, b in zip(before, found, strict=False)):
         return found, (), mind.time
     rival = tuple(b.object_id for b in found)
     since = memory.rival_since if rival == memory.rival else mind.time
-    if mind.time - since >= follower.settings.switch_s:
+    if mind.time - since >= tracker.settings.switch_s:
         return found, (), mind.time
     return tuple(_refreshed(b, mind) for b in before), rival, since
 
@@ -280,22 +286,27 @@ def _refreshed(binding: Binding, mind: Mind) -> Binding:
     return replace(binding, strength=strength(belief, binding.models))
 
 
-def _start(follower: Follower, scene: Scene) -> tuple[Reading, ...]:
+def _start(tracker: HypothesisTracker, scene: TaskSnapshot) -> tuple[TaskHypothesis, ...]:
     """The task begins once all actors of one of its first steps are found."""
-    found = any(scene.found(step.actors) for step in follower.first_steps)
-    return follower.start(scene.mind.time) if found else ()
+    found = any(scene.found(step.actors) for step in tracker.first_steps)
+    return tracker.start(scene.mind.time) if found else ()
 
 
-def _strange(follower: Follower, scene: Scene, memory: TaskMemory) -> tuple[tuple[int, float], ...]:
+def _strange(
+    tracker: HypothesisTracker, scene: TaskSnapshot, memory: TaskMemory
+) -> tuple[tuple[int, float], ...]:
     """Objects that are unexplained now, each with the time since when."""
     before = dict(memory.strange_since)
-    optional = {a.name for a in follower.task.actors if a.optional}
-    now = unexplained(scene.mind, scene.bindings, follower.settings, optional)
+    optional = {a.name for a in tracker.task.actors if a.optional}
+    now = unexplained(scene.mind, scene.bindings, tracker.settings, optional)
     return tuple((i, before.get(i, scene.mind.time)) for i in now)
 
 
 def _interrupted(
-    follower: Follower, scene: Scene, memory: TaskMemory, broken: tuple[float | None, ...]
+    tracker: HypothesisTracker,
+    scene: TaskSnapshot,
+    memory: TaskMemory,
+    broken: tuple[float | None, ...],
 ) -> tuple[str, tuple[int, ...]]:
     """Why the task is interrupted by something unsafe, or empty; and by which unexpected objects.
 
@@ -307,13 +318,13 @@ def _interrupted(
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
-    for invariant, since in zip(follower.task.invariants, broken, strict=True):
-        if since is not None and scene.mind.time - since >= patience(follower, invariant):
+    for invariant, since in zip(tracker.task.invariants, broken, strict=True):
+        if since is not None and scene.mind.time - since >= patience(tracker, invariant):
             return f"`{invariant}` does not hold", ()
     return "", ()
 
 
 def _current_actors(memory: TaskMemory) -> tuple[str, ...]:
-    if not memory.readings:
+    if not memory.hypotheses:
         return ()
-    return tuple(a for x in leaves(memory.readings[0].state) for a in x.step.actors)
+    return tuple(a for x in leaves(memory.hypotheses[0].state) for a in x.step.actors)

@@ -139,7 +139,7 @@ class _Drawer:
                 return self.reference(name, stage, said)
             case Timed(item=item, clauses=clauses):
                 return self.course(item, stage, (*map(str, clauses), *said))
-            case Conditioned(item=item, signs=signs):
+            case Conditioned(item=item, conditions=signs):
                 return self.course(item, stage, (*map(str, signs), *said))
             case Choice(options=options):
                 parts = [self.course(o, stage, said) for o in options]

@@ -10,7 +10,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from random import Random
 
-from visup.tasks.automaton.derivatives import State, Step, begin, enter, form, leaves, moves
+from visup.tasks.automaton.derivatives import (
+    State,
+    TaskStep,
+    begin,
+    derivatives,
+    enter,
+    leaves,
+    structural_key,
+)
 from visup.tasks.grammar.nodes import Task
 
 LONGEST = 200  # moments after which a course drawn at random is cut off
@@ -47,7 +55,7 @@ def successors(task: Task, place: Position) -> tuple[Position, ...]:
     """The places that can come next; none after the end."""
     if place.state is None:
         return ()
-    return _distinct(m.state for m in moves(task, place.state, None, 0.0))
+    return _distinct(m.state for m in derivatives(task, place.state, None, 0.0))
 
 
 def traces(task: Task) -> Iterator[Trace]:
@@ -69,7 +77,7 @@ def traces(task: Task) -> Iterator[Trace]:
         else:
             now = (*before, place.moment)
             for following in successors(task, place):
-                key = (now, None if following.state is None else form(following.state))
+                key = (now, None if following.state is None else structural_key(following.state))
                 if key not in looked_at:  # several ways may have led there
                     looked_at.add(key)
                     todo.append((now, following))
@@ -88,7 +96,7 @@ def sample(task: Task, rng: Random) -> tuple[Trace, bool]:
 def _distinct(states: Iterator[State[None] | None]) -> tuple[Position, ...]:
     found: dict[object, Position] = {}
     for state in states:
-        found.setdefault(None if state is None else form(state), Position(state))
+        found.setdefault(None if state is None else structural_key(state), Position(state))
     return tuple(found.values())
 
 
@@ -97,7 +105,7 @@ def _moment(state: State[None]) -> Moment:
     return tuple(f"<{s.stage}> {_written(s)}" for s in steps)
 
 
-def _written(step: Step) -> str:
+def _written(step: TaskStep) -> str:
     """What a step asks for, as it is written: its key begins with the name of the action."""
     name, _, rest = step.action.partition(" ")
     zone, sign = ("", rest) if rest[:1] in ("<", ">") else (rest, "")

@@ -17,7 +17,7 @@ NEVER: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class ActionObservation:
     """What is seen of an action between its actors.
 
     Attributes:
@@ -37,15 +37,15 @@ class Sighting:
     entry: Relation | None = None
     not_yet: bool = False
     contrary: Relation | None = None
-    stern: bool = False
+    decisive: bool = False
     over: Truth | None = None
     observed: bool = False
 
 
-UNSEEN = Sighting()
+UNOBSERVED = ActionObservation()
 
 
-class Relations:
+class RelationLookup:
     """All relations of a mind at one moment, found by name and objects.
 
     Args:
@@ -142,8 +142,8 @@ class Relations:
 
 
 def observe(
-    meaning: ActionDefinition, objects: tuple[int | None, ...], relations: Relations
-) -> Sighting:
+    meaning: ActionDefinition, objects: tuple[int | None, ...], relations: RelationLookup
+) -> ActionObservation:
     """What is seen of an action.
 
     Args:
@@ -152,16 +152,16 @@ def observe(
         relations: What holds now.
 
     Returns:
-        The sighting; `UNSEEN` when an actor is not found.
+        The sighting; `UNOBSERVED` when an actor is not found.
     """
     ids = tuple(o for o in objects if o is not None)
     if len(ids) < len(objects):
-        return UNSEEN
+        return UNOBSERVED
     holds = _holds(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
     known = (*meaning.helps, *meaning.contrary)
-    return Sighting(
+    return ActionObservation(
         holds=holds,
         helps=helps,
         entry=relations.first_true(meaning.begins, ids),
@@ -172,32 +172,32 @@ def observe(
     )
 
 
-def _holds(meaning: ActionDefinition, ids: tuple[int, ...], relations: Relations) -> Truth:
+def _holds(meaning: ActionDefinition, ids: tuple[int, ...], relations: RelationLookup) -> Truth:
     """True when one of the relations is, false when all that are known are false."""
     if relations.first_true(meaning.holds, ids) is not None:
         return Truth.TRUE
     return Truth.FALSE if relations.known(meaning.holds, ids) else Truth.UNKNOWN
 
 
-Derive = Callable[[Mind, Relations, tuple[int, ...]], Relation | None]
+Derive = Callable[[Mind, RelationLookup, tuple[int, ...]], Relation | None]
 
 
-def _coupled(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     """Coupled when the mind says so, whether or not a relation of that name is kept."""
     pair = tuple(sorted(ids))
     since = next((c.since for c in mind.couplings if c.objects == pair), None)
     return None if since is None else Relation("coupled", ids, Truth.TRUE, since)
 
 
-def _decoupled(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+def _decoupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     return _opposite("decoupled", relations.find("coupled", ids))
 
 
-def _apart(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+def _apart(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     return _opposite("apart", relations.find("touching", ids))
 
 
-def _present(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+def _present(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     belief = mind.objects.get(ids[0])
     if belief is None:
         return None
@@ -206,7 +206,7 @@ def _present(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation
     return Relation("present", ids, Truth.TRUE if here else Truth.FALSE, since)
 
 
-def _gone(mind: Mind, relations: Relations, ids: tuple[int, ...]) -> Relation | None:
+def _gone(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     return _opposite("gone", relations.find("present", ids))
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
-from visup.tasks.automaton.stage_hmm import Process
+from visup.tasks.automaton.stage_hmm import StageHmm
 
 Expr: TypeAlias = tuple[Any, ...]
 """('act', key), ('hold', key, seconds), ('ref', stage), ('seq' | 'alt' | 'any' | 'and', *parts),
@@ -129,7 +129,7 @@ class Oracle:
     """
 
     rules: Rules
-    model: Process
+    model: StageHmm
 
     def begin(self) -> list[tuple[Tree | None, float]]:
         """Each way to begin, with its probability."""

@@ -14,7 +14,7 @@ import pytest
 
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
-from tests.percepts.video.test_live import FakeCapture
+from tests.percepts.video.test_live_source import FakeCapture
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
@@ -22,7 +22,7 @@ from visup.agent.storage.codec import packed
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.percepts.video.live import LiveSource
+from visup.percepts.video.live_source import LiveSource
 from visup.runs.checkpoints import CHECKPOINT
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.operator import HumanOperator

@@ -27,10 +27,10 @@ from visup.tasks.grammar.nodes import (
     Repeated,
     Sequence,
     Stage,
+    StageCondition,
     Task,
     Timed,
     Together,
-    WhenClause,
     ZoneDeclaration,
 )
 from visup.tasks.grammar.statement import RESERVED_WORDS
@@ -65,7 +65,7 @@ def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]
 
 conditions = st.recursive(facts, _joined, max_leaves=4)
 kinds = st.sampled_from(["begins", "ends", "progresses", "fails"])
-signs = st.builds(WhenClause, kinds, conditions, st.none() | holds)
+signs = st.builds(StageCondition, kinds, conditions, st.none() | holds)
 
 
 def _several(inner: st.SearchStrategy[Course]) -> st.SearchStrategy[tuple[Course, ...]]:

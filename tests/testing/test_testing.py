@@ -14,7 +14,7 @@ from visup.agent import Contract
 from visup.agent.cycle.agent import Agent
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
-from visup.percepts.video.base import Ending
+from visup.percepts.video.source import Ending
 from visup.testing import (
     Scripted,
     ScriptedSource,

@@ -132,7 +132,7 @@ def _tasks() -> str:
 
 
 def _demo() -> str:
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.runs.demo import demo_settings
     from visup.runs.wiring import open_video
 

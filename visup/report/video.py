@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
-from visup.percepts.video.silence import quiet
+from visup.percepts.video.quiet_decoder import quiet
 from visup.report.annotate import annotate
 
 MOST_WIDTH = 960

@@ -18,7 +18,7 @@ from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, Limits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
 from visup.agent.storage.jsonable import plain
-from visup.percepts.video import Source
+from visup.percepts.video import VideoSource
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
@@ -59,7 +59,7 @@ class Recorder:
     def __init__(
         self,
         settings: WatchSettings,
-        source: Source,
+        source: VideoSource,
         folder: Path,
         *,
         video: bool = True,

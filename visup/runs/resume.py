@@ -20,7 +20,7 @@ from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
 from visup.agent.storage.codec import packed
 from visup.agent.storage.journal_reader import Recording
-from visup.percepts.video import Source
+from visup.percepts.video import VideoSource
 from visup.runs.checkpoints import Checkpoint, read_checkpoint
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import WatchSettings
@@ -108,7 +108,7 @@ def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
 
 
 def catch_up(
-    agent: Agent, source: Source, past: InterruptedRun, tell: Callable[[Step, Frame], None]
+    agent: Agent, source: VideoSource, past: InterruptedRun, tell: Callable[[Step, Frame], None]
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     """Make an agent what it was after the last recorded step.
 
@@ -150,7 +150,7 @@ def catch_up(
     return (f for f in frames if f.index > begin), tuple(notes)
 
 
-def _frame(frames: Iterator[Frame], seen: Observation, source: Source) -> Frame:
+def _frame(frames: Iterator[Frame], seen: Observation, source: VideoSource) -> Frame:
     for frame in frames:
         if frame.index == seen.frame_index and frame.size == seen.frame_size:
             return Frame(frame.index, seen.time, frame.image)
@@ -169,7 +169,7 @@ def _without_troubles(seen: Observation) -> Observation:
     return replace(seen, reports=tuple(r for r in seen.reports if r.behaviour != name))
 
 
-def _live(agent: Agent, source: Source, past: InterruptedRun, after: int) -> Iterator[Frame]:
+def _live(agent: Agent, source: VideoSource, past: InterruptedRun, after: int) -> Iterator[Frame]:
     """Frames of a camera, counted and timed on from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):

@@ -13,8 +13,8 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.journal import Limits
-from visup.percepts.video import Source
-from visup.percepts.video.live import LiveSource
+from visup.percepts.video import VideoSource
+from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import in_real_time
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.monotonic_clock import MonotonicFrames
@@ -223,7 +223,7 @@ def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str]
 
 def _recorder(
     settings: WatchSettings,
-    source: Source,
+    source: VideoSource,
     folder: Path | None,
     options: RunOptions,
     resume: bool,
@@ -245,7 +245,7 @@ def _recorder(
 
 
 def _caught_up(
-    agent: Agent, source: Source, past: InterruptedRun, recorder: Recorder | None
+    agent: Agent, source: VideoSource, past: InterruptedRun, recorder: Recorder | None
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     if recorder and past.state:
         recorder.collector.load(past.state.kept)
@@ -253,11 +253,11 @@ def _caught_up(
     return catch_up(agent, source, past, tell)
 
 
-def _keeps_pace(settings: WatchSettings, source: Source) -> bool:
+def _keeps_pace(settings: WatchSettings, source: VideoSource) -> bool:
     return source.live if settings.realtime is None else settings.realtime
 
 
-def _steps_of(source: Source, settings: WatchSettings) -> int | None:
+def _steps_of(source: VideoSource, settings: WatchSettings) -> int | None:
     count = source.frame_count
     return None if count is None else -(-count // settings.every)
 

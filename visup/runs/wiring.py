@@ -15,8 +15,8 @@ from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.video import Source, open_source
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.video import VideoSource, open_source
 from visup.rules.activation.attention import Attend
 from visup.rules.activation.waking import Wake, wakeful, waking_rules
 from visup.rules.language.parser import load_rules, shipped_rules
@@ -40,7 +40,7 @@ compiling loops takes at the first frames after an installation."""
 __all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
 
-def open_video(settings: WatchSettings) -> Source:
+def open_video(settings: WatchSettings) -> VideoSource:
     """The source of a run, opened.
 
     Raises:

@@ -18,7 +18,7 @@ from visup.agent import (
     Percept,
 )
 from visup.agent.model.errors import BehaviourError, SettingsError
-from visup.percepts.video.base import Ending, Source
+from visup.percepts.video.source import Ending, VideoSource
 from visup.testing.clips import LabelledFrame
 
 Script = Callable[[Frame], object]
@@ -50,7 +50,7 @@ class Scripted:
         return [self.contract.percept(frame, value) for value in values]
 
 
-class ScriptedSource(Source):
+class ScriptedSource(VideoSource):
     """A source of frames that are given.
 
     Args:

@@ -13,10 +13,10 @@ import numpy as np
 
 from visup.agent import Region
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
-from visup.percepts.motion.outlines.contour import describe
-from visup.percepts.motion.static_camera.blob import Silhouette, Silhouettes, View
-from visup.percepts.motion.static_camera.blob_filters import is_salient
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.outlines.region_outline import describe_mask
+from visup.percepts.motion.static_camera.blob_filters import is_salient_blob
+from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, Foreground
 
 KNOWN = 0.4  # share of a region that differs from the picture when the picture knows it
 COMMON = 0.5  # share of the smaller that two outlines of one object have in common
@@ -34,7 +34,7 @@ LEAST_TOLD = 0.0005  # share of the image that an object must fill when it is fi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
+class MotionEvidence:
     """Points that are seen to move by themselves.
 
     Attributes:
@@ -46,7 +46,7 @@ class Evidence:
     sure: Floats
 
 
-class Telling:
+class TrackFusion:
     """Under which ids objects are told; one per video."""
 
     def __init__(self) -> None:
@@ -54,7 +54,9 @@ class Telling:
         self._shown: set[int] = set()  # their ids that were told without silhouettes
         self._alias: dict[int, int] = {}  # under which other id a region is told
         self._old: set[int] = set()  # those told before the picture, and well known
-        self._told_by: dict[int, tuple[float, float]] = {}  # what tells of a region: missed, all
+        self._missed_evidence: dict[
+            int, tuple[float, float]
+        ] = {}  # what tells of a region: missed, all
 
     def knows(self, number: int) -> bool:
         """Whether a region of the layers was seen of late."""
@@ -73,11 +75,11 @@ class Telling:
         for i in gone:
             del self._last[i]
             self._alias.pop(i, None)
-            self._told_by.pop(i, None)
+            self._missed_evidence.pop(i, None)
         self._old -= gone
         self._shown -= gone - set(self._alias.values())
 
-    def alone(self, regions: Sequence[Region], many: float) -> tuple[Region, ...]:
+    def passthrough(self, regions: Sequence[Region], many: float) -> tuple[Region, ...]:
         """Regions of the layers, told without silhouettes.
 
         Args:
@@ -98,16 +100,16 @@ class Telling:
             out.append(replace(r, id=number))
         return tuple(sorted(out, key=lambda r: r.id))
 
-    def together(
+    def fuse(
         self,
         size: tuple[int, int],
-        view: View,
-        silhouettes: Silhouettes,
+        view: Foreground,
+        silhouettes: BlobTracks,
         regions: Sequence[Region],
         ids: int,
-        evidence: Evidence,
+        evidence: MotionEvidence,
         many: float,
-    ) -> tuple[tuple[Region, ...], Silhouettes, int]:
+    ) -> tuple[tuple[Region, ...], BlobTracks, int]:
         """Give ids to silhouettes that are salient, and settle with the regions of the layers.
 
         Args:
@@ -124,7 +126,9 @@ class Telling:
         """
         scale = size[0] / view.labels.shape[1], size[1] / view.labels.shape[0]
         seen = {
-            s.key: region_of(s, scale, size, view.seconds) for s in silhouettes if s.now is not None
+            s.key: blob_region(s, scale, size, view.seconds)
+            for s in silhouettes
+            if s.visible is not None
         }
         numbered = {s.id: seen[s.key] for s in silhouettes if s.id and s.key in seen}
         # Small ones are seen better before the picture: people who go together, with their shadows.
@@ -133,20 +137,22 @@ class Telling:
         older, heirs = self._older(regions, seen, missed)
         whole_view = size[0] * size[1]
         out: list[Region] = []
-        known: list[Silhouette] = []
+        known: list[BlobTrack] = []
         taken = {s.id for s in silhouettes} | {self._alias.get(r.id, r.id) for r in older}
         for s in silhouettes:
             if s.key in heirs and heirs[s.key] not in taken:
                 s = replace(s, id=heirs[s.key])
                 taken.add(s.id)
             own = seen.get(s.key)
-            free = own is not None and not any(common(own, r) > COMMON * own.area for r in older)
+            free = own is not None and not any(
+                common_pixels(own, r) > COMMON * own.area for r in older
+            )
             large = own is not None and own.area >= LEAST_TOLD * whole_view
             new = own is not None and large and free and not s.id
             if (
                 own is not None
                 and new
-                and is_salient(s)
+                and is_salient_blob(s)
                 and not self._is_part(own, large_ones, numbered)
             ):
                 ids, number = self._number(own, regions, ids, taken)
@@ -162,9 +168,9 @@ class Telling:
                 self._same(r, out)
                 # What is small and was told stays told until a silhouette of it is.
                 small = r.id in self._shown and r.area < many
-                if not small or any(common(s, r) for s in out):
+                if not small or any(common_pixels(s, r) for s in out):
                     continue
-            out = [s for s in out if common(s, r) < COMMON * s.area]
+            out = [s for s in out if common_pixels(s, r) < COMMON * s.area]
             number = self._alias.get(r.id, r.id)
             shown = {s.id for s in out}
             out.append(replace(r, id=r.id if number in shown else number))
@@ -175,7 +181,7 @@ class Telling:
         regions: Sequence[Region],
         seen: Sequence[Region],
         size: tuple[int, int],
-        evidence: Evidence,
+        evidence: MotionEvidence,
     ) -> set[int]:
         """Regions of which the picture misses parts: what is of one tone with the rest, or slow.
 
@@ -195,9 +201,9 @@ class Telling:
             mine = mine[r.mask[row[mine] - y, column[mine] - x]]
             sure = np.maximum(evidence.sure[mine], 0)
             lost = float(sure[~beside[row[mine], column[mine]]].sum())
-            before = self._told_by.get(r.id, (0.0, 0.0))
+            before = self._missed_evidence.get(r.id, (0.0, 0.0))
             now = RECENT * before[0] + lost, RECENT * before[1] + float(sure.sum())
-            self._told_by[r.id] = now
+            self._missed_evidence[r.id] = now
             if now[0] > MISSED * max(now[1], 1.0):
                 out.add(r.id)
         return out
@@ -216,7 +222,7 @@ class Telling:
                 continue
             if r.id not in self._old:
                 continue
-            both = {key: common(s, r) for key, s in seen.items()}
+            both = {key: common_pixels(s, r) for key, s in seen.items()}
             whole = {key: b / (seen[key].area + r.area - b) for key, b in both.items()}
             best = max(whole, key=lambda key: whole[key], default=None)
             if best is None or whole[best] <= WHOLE:
@@ -232,7 +238,11 @@ class Telling:
         """Whether a silhouette that was never told touches another one of the same region."""
         for r in regions:
             host = numbered.get(self._alias.get(r.id, r.id))
-            if host is not None and common(own, r) > COMMON * own.area and touch(own, host):
+            if (
+                host is not None
+                and common_pixels(own, r) > COMMON * own.area
+                and are_near(own, host)
+            ):
                 return True
         return False
 
@@ -243,18 +253,18 @@ class Telling:
         for r in regions:
             number = self._alias.get(r.id, r.id)
             much = MAIN * r.area
-            if number in self._shown and number not in taken and common(own, r) > much:
+            if number in self._shown and number not in taken and common_pixels(own, r) > much:
                 return ids, number
         return ids + 1, ids + 1
 
     def _same(self, r: Region, told: Sequence[Region]) -> None:
         """Note under which id a region of the layers is told."""
-        best = max(told, key=lambda s: common(s, r), default=None)
-        if best is not None and common(best, r) > COMMON * min(r.area, best.area):
+        best = max(told, key=lambda s: common_pixels(s, r), default=None)
+        if best is not None and common_pixels(best, r) > COMMON * min(r.area, best.area):
             self._alias[r.id] = best.id
 
 
-def common(a: Region, b: Region) -> int:
+def common_pixels(a: Region, b: Region) -> int:
     """Pixels that two regions have in common."""
     (ax, ay, aw, ah), (bx, by, bw, bh) = a.bbox, b.bbox
     x0, y0, x1, y1 = max(ax, bx), max(ay, by), min(ax + aw, bx + bw), min(ay + ah, by + bh)
@@ -264,17 +274,17 @@ def common(a: Region, b: Region) -> int:
     return int(np.count_nonzero(in_a & b.mask[y0 - by : y1 - by, x0 - bx : x1 - bx]))
 
 
-def touch(a: Region, b: Region) -> bool:
+def are_near(a: Region, b: Region) -> bool:
     """Whether two regions come nearer than some pixels to each other."""
     x, y, w, h = a.bbox
     wide = np.pad(a.mask.view(np.uint8), BESIDE)
     near = cv2.dilate(wide, np.ones((2 * BESIDE + 1, 2 * BESIDE + 1), np.uint8)) > 0
     grown = replace(a, bbox=(x - BESIDE, y - BESIDE, w + 2 * BESIDE, h + 2 * BESIDE), mask=near)
-    return common(grown, b) > 0
+    return common_pixels(grown, b) > 0
 
 
-def region_of(
-    s: Silhouette, scale: tuple[float, float], size: tuple[int, int], seconds: float
+def blob_region(
+    s: BlobTrack, scale: tuple[float, float], size: tuple[int, int], seconds: float
 ) -> Region:
     """What is visible of an object as a region.
 
@@ -287,14 +297,14 @@ def region_of(
     Returns:
         The region, in frame pixels.
     """
-    assert s.now is not None
-    (x0, y0, x1, y1), mask = s.now
+    assert s.visible is not None
+    (x0, y0, x1, y1), mask = s.visible
     left, top = round(x0 * scale[0]), round(y0 * scale[1])
     right, bottom = min(round(x1 * scale[0]), size[0]), min(round(y1 * scale[1]), size[1])
     large = cv2.resize(
         mask.astype(np.uint8), (right - left, bottom - top), interpolation=cv2.INTER_NEAREST
     )
-    shape = describe(large.astype(bool), (left, top), size)
+    shape = describe_mask(large.astype(bool), (left, top), size)
     velocity = (s.velocity[0] * scale[0], s.velocity[1] * scale[1])
     # A box is known to about a pixel, and its last few steps are averaged.
     sigma = 0.5 * scale[0] / seconds

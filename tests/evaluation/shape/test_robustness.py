@@ -18,7 +18,7 @@ from visup.evaluation.shape.robustness import (
     try_file,
     try_mask,
 )
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 

@@ -10,7 +10,7 @@ from visup.agent import Pose, Spin
 from visup.agent.model.orientation import orientations, swing_and_roll
 from visup.evaluation.missions.mission_poses import spin_error, view_error
 from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
-from visup.percepts.shape.building.views import half_sphere_directions
+from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
 
 def looks(

@@ -21,7 +21,7 @@ from visup.agent import (
 )
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.evaluation.runtime.soak import scripted
-from visup.percepts.shape.behaviour import _resting
+from visup.percepts.shape.behaviour import _rest_intervals
 from visup.rules.activation.attention import Attend
 from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
@@ -91,7 +91,7 @@ def test_only_directives_for_the_behaviour_count() -> None:
         Directive("rest", "r", {"behaviour": "lamp", "region": 4, "every_s": 1.0}),
         Directive("ignore", "r", {"bbox": (0, 0, 1, 1)}),
     ]
-    assert _resting(wishes, "shape") == {3: 1.0}
+    assert _rest_intervals(wishes, "shape") == {3: 1.0}
 
 
 def test_attention_is_a_reasoner_like_any_other() -> None:

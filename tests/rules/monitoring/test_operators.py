@@ -20,9 +20,9 @@ from visup.rules.formula.nodes import Formula, Predicate
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula
 from visup.rules.monitoring.compiler import Compiler
-from visup.rules.monitoring.intervals import Interval
+from visup.rules.monitoring.intervals import Interval, verdict
 from visup.rules.monitoring.linker import LinkedProgram
-from visup.rules.monitoring.monitor import Monitor, verdict
+from visup.rules.monitoring.monitor import Monitor
 from visup.rules.monitoring.operators import max_samples
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.vocabulary import signals

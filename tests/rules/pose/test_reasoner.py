@@ -28,7 +28,7 @@ from visup.agent import (
     ReportState,
 )
 from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
-from visup.percepts.shape.building.views import half_sphere_directions
+from visup.percepts.shape.building.mesh_views import half_sphere_directions
 from visup.rules.pose.reasoner import BelievePose, PoseSettings, pose_support, tracks
 from visup.rules.presence.association import OWNERS
 

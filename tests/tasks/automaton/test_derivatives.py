@@ -9,10 +9,10 @@ from visup.tasks.automaton.derivatives import (
     Leaf,
     State,
     begin,
+    derivatives,
     enter,
-    form,
     leaves,
-    moves,
+    structural_key,
     with_leaves,
 )
 from visup.tasks.grammar.analysis import Grammar
@@ -90,10 +90,10 @@ def walked(task: Task) -> set[Word]:
         if state is None:
             found.add(word)
             continue
-        if len(word) >= LONGEST or (form(state), word) in seen:
+        if len(word) >= LONGEST or (structural_key(state), word) in seen:
             continue
-        seen.add((form(state), word))
-        for move in moves(task, state, None, 0.0):
+        seen.add((structural_key(state), word))
+        for move in derivatives(task, state, None, 0.0):
             left = frozenset(x.step.action for x in move.left)
             todo.append((move.state, (*word, left)))
     return found
@@ -198,10 +198,10 @@ def test_stages_and_times_of_steps_are_those_around_them() -> None:
 def test_a_deadline_runs_on_through_a_sequence_and_anew_in_each_round() -> None:
     task = read("<t> ::= ((a(x) b(x)) within 60 s)+")
     (state,) = [s for s in enter(task, begin(task), None, 0.0) if s is not None]
-    (on,) = moves(task, state, None, 5.0)
+    (on,) = derivatives(task, state, None, 5.0)
     assert on.state is not None
     assert leaves(on.state)[0].step.deadlines[0].at == 60.0
-    again = [m for m in moves(task, on.state, None, 20.0) if m.state is not None]
+    again = [m for m in derivatives(task, on.state, None, 20.0) if m.state is not None]
     assert [leaves(m.state)[0].step.deadlines[0].at for m in again if m.state] == [80.0]
 
 
@@ -209,5 +209,5 @@ def test_leaves_are_replaced_in_order() -> None:
     task = read("<t> ::= (a(x) & b(x)) c(x)")
     (state,) = [s for s in enter(task, begin(task), 0, 0.0) if s is not None]
     numbered = with_leaves(state, iter(Leaf(x.step, i) for i, x in enumerate(leaves(state), 1)))
-    assert [x.watch for x in leaves(numbered)] == [1, 2]
-    assert form(numbered) == form(state)
+    assert [x.payload for x in leaves(numbered)] == [1, 2]
+    assert structural_key(numbered) == structural_key(state)

@@ -9,8 +9,8 @@ import pytest
 from tests.tasks.scripted import Played, Script, Spell, play
 from visup.agent import TaskBelief, Verdict
 from visup.tasks import load_task, parse_task
-from visup.tasks.automaton.recognise import Recogniser
-from visup.tasks.automaton.stage_hmm import SUPERVISED, Seen
+from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, ActionStatus
+from visup.tasks.automaton.task_filter import TaskFilter
 from visup.tasks.supervision.sentences import prospects_text
 from visup.tasks.supervision.supervise import task_reasoner
 
@@ -41,8 +41,8 @@ def test_readings_share_all_probability_and_the_likeliest_is_told(
 ) -> None:
     played = watch(*spells)
     for mind in played.minds[5:]:
-        readings = mind.memory["tasks"][0].readings
-        masses = [r.mass for r in readings]
+        hypotheses = mind.memory["tasks"][0].hypotheses
+        masses = [r.mass for r in hypotheses]
         assert math.isclose(sum(masses), 1.0)
         assert masses == sorted(masses, reverse=True)
         assert mind.tasks[0].confidence == masses[0]
@@ -102,12 +102,12 @@ def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> 
 
 
 def test_a_relation_that_is_not_sure_counts_for_less() -> None:
-    for seen in (Seen.NEITHER, Seen.CONTRARY):
-        fits = [SUPERVISED.fit(seen, sure, 1.0) for sure in (1.0, 0.7, 0.3, 0.0)]
+    for seen in (ActionStatus.NEITHER, ActionStatus.CONTRARY):
+        fits = [SUPERVISION_HMM.fit(seen, sure, 1.0) for sure in (1.0, 0.7, 0.3, 0.0)]
         assert fits == sorted(fits)
         assert fits[-1] == pytest.approx(1.0)
-    halves = SUPERVISED.fit(Seen.CONTRARY, 0.8, 0.5) ** 2
-    assert halves == pytest.approx(SUPERVISED.fit(Seen.CONTRARY, 0.8, 1.0))
+    halves = SUPERVISION_HMM.fit(ActionStatus.CONTRARY, 0.8, 0.5) ** 2
+    assert halves == pytest.approx(SUPERVISION_HMM.fit(ActionStatus.CONTRARY, 0.8, 1.0))
 
 
 def test_prospects_are_said_in_one_line() -> None:
@@ -119,8 +119,16 @@ def test_prospects_are_said_in_one_line() -> None:
 
 
 def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:
-    fit = SUPERVISED.fit
-    order = [fit(s, 1.0, 1.0) for s in (Seen.CONTRARY, Seen.NEITHER, Seen.UNKNOWN, Seen.HOLDS)]
+    fit = SUPERVISION_HMM.fit
+    order = [
+        fit(s, 1.0, 1.0)
+        for s in (
+            ActionStatus.CONTRARY,
+            ActionStatus.NEITHER,
+            ActionStatus.UNKNOWN,
+            ActionStatus.HOLDS,
+        )
+    ]
     assert order == sorted(order)
 
 
@@ -129,5 +137,5 @@ def test_a_stage_that_comes_back_to_itself_inside_another_is_not_looked_into_for
         "<t> ::= <loop>\n<loop> ::= converging(arm, satellite)"
         " | touching(arm, satellite) & (diverging(arm, satellite) <loop>)"
     )
-    recogniser = Recogniser(task)
+    recogniser = TaskFilter(task)
     assert 0.0 < recogniser.success(recogniser.start()) < 1.0

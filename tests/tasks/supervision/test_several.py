@@ -10,8 +10,8 @@ from tests.tasks.scripted import Played, Script, Spell, play
 from visup.agent import Status, TaskBelief, Verdict
 from visup.runs.wiring import final_verdict
 from visup.tasks import parse_task
-from visup.tasks.supervision.inference import AUDIBLE
-from visup.tasks.supervision.supervise import SILENT_S, task_reasoner
+from visup.tasks.supervision.supervise import UNREPORTED_S, task_reasoner
+from visup.tasks.supervision.task_inference import REPORTABLE
 
 DOCK = parse_task("""<dock> ::= <approach> <captured>
 <approach> ::= converging(arm, satellite)
@@ -79,7 +79,7 @@ def test_tasks_with_the_same_beginning_are_both_told_of_until_they_differ() -> N
     assert early["dock"] == pytest.approx(early["inspect"], abs=0.02)
     assert early["dock"] > 0.4
     assert early["leave"] < 0.05
-    assert belief(played, "inspect").active < AUDIBLE
+    assert belief(played, "inspect").active < REPORTABLE
 
 
 def test_a_task_that_is_not_going_on_is_not_told_to_fail() -> None:
@@ -125,12 +125,12 @@ def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own
     paces = set()
     for before, mind in pairwise(minds):
         for old, new in zip(before.memory["tasks"], mind.memory["tasks"], strict=True):
-            if old.activity.audible:
+            if old.activity.reportable:
                 assert new.time == mind.time
             else:
-                assert mind.time - new.time < SILENT_S
+                assert mind.time - new.time < UNREPORTED_S
                 paces |= {round(new.time - old.time, 6)} - {0.0}
-    assert paces == {SILENT_S}
+    assert paces == {UNREPORTED_S}
 
 
 def test_one_task_alone_is_followed_in_each_step() -> None:

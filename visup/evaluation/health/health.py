@@ -20,7 +20,7 @@ from visup.agent.model.errors import SettingsError, VisupError
 from visup.evaluation.health.camera_faults import EXPECTED, inject
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.video import open_source
-from visup.percepts.video.folder import VIDEO_SUFFIXES, images_in
+from visup.percepts.video.image_folder import VIDEO_SUFFIXES, images_in
 
 FAULTS = 100
 WITHIN_S = 1.0

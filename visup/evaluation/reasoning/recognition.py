@@ -17,8 +17,8 @@ from typing import Any
 
 from visup.evaluation.oracles import oracle
 from visup.tasks.automaton.automaton import END
-from visup.tasks.automaton.recognise import Belief, Evidence, Key, Recogniser
-from visup.tasks.automaton.stage_hmm import Process, Seen
+from visup.tasks.automaton.stage_hmm import ActionStatus, StageHmm
+from visup.tasks.automaton.task_filter import ActionEvidence, ActionKey, TaskFilter, TaskPosterior
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import read
 
@@ -75,7 +75,7 @@ def _compare(rng: random.Random, seed: int, result: Agreement) -> None:
     rules, model = draw.rules(), drawn_process(rng)
     stream = draw.stream(LONGEST)
     oracle = recognition_oracle.Oracle(rules, model)
-    recogniser = Recogniser(read(recognition_tasks.text_of(rules)), model, most=10**9, least=0.0)
+    recogniser = TaskFilter(read(recognition_tasks.text_of(rules)), model, most=10**9, least=0.0)
     belief = recogniser.start()
     result.grammars += 1
     for (dt, seen), truth in zip(stream, oracle.told(stream, MOST_HISTORIES), strict=False):
@@ -92,9 +92,9 @@ def _compare(rng: random.Random, seed: int, result: Agreement) -> None:
     result.worst_success = max(result.worst_success, good - hoped, hoped - good - open_end)
 
 
-def drawn_process(rng: random.Random) -> Process:
+def drawn_process(rng: random.Random) -> StageHmm:
     """A model whose numbers are drawn too: what is compared is the arithmetic, not the numbers."""
-    return Process(
+    return StageHmm(
         begin=rng.uniform(0.2, 3.0),
         leave=rng.uniform(0.05, 2.0),
         skip=rng.uniform(0.0, 0.1),
@@ -107,11 +107,11 @@ def drawn_process(rng: random.Random) -> Process:
     )
 
 
-def evidence(seen: Mapping[str, tuple[str, float]]) -> dict[Key, Evidence]:
+def evidence(seen: Mapping[str, tuple[str, float]]) -> dict[ActionKey, ActionEvidence]:
     """What a drawn stream tells, as the recogniser takes it."""
     return {
-        (key, ("o",) if key == recognition_oracle.OPTIONAL else ("x",)): Evidence(
-            Seen[what.upper()], sure
+        (key, ("o",) if key == recognition_oracle.OPTIONAL else ("x",)): ActionEvidence(
+            ActionStatus[what.upper()], sure
         )
         for key, (what, sure) in seen.items()
     }
@@ -127,7 +127,7 @@ class Played:
     """
 
     stages: tuple[str, ...]
-    seen: tuple[Mapping[Key, Evidence], ...]
+    seen: tuple[Mapping[ActionKey, ActionEvidence], ...]
 
 
 def play(
@@ -142,31 +142,31 @@ def play(
         wrong: Share of verdicts that are wrong: each of the two others alike.
         most: No more than so many steps, whether or not the task is over.
     """
-    automaton = Recogniser(task).automaton
+    automaton = TaskFilter(task).automaton
     keys = sorted(
         {(s.action, s.actors) for n in automaton.explored(10**6) for s in automaton.steps(n)}
     )
     stages: list[str] = []
-    seen: list[Mapping[Key, Evidence]] = []
+    seen: list[Mapping[ActionKey, ActionEvidence]] = []
     node = rng.choice(automaton.start)[0]
     while node != END and len(stages) < most:
         (step,) = automaton.steps(node)
         for _ in range(round(mean_s * rng.uniform(0.5, 1.5) / FRAME_S)):
             stages.append(step.stage)
             seen.append({k: _verdict(k == (step.action, step.actors), rng, wrong) for k in keys})
-        node = rng.choice(automaton.ways(node)).target
+        node = rng.choice(automaton.transitions(node)).target
     return Played(tuple(stages), tuple(seen))
 
 
-SURE = {s: Evidence(s) for s in Seen}
+SURE = {s: ActionEvidence(s) for s in ActionStatus}
 WRONGLY = {
-    Seen.HOLDS: (SURE[Seen.NEITHER], SURE[Seen.CONTRARY]),
-    Seen.NEITHER: (SURE[Seen.HOLDS], SURE[Seen.CONTRARY]),
+    ActionStatus.HOLDS: (SURE[ActionStatus.NEITHER], SURE[ActionStatus.CONTRARY]),
+    ActionStatus.NEITHER: (SURE[ActionStatus.HOLDS], SURE[ActionStatus.CONTRARY]),
 }
 
 
-def _verdict(going: bool, rng: random.Random, wrong: float) -> Evidence:
-    true = Seen.HOLDS if going else Seen.NEITHER
+def _verdict(going: bool, rng: random.Random, wrong: float) -> ActionEvidence:
+    true = ActionStatus.HOLDS if going else ActionStatus.NEITHER
     return rng.choice(WRONGLY[true]) if rng.random() < wrong else SURE[true]
 
 
@@ -196,7 +196,7 @@ def follow(stages: int, seed: int, mean_s: float) -> Followed:
     rng = random.Random(seed)
     task = read(recognition_tasks.large_task(stages, rng))
     played = play(task, rng, mean_s)
-    pruned, whole = Recogniser(task), Recogniser(task, most=10**9, least=0.0)
+    pruned, whole = TaskFilter(task), TaskFilter(task, most=10**9, least=0.0)
     told = list(_beliefs(pruned, played))
     said = [pruned.ranking(b) for b in told]
     # Without pruning every place is worked out at every step, which takes a while.
@@ -206,14 +206,14 @@ def follow(stages: int, seed: int, mean_s: float) -> Followed:
     return Followed(
         right=sum(r[0][0] == s for r, s in zip(said, played.stages, strict=True)) / count,
         steps=count,
-        kept=statistics.fmean(len(b.places) for b in told),
+        kept=statistics.fmean(len(b.states) for b in told),
         lost=told[-1].lost,
         differs=sum(r[0][0] != s for r, s in zip(said, exact, strict=False)) / len(exact),
         dropped_truth=sum(s not in dict(r) for r, s in zip(said, played.stages, strict=True)),
     )
 
 
-def _beliefs(recogniser: Recogniser, played: Played) -> Iterator[Belief]:
+def _beliefs(recogniser: TaskFilter, played: Played) -> Iterator[TaskPosterior]:
     belief = recogniser.start()
     for i, seen in enumerate(played.seen):
         belief = recogniser.step(belief, seen, FRAME_S if i else 0.0)
@@ -228,7 +228,7 @@ def speed(stages: int, seed: int = 0, steps: int = 2_000) -> float:
     rng = random.Random(seed)
     task = read(recognition_tasks.large_task(stages, rng))
     seen = play(task, rng, 4.0, most=steps).seen[:steps]
-    recogniser = Recogniser(task)
+    recogniser = TaskFilter(task)
     begin = time.process_time()
     belief = recogniser.start()
     for i, now in enumerate(seen):
@@ -240,7 +240,7 @@ def speed(stages: int, seed: int = 0, steps: int = 2_000) -> float:
 def speed_unsure(stages: int, steps: int = 200) -> float:
     """Steps per second when nothing at all is seen of rows of ten stages, one of which is taken."""
     rows = [" ".join(f"act_{i}(x)" for i in range(n, n + 10)) for n in range(0, stages, 10)]
-    recogniser = Recogniser(read(f"<t> ::= {' | '.join(rows)}"))
+    recogniser = TaskFilter(read(f"<t> ::= {' | '.join(rows)}"))
     belief = recogniser.start()
     begin = time.process_time()
     for i in range(steps):

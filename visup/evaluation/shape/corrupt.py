@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.index.records import NODE, VIEW
+from visup.percepts.shape.index.view_records import NODE, VIEW
 
 Random = np.random.Generator
 Mask = NDArray[np.generic]

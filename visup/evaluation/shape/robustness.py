@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import VisupError
 from visup.evaluation.shape.corrupt import DAMAGES, HARMLESS, LARGE, MASKS, damage, odd_mask
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.index.records import NewView
-from visup.percepts.shape.matching.similarity import shape_of
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.index.view_records import NewView
+from visup.percepts.shape.matching.shape_similarity import shape_of
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 FILES = 2000

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.shape.augment import multiplied
 from visup.percepts.shape.building.build import build_database
-from visup.percepts.shape.building.views import load_mesh, render_views, sphere_directions
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
+from visup.percepts.shape.database.model_database import ModelDatabase
 
 VIEWS_OF_A_MESH = 16
 SIZES = (1, 10)
@@ -122,7 +122,7 @@ def _probed(path: Path, masks: Path, *, exhaustive: bool) -> dict[str, Any]:
 def probe(path: Path, masks: Sequence[NDArray[np.bool_]], *, exhaustive: bool) -> dict[str, Any]:
     """Figures of one database; see `evaluate_scale`."""
     # What is imported when it is first needed is no part of opening or answering.
-    from visup.percepts.shape.matching.similarity import shape_of
+    from visup.percepts.shape.matching.shape_similarity import shape_of
     from visup.percepts.shape.silhouette.silhouette import normalise
 
     shapes = [shape_of(s) for m in masks if (s := normalise(m)) is not None]

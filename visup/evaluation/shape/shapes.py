@@ -19,11 +19,16 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.percepts.shape.building.build import PICTURES, read_silhouette
-from visup.percepts.shape.database.database import candidates_wanted
-from visup.percepts.shape.index.index import ViewIndex
+from visup.percepts.shape.database.model_database import candidates_wanted
+from visup.percepts.shape.index.view_index import ViewIndex
 from visup.percepts.shape.matching.graph_matching import WEIGHTS, match_nodes
-from visup.percepts.shape.matching.similarity import GRAPH_SHARE, Shape, second_looks, shape_of
-from visup.percepts.shape.silhouette.areas import AreaIndex
+from visup.percepts.shape.matching.shape_similarity import (
+    GRAPH_SHARE,
+    Shape,
+    compare_outlines_and_areas,
+    shape_of,
+)
+from visup.percepts.shape.silhouette.area_overlap import AreaIndex
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 RANKS = 10
@@ -175,7 +180,7 @@ def _looks_row(i: int) -> NDArray[np.float64]:
     """What outlines and areas give to the similarities of one shape with all before it."""
     query = _Shared.shapes[i]
     overlaps = _Shared.areas.overlaps(query.areas, np.arange(i))
-    return second_looks(query, _Shared.shapes[:i], overlaps).worth
+    return compare_outlines_and_areas(query, _Shared.shapes[:i], overlaps).worth
 
 
 def _pruning(

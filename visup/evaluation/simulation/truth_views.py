@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from visup.agent import Depth, Hypothesis, Region
 from visup.evaluation.simulation.truth_masks import Mission
 from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
-from visup.percepts.shape.building.views import half_sphere_directions
+from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
 ABSENT = ("antenna", "barrel", "chair", "drill", "engine", "funnel", "guitar", "hammer", "iron")
 """Models that no mission of ours shows, for silhouettes to be mistaken for."""

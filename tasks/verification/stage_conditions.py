@@ -1,0 +1,78 @@
+"""What a course says of the beginning, end, progress and failure of its steps, as it is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from visup.agent import Relation, Truth
+from visup.tasks.actions.vocabulary import OPPOSITE
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.grammar.conditions import And, Condition, Not, Or
+from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
+from visup.tasks.grammar.structure import fact_key
+from visup.tasks.grammar.units import value
+from visup.tasks.verification.observe import ActionObservation, RelationLookup
+
+FIRM = (Truth.FALSE, Truth.UNKNOWN, Truth.TRUE)
+"""Kleene's strong logic: the least of a conjunction, the greatest of a disjunction."""
+
+Holds = Callable[[str, tuple[str, ...]], Truth]
+"""Whether an action holds now, by its key and its actors."""
+
+
+@dataclass(frozen=True)
+class ConditionEvaluator:
+    """The conditions of a task at one moment.
+
+    Attributes:
+        task: The task.
+        holds: Whether an action holds now.
+        relations: What holds now.
+    """
+
+    task: Task
+    holds: Holds
+    relations: RelationLookup
+
+    def truth(self, condition: Condition) -> Truth:
+        """Whether a condition holds; unknown when what decides it was not observed."""
+        match condition:
+            case Action() | Comparison():
+                return self.holds(*fact_key(self.task, condition))
+            case Not(item=item):
+                return OPPOSITE[self.truth(item)]
+            case And(parts=parts):
+                return min((self.truth(p) for p in parts), key=FIRM.index)
+            case Or(parts=parts):
+                return max((self.truth(p) for p in parts), key=FIRM.index)
+
+    def relation(self, condition: Condition, lasting: Hold | None) -> Relation:
+        """A condition as a relation: true once it has held as long as it must."""
+        found = self.relations.lasting(str(condition), (), self.truth(condition))
+        if found.truth is not Truth.TRUE or lasting is None:
+            return found
+        must = value(self.task.amount(lasting.duration))
+        held = self.relations.time - found.since >= must - 1e-9
+        return found if held else replace(found, truth=Truth.FALSE)
+
+    def apply(self, step: TaskStep, seen: ActionObservation) -> ActionObservation:
+        """A sighting with what the course itself says of the step in place of what its action says."""
+        for sign in step.conditions:
+            seen = self._apply(sign, seen)
+        return seen
+
+    def _apply(self, sign: StageCondition, seen: ActionObservation) -> ActionObservation:
+        found = self.relation(sign.condition, sign.lasting)
+        known = seen.observed or found.truth is not Truth.UNKNOWN
+        true = found if found.truth is Truth.TRUE else None
+        match sign.kind:
+            case "begins":
+                return replace(seen, entry=true, not_yet=False, observed=known)
+            case "ends":
+                return replace(seen, over=found.truth, observed=known)
+            case "progresses":
+                helps = seen.helps if seen.holds is Truth.TRUE else true
+                return replace(seen, helps=helps, observed=known)
+            case "fails":
+                return replace(seen, contrary=true, decisive=True, observed=known)

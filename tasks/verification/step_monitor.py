@@ -1,0 +1,237 @@
+"""Verification of one step under way: its status, from what is seen of it over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from visup.agent import Status, Truth
+from visup.agent.model.fast_replace import replace
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
+from visup.tasks.verification.settings import TaskSettings
+
+BAD = (Status.FAILING, Status.FAILED)
+
+
+@dataclass(frozen=True)
+class StepMonitor:
+    """What is kept about a step under way; times in seconds.
+
+    Attributes:
+        entered: When the step was entered.
+        status: How it stands.
+        since: Since when it stands so.
+        begun: When it was first seen to hold or to come nearer, or None.
+        held: Whether it ever held.
+        held_s: How long it has held without a break.
+        broken_since: Since when it has not held, or None.
+        fulfilled: Whether it has held for as long as it must.
+        helped_by: Name of the relation by which it last held or came nearer, or None.
+        helped_since: Since when that relation was true, or None.
+        helped_at: When it last held or came nearer, or None.
+        better_since: Since when it holds or comes nearer without a break, or None.
+        contrary: Name of the contrary relation that is true now, or None.
+        contrary_since: Since when.
+        fault: The contrary by which it last failed, or None.
+        fault_since: Since when that was so.
+        late: Whether a `within` ran out before the step was over; there is no way back from that.
+        ceased: Whether it once held and then was seen not to.
+        unseen_since: Since when nothing is known about it, or None.
+        denied: Whether what the course says of its end was last seen not to hold.
+        opened: Whether what the course says of its beginning was seen (see `StageCondition`).
+        confidence: Of the last sighting, 0 to 1.
+    """
+
+    entered: float
+    status: Status = Status.ACTIVE
+    since: float = 0.0
+    begun: float | None = None
+    held: bool = False
+    held_s: float = 0.0
+    broken_since: float | None = None
+    fulfilled: bool = False
+    helped_by: str | None = None
+    helped_since: float | None = None
+    helped_at: float | None = None
+    better_since: float | None = None
+    contrary: str | None = None
+    contrary_since: float | None = None
+    fault: str | None = None
+    fault_since: float = 0.0
+    late: bool = False
+    ceased: bool = False
+    unseen_since: float | None = None
+    confidence: float = 1.0
+    denied: bool = False
+    opened: bool = False
+
+
+def entered(now: float) -> StepMonitor:
+    """What is kept about a step that begins now."""
+    return StepMonitor(entered=now, since=now)
+
+
+def update(
+    monitor: StepMonitor,
+    step: TaskStep,
+    meaning: ActionDefinition,
+    seen: ActionObservation,
+    now: float,
+    dt: float,
+    settings: TaskSettings,
+) -> StepMonitor:
+    """Take one sighting into what is kept about a step.
+
+    Args:
+        monitor: What was kept.
+        step: The step.
+        meaning: Its action.
+        seen: What is seen of it now.
+        now: Seconds.
+        dt: Seconds since the last sighting.
+        settings: Patience.
+
+    Returns:
+        What is kept now, with the new status.
+    """
+    if step.condition("begins") is not None and not monitor.opened:
+        # Until it begins, nothing that is seen speaks for or against it.
+        monitor = replace(monitor, opened=seen.entry is not None)
+        seen = seen if monitor.opened else replace(UNOBSERVED, observed=seen.observed)
+    noted = _note_contrary(
+        _note_progress(monitor, step, meaning, seen, now, dt, settings), seen, now
+    )
+    late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
+    noted = replace(noted, late=late)
+    status = _status(noted, seen, now, settings)
+    if status is noted.status:
+        return noted
+    if status is not Status.FAILING:
+        return replace(noted, status=status, since=now)
+    # What had been reached is lost; the step fails since the contrary began, not since it was sure.
+    since = now if noted.contrary_since is None else noted.contrary_since
+    return replace(
+        noted,
+        status=status,
+        since=since,
+        fault=noted.contrary,
+        fault_since=since,
+        fulfilled=False,
+        held_s=0.0,
+    )
+
+
+def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> bool:
+    """Whether a step is over by itself, whatever comes next."""
+    told = step.hold_s is not None or step.condition("ends") is not None
+    return monitor.fulfilled and (not meaning.lasts or told)
+
+
+def overdue(step: TaskStep, now: float) -> bool:
+    """Whether a `within` around the step has run out."""
+    return any(now > d.at for d in step.deadlines)
+
+
+def _note_progress(
+    monitor: StepMonitor,
+    step: TaskStep,
+    meaning: ActionDefinition,
+    seen: ActionObservation,
+    now: float,
+    dt: float,
+    settings: TaskSettings,
+) -> StepMonitor:
+    if not seen.observed:
+        # Not seen is not "no": what was reached stays, the clocks stand still.
+        return replace(monitor, unseen_since=_first(monitor.unseen_since, now), better_since=None)
+    held, broken, ceased = monitor.held_s, monitor.broken_since, monitor.ceased
+    if seen.holds is Truth.TRUE:
+        held, broken = held + dt, None
+    elif seen.holds is Truth.FALSE:
+        broken = _first(broken, now)
+        if now - broken >= settings.gap_s:
+            held, ceased = 0.0, ceased or monitor.fulfilled
+    helping = seen.helps is not None
+    must = meaning.hold_s if step.hold_s is None else step.hold_s
+    complete = held >= must - 1e-9
+    if seen.over is not None:
+        complete = seen.over is Truth.TRUE and (complete or step.hold_s is None)
+    return replace(
+        monitor,
+        begun=_first(monitor.begun, now) if helping else monitor.begun,
+        held=monitor.held or seen.holds is Truth.TRUE,
+        held_s=held,
+        broken_since=broken,
+        fulfilled=monitor.fulfilled or complete,
+        helped_by=seen.helps.name if seen.helps else monitor.helped_by,
+        helped_since=seen.helps.since if seen.helps else monitor.helped_since,
+        helped_at=now if helping else monitor.helped_at,
+        better_since=_first(monitor.better_since, now) if helping and not seen.contrary else None,
+        ceased=ceased,
+        denied=monitor.denied if seen.over in (None, Truth.UNKNOWN) else seen.over is Truth.FALSE,
+        unseen_since=None,
+        confidence=seen.helps.confidence if seen.helps else 1.0,
+    )
+
+
+def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
+    """A contrary counts from when it was true within this step; holding outweighs it."""
+    if not seen.observed:
+        return monitor
+    if seen.contrary is None or (seen.holds is Truth.TRUE and not seen.decisive):
+        return replace(monitor, contrary=None, contrary_since=None)
+    since = max(monitor.entered, seen.contrary.since)
+    if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:
+        since = min(since, monitor.contrary_since)
+    confidence = seen.contrary.confidence
+    return replace(
+        monitor, contrary=seen.contrary.name, contrary_since=since, confidence=confidence
+    )
+
+
+def _status(
+    monitor: StepMonitor, seen: ActionObservation, now: float, settings: TaskSettings
+) -> Status:
+    if monitor.late:
+        return Status.FAILED
+    if not seen.observed:
+        return _status_unseen(monitor, now, settings)
+    if _fails(monitor, now, settings):
+        return Status.FAILED if _long_failing(monitor, now, settings) else Status.FAILING
+    if monitor.status in BAD and not _recovered(monitor, now, settings):
+        return Status.FAILED if _long_failing(monitor, now, settings) else monitor.status
+    if monitor.begun is None:
+        return Status.ACTIVE
+    stalled = monitor.helped_at is not None and now - monitor.helped_at >= settings.stalled_s
+    return Status.STALLED if stalled else Status.PROGRESSING
+
+
+def _status_unseen(monitor: StepMonitor, now: float, settings: TaskSettings) -> Status:
+    """A failing stage stays so while it is not seen; any other becomes unknown after a while."""
+    lasting = monitor.status in (Status.FAILING, Status.FAILED, Status.ACTIVE)
+    long = monitor.unseen_since is not None and now - monitor.unseen_since >= settings.unseen_s
+    return Status.UNKNOWN if long and not lasting else monitor.status
+
+
+def _fails(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+    if monitor.contrary_since is None:
+        return False
+    patience = settings.contrary_s if monitor.begun is not None else settings.contrary_early_s
+    return now - monitor.contrary_since >= patience - 1e-9
+
+
+def _long_failing(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+    if monitor.status is Status.FAILED:
+        return True
+    return monitor.status is Status.FAILING and now - monitor.since >= settings.failed_s
+
+
+def _recovered(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
+    """What failed for good goes on only when it has gone well for as long as that took."""
+    must = settings.failed_s if monitor.status is Status.FAILED else settings.recover_s
+    return monitor.better_since is not None and now - monitor.better_since >= must
+
+
+def _first(earlier: float | None, now: float) -> float:
+    return now if earlier is None else earlier

@@ -1,0 +1,254 @@
+"""Recognition: laws of the model, the exact oracle, and what is told of where a task is."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.oracles.recognition_tasks import Draw, text_of
+from visup.agent import Status
+from visup.evaluation.reasoning.recognition import compare, follow
+from visup.tasks.automaton.automaton import END
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.stage_hmm import DEFAULT_HMM, ActionStatus, PhaseKind, StageHmm
+from visup.tasks.automaton.task_filter import ActionEvidence, ActionKey, TaskFilter, TaskPosterior
+from visup.tasks.automaton.transitions import HiddenState, HiddenTransitions
+from visup.tasks.grammar.parser import read
+
+ROW = "<t> ::= <one> <two> <three>\n<one> ::= a(x)\n<two> ::= b(x)\n<three> ::= c(x)"
+HELD = TaskStep("a", ("x",), "t", 2.0)
+PLAIN = TaskStep("a", ("x",), "t")
+LAW = settings(max_examples=40, deadline=None)
+
+
+def seeing(*holding: str, among: str = "abc") -> dict[ActionKey, ActionEvidence]:
+    seen = {k: ActionStatus.HOLDS if k in holding else ActionStatus.NEITHER for k in among}
+    return {(k, ("x",)): ActionEvidence(s) for k, s in seen.items()}
+
+
+def followed(
+    recogniser: TaskFilter, told: str, among: str = "abc", dt: float = 0.2
+) -> list[TaskPosterior]:
+    """Beliefs after each letter of what is seen; `.` for nothing at all."""
+    beliefs = [recogniser.start()]
+    for letter in told:
+        seen = {} if letter == "." else seeing(letter, among=among)
+        beliefs.append(recogniser.step(beliefs[-1], seen, dt))
+    return beliefs
+
+
+def test_small_tasks_are_recognised_as_by_counting_all_histories() -> None:
+    agreed = compare(25, first=5_000)
+    assert agreed.steps > 100
+    assert agreed.worst <= 1e-6
+    assert agreed.worst_success <= 1e-6
+    assert not agreed.other
+
+
+@LAW
+@given(st.integers(0, 10**6), st.sampled_from([0.04, 0.3, 5.0]))
+def test_passages_from_a_place_share_all_of_its_mass(seed: int, dt: float) -> None:
+    task = read(text_of(Draw(random.Random(seed)).rules()))
+    recogniser = TaskFilter(task)
+    transitions = HiddenTransitions(recogniser.automaton, DEFAULT_HMM)
+    places = [p for p, _ in transitions.begin()]
+    for place in places[:5]:
+        passages = transitions.transitions(place, dt)
+        assert sum(p.chance for p in passages) == pytest.approx(1.0)
+        places += [p.to for p in passages]
+
+
+@pytest.mark.parametrize("step", [HELD, PLAIN])
+@given(dt=st.floats(0.001, 100.0))
+def test_changes_of_a_phase_share_all_of_its_mass(step: TaskStep, dt: float) -> None:
+    for phase in range(DEFAULT_HMM.count(step) + 3):
+        changes = list(DEFAULT_HMM.changes(step, phase, dt))
+        assert sum(p for _, p in changes) == pytest.approx(1.0)
+        assert all(p >= 0 for _, p in changes)
+
+
+@given(st.sampled_from(PhaseKind), st.floats(0.0, 1.0))
+def test_what_is_seen_is_seen_with_some_probability_whatever_is_going_on(
+    kind: PhaseKind, sure: float
+) -> None:
+    assert sum(DEFAULT_HMM.chances[kind]) == pytest.approx(1.0)
+    assert DEFAULT_HMM.likelihood(kind, ActionStatus.UNKNOWN, sure) == 1.0
+    for seen in ActionStatus:
+        assert DEFAULT_HMM.likelihood(kind, seen, 0.0) == pytest.approx(1.0)
+
+
+def test_what_is_unknown_changes_nothing_but_the_time() -> None:
+    recogniser = TaskFilter(read(ROW))
+    before = followed(recogniser, "aaa")[-1]
+    unknown = {key: ActionEvidence(ActionStatus.UNKNOWN) for key in seeing()}
+    assert recogniser.step(before, unknown, 0.5).states == recogniser.step(before, {}, 0.5).states
+    same = recogniser.step(before, unknown, 0.0)
+    for place, weighed in before.states.items():
+        assert same.states[place].mass == pytest.approx(weighed.mass)
+
+
+@LAW
+@given(st.integers(0, 10**6))
+def test_time_may_be_cut_into_steps_as_one_likes(seed: int) -> None:
+    """While nothing is seen, many short steps and few longer ones come to nearly the same."""
+    recogniser = TaskFilter(read(ROW), least=0.0)
+    before = followed(recogniser, random.Random(seed).choice(["aaaa", "aab", "abbbc"]))[-1]
+    short = before
+    for _ in range(20):
+        short = recogniser.step(short, {}, 0.01)
+    middle = before
+    for _ in range(10):
+        middle = recogniser.step(middle, {}, 0.02)
+    one, other = recogniser.stages(short), recogniser.stages(middle)
+    for key, chance in one.items():
+        assert other.get(key, 0.0) == pytest.approx(chance, abs=0.002)
+
+
+def test_a_task_is_followed_from_stage_to_stage() -> None:
+    recogniser = TaskFilter(read(ROW))
+    beliefs = followed(recogniser, "aaaaaabbbbbbcccccc")
+    told = [recogniser.most_likely(b)[0] for b in beliefs[1:]]
+    assert told == sorted(told, key=["one", "two", "three"].index)
+    assert recogniser.most_likely(beliefs[6]) == ("one", Status.PROGRESSING)
+    stage, chance = recogniser.ranking(beliefs[-1])[0]
+    assert stage == "three"
+    assert chance > 0.98
+
+
+def test_one_wrong_look_does_not_lead_astray() -> None:
+    recogniser = TaskFilter(read(ROW))
+    beliefs = followed(recogniser, "aaaaaacaaabaaaaaaa")
+    assert {recogniser.most_likely(b)[0] for b in beliefs[4:]} == {"one"}
+
+
+def test_a_contrary_that_lasts_is_failing_and_ends_it() -> None:
+    recogniser = TaskFilter(read(ROW))
+    belief = followed(recogniser, "aaaaa")[-1]
+    hopes = [recogniser.success(belief)]
+    for _ in range(6):
+        seen = {**seeing(), ("a", ("x",)): ActionEvidence(ActionStatus.CONTRARY)}
+        belief = recogniser.step(belief, seen, 0.2)
+        hopes.append(recogniser.success(belief))
+    assert recogniser.most_likely(belief) == ("one", Status.FAILING)
+    assert hopes == sorted(hopes, reverse=True)
+    assert recogniser.success(followed(recogniser, "aaaaabbbbbccccc")[-1]) > hopes[0] > hopes[-1]
+
+
+def test_what_may_come_next_is_told_with_equal_shares() -> None:
+    task = "<t> ::= <a> (<b> | <c> <b>)\n<a> ::= a(x)\n<b> ::= b(x)\n<c> ::= c(x)"
+    recogniser = TaskFilter(read(task))
+    assert dict(recogniser.next_stages(recogniser.start())) == {
+        "b": pytest.approx(0.5),
+        "c": pytest.approx(0.5),
+    }
+    assert dict(recogniser.next_stages(followed(recogniser, "aaaabbbbbbbb")[-1])).get("b", 0) < 0.1
+
+
+def test_what_comes_next_is_a_stage_however_many_steps_away() -> None:
+    task = "<t> ::= <a> <b>?\n<a> ::= (a(x) c(x))+\n<b> ::= b(x)"
+    recogniser = TaskFilter(read(task))
+    after_one = dict(recogniser.next_stages(recogniser.start()))["b"]
+    # From c: a again, b, or the end; a leads back to c: p = 1/3 p + 1/3.
+    assert after_one == pytest.approx(0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "text", [ROW, "<t> ::= (a(x) for 2 s b(x))+ c(x)?", "<t> ::= a(x) | b(x) <t>"]
+)
+def test_success_is_the_share_of_courses_that_end(text: str) -> None:
+    """Letting the model run until all is over finds what is told beforehand."""
+    process = StageHmm(begin=2.0, leave=1.0, fail=0.2, recover=0.3, lose=0.2, skip=0.05)
+    recogniser = TaskFilter(read(text), process, most=10**6, least=1e-12)
+    belief = recogniser.start()
+    hope = recogniser.success(belief)
+    for _ in range(3_000):
+        belief = recogniser.step(belief, {}, 0.05)
+    ended = belief.states[HiddenState(END, ())].mass
+    assert 0.1 < hope < 0.95
+    assert ended == pytest.approx(hope, abs=0.01)
+
+
+def test_what_later_evidence_overturns_is_taken_back() -> None:
+    task = "<t> ::= a(x) | <long> <other>\n<long> ::= b(x)\n<other> ::= c(x)"
+    recogniser = TaskFilter(read("<t> ::= <one> <two>\n<one> ::= a(x)\n<two> ::= b(x)"))
+    beliefs = followed(recogniser, "aaaaabbb" + "a" * 12, among="ab")
+    taken = [r for b in beliefs for r in b.revised]
+    assert [r.step.stage for r in taken] == ["one"]
+    assert 1.0 < taken[0].told < taken[0].revised
+    assert "`one`, told done at" in str(taken[0])
+    assert "now believed not to have happened" in str(taken[0])
+    steady = followed(TaskFilter(read(task)), "bbbbbbccccc")
+    assert not [r for b in steady for r in b.revised]
+
+
+def test_a_retry_is_followed_however_often_it_comes() -> None:
+    task = "<t> ::= <try> (<done> | <back> <t>)\n<try> ::= a(x)\n<back> ::= b(x)\n<done> ::= c(x)"
+    recogniser = TaskFilter(read(task))
+    beliefs = followed(recogniser, "aaaaabbbbb" * 8 + "ccccccccc")
+    assert recogniser.most_likely(beliefs[78])[0] == "back"
+    assert recogniser.most_likely(beliefs[-1])[0] == "done"
+    assert len(recogniser.automaton) < 20  # a retry at the end of its task needs no stack
+
+
+def test_a_task_that_holds_itself_within_itself_is_looked_into_no_further_than_is_bounded() -> None:
+    task = read("<t> ::= any order (<u>, e(x)?) | b(x) <t>\n<u> ::= d(x)? | c(x) <t>")
+    recogniser = TaskFilter(task)
+    assert 0.5 < recogniser.success(recogniser.start()) < 1.0
+    assert len(recogniser.automaton) < 3_000
+
+
+def test_places_are_bounded_and_what_is_dropped_is_accounted_for() -> None:
+    task = read("<t> ::= any order (a(x), b(x), c(x), d(x), e(x))")
+    few, all_of_them = TaskFilter(task, most=40), TaskFilter(task, most=10**6, least=0.0)
+    told = "aaaaaccccceeeee"
+    one, other = followed(few, told, "abcde")[-1], followed(all_of_them, told, "abcde")[-1]
+    assert len(one.states) <= 40 < len(other.states)
+    assert 0.0 < one.lost < 0.05
+    assert other.lost == pytest.approx(0.0, abs=1e-12)
+    assert few.most_likely(one) == all_of_them.most_likely(other)
+
+
+def test_the_truth_is_dropped_no_more_often_than_is_accounted_for() -> None:
+    """Over streams that the model itself draws, with far too few places kept."""
+    task = read("<t> ::= any order (a(x), b(x), c(x))")
+    recogniser = TaskFilter(task, most=4)
+    dropped, accounted = 0, 0.0
+    for seed in range(60):
+        truths, belief = drawn(recogniser, random.Random(seed)), recogniser.start()
+        missed = False
+        for place, seen in truths:
+            belief = recogniser.step(belief, seen, 1.0)
+            missed = missed or place not in belief.states
+        dropped += missed
+        accounted += belief.lost
+    assert dropped > 0
+    assert dropped <= accounted + 3 * accounted**0.5
+
+
+def drawn(
+    recogniser: TaskFilter, rng: random.Random
+) -> list[tuple[HiddenState, dict[ActionKey, ActionEvidence]]]:
+    """Where a task is at each second, and what is seen of it, by the model itself."""
+    transitions = HiddenTransitions(recogniser.automaton, DEFAULT_HMM)
+    place = rng.choice([p for p, _ in transitions.begin()])
+    found = []
+    for _ in range(25):
+        passages = transitions.transitions(place, 1.0)
+        place = rng.choices(passages, [p.chance for p in passages])[0].to
+        asked = dict(transitions.required(place))
+        seen = {}
+        for key in seeing():
+            chances = DEFAULT_HMM.chances[asked.get(key, PhaseKind.WAITING)]
+            seen[key] = ActionEvidence(ActionStatus(rng.choices(range(3), chances)[0]))
+        found.append((place, seen))
+    return found
+
+
+def test_large_tasks_are_followed_through_wrong_verdicts() -> None:
+    run = follow(12, seed=3, mean_s=6.0)
+    assert run.right >= 0.95
+    assert run.differs == 0.0
+    assert run.dropped_truth == 0
