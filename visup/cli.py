@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-import visup
 from visup.agent.model.errors import VisupError
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.debug import app as debug_app
@@ -21,6 +20,7 @@ from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.watch import demo, watch
+from visup.version import __version__
 
 BAD_INPUT = 2
 
@@ -52,7 +52,7 @@ app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"visup {visup.__version__}")
+        print(f"visup {__version__}")
         raise typer.Exit
 
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Truth
 from visup.rules.predicates._snapshot_jit import pair_quantities
-from visup.rules.relations.kinematics import Measured
-from visup.rules.relations.reasoner import NAMES, measured
+from visup.rules.relations.kinematics import Kinematics
+from visup.rules.relations.reasoner import NAMES, kinematics
 from visup.rules.wording.sentences import short
 
 Codes = NDArray[np.int8]
@@ -50,7 +50,7 @@ class Snapshot:
         self.beliefs = mind.present()
         self.ids = tuple(b.id for b in self.beliefs)
         self.row = {object_id: i for i, object_id in enumerate(self.ids)}
-        self.measured: Measured = measured(mind)
+        self.measured: Kinematics = kinematics(mind)
         self._names: dict[int, str] = {}
         self._codes: dict[str, Codes] = {}
         self._paired: tuple[Floats, Codes] | None = None

@@ -12,7 +12,7 @@ import numpy as np
 
 from visup.agent import HealthStatus, ObjectBelief, Presence, Region
 from visup.rules.formula.units import ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
-from visup.rules.geometry.regions import scale
+from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.snapshot import (
     MAYBE,
@@ -28,9 +28,9 @@ from visup.rules.predicates.snapshot import (
     exact,
     interval_between,
 )
-from visup.rules.presence.sightings import tracks
+from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.relations.kinematics import RelationSettings
-from visup.rules.relations.zones import QUESTIONS, asked
+from visup.rules.relations.zones import QUESTIONS, zone_truth
 from visup.rules.wording.sentences import believed_name
 
 IMPLIED = MappingProxyType(
@@ -146,7 +146,7 @@ def is_named(facts: Snapshot, name: str) -> Codes:
 
 def moving(facts: Snapshot) -> Codes:
     """Whether an object moves in the image."""
-    still = STILL_SPEED * scale(facts.mind.frame_size)
+    still = STILL_SPEED * image_diagonal(facts.mind.frame_size)
     speeds = facts.one("speed").tolist()
     codes = [MAYBE if v != v else code(v > still) for v in speeds]  # NaN is not equal to itself
     return np.array(codes, dtype=np.int8)
@@ -170,7 +170,7 @@ def first_contact(facts: Snapshot) -> Codes:
 
 def lost(facts: Snapshot) -> Codes:
     """Whether an object is out of sight and nothing tells why."""
-    known = tracks(facts.mind).of
+    known = presence_memory(facts.mind).of
     return facts.among([i for i in facts.ids if i in known and known[i].told == "lost"])
 
 
@@ -237,7 +237,7 @@ def in_forbidden_zone(facts: Snapshot) -> Codes:
 
 def _zone(question: str) -> Callable[[Snapshot, str], Codes]:
     return lambda facts, zone: facts.each(
-        lambda b: TRUTH_CODE[asked(facts.mind, question, b.id, zone)]
+        lambda b: TRUTH_CODE[zone_truth(facts.mind, question, b.id, zone)]
     )
 
 

@@ -18,7 +18,7 @@ from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED
 from visup.rules.predicates.inputs_missing import inputs_missing
 from visup.rules.predicates.snapshot import MAYBE, NO, YES, Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
-from visup.rules.relations.zones import asked, contains
+from visup.rules.relations.zones import contains, zone_truth
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
 from visup.tasks.grammar.nodes import Action, Actors, Task, walk
@@ -191,7 +191,7 @@ def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
             within = contains(points, polygon)
             told = _truth(bool(within.all() if name == "wholly_inside" else within.any()))
         else:
-            told = asked(facts.mind, question, ids[0], zone)
+            told = zone_truth(facts.mind, question, ids[0], zone)
         return OPPOSITE[told] if name == "outside" else told
 
     return look

@@ -15,7 +15,7 @@ from visup.rules.predicates.snapshot import SIGMAS
 from visup.rules.predicates.vocabulary import IMPLIED, KEEP_OUT, PREDICATES, QUANTITIES
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.step_context import PresenceSettings
-from visup.rules.reasoners import RuleSettings
+from visup.rules.reasoners import ReasonerSettings
 from visup.rules.relations.kinematics import RelationSettings
 
 PAGE = (ROOT / "docs/rules.md").read_text("utf-8")
@@ -84,20 +84,20 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
         ("(by {} D", FragmentSettings().apart),
         ("seen steadily: {} s", PresenceSettings().entry_s),
         ("out of sight for {:g} s and nothing", PresenceSettings().lost_s),
-        ("judged over the last {} s", RuleSettings().coupling.window_s),
-        ("0.0125 D/s), which add up until their logarithm is {:g}", RuleSettings().coupling.odds),
-        ("came together in the {:g} s before", RuleSettings().coupling.approach_s),
-        ("apart for {} s.", RuleSettings().coupling.part_s),
-        ("tau is {:g} s", RuleSettings().votes.tau_s),
-        ("and {:g} s for an object that is hidden", RuleSettings().votes.tau_hidden_s),
-        ("fewer than {} votes", RuleSettings().votes.known_votes),
-        ("in less than {} s", RuleSettings().votes.apart_s),
-        ("similarity {}.", RuleSettings().votes.stranger),
-        ("exp({} v)", RuleSettings().votes.evidence),
-        ("led for {} s with", RuleSettings().votes.settle_s),
-        ("with a likelihood of {} |", RuleSettings().votes.settle),
-        ("within {} of each other", RuleSettings().questions.close),
-        ("stayed close for {:g} s", RuleSettings().questions.patience_s),
+        ("judged over the last {} s", ReasonerSettings().coupling.window_s),
+        ("0.0125 D/s), which add up until their logarithm is {:g}", ReasonerSettings().coupling.odds),
+        ("came together in the {:g} s before", ReasonerSettings().coupling.approach_s),
+        ("apart for {} s.", ReasonerSettings().coupling.part_s),
+        ("tau is {:g} s", ReasonerSettings().votes.tau_s),
+        ("and {:g} s for an object that is hidden", ReasonerSettings().votes.tau_hidden_s),
+        ("fewer than {} votes", ReasonerSettings().votes.known_votes),
+        ("in less than {} s", ReasonerSettings().votes.apart_s),
+        ("similarity {}.", ReasonerSettings().votes.stranger),
+        ("exp({} v)", ReasonerSettings().votes.evidence),
+        ("led for {} s with", ReasonerSettings().votes.settle_s),
+        ("with a likelihood of {} |", ReasonerSettings().votes.settle),
+        ("within {} of each other", ReasonerSettings().questions.close),
+        ("stayed close for {:g} s", ReasonerSettings().questions.patience_s),
     ],
 )  # fmt: skip
 def test_thresholds_on_the_page_are_the_defaults(text: str, value: float) -> None:

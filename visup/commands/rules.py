@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.watch import Actors, Every, Fov, Fps, Models, Rules, Source, Tasks, settings_of
+from visup.commands.options import Given, takes
+from visup.runs.settings import WatchSettings
 
 if TYPE_CHECKING:
     from visup.agent import Mind
@@ -18,6 +19,8 @@ app = typer.Typer(no_args_is_help=True)
 
 Files = Annotated[list[Path] | None, typer.Argument(help="Rule files; the shipped rules if none.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
+EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical_deg")
+"""Settings of a run that bear on what rules say."""
 
 
 @app.command()
@@ -70,23 +73,20 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
 
 
 @app.command()
+@takes(WatchSettings, only=EXPLAINED)
 def explain(
-    source: Source,
+    setting: Given,
+    source: Annotated[
+        str, typer.Argument(help="Video file, folder of images, camera index or URL.")
+    ],
     at: Annotated[float, typer.Option("--at", min=0.0, help="Seconds of the video.")],
     rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
-    task: Tasks = None,
-    models: Models = None,
-    rules: Rules = None,
-    actor: Actors = None,
-    every: Every = 1,
-    fps: Fps = None,
-    fov: Fov = None,
 ) -> None:
     """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
     from visup.agent.model.errors import SettingsError
     from visup.runs.wiring import build_agent, open_video
 
-    settings = settings_of(source, task, models, rules, actor, every, None, None, fps, fov)
+    settings = WatchSettings(source, **setting)
     agent, mind = build_agent(settings), None
     with open_video(settings) as video:
         for frame in video:

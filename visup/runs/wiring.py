@@ -17,8 +17,8 @@ from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.video import VideoSource, open_source
-from visup.rules.activation.attention import Attend
-from visup.rules.activation.waking import Wake, wakeful, waking_rules
+from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
+from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
 from visup.runs.plugins import user_behaviours
@@ -88,7 +88,7 @@ def build_agent(
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
-        limits=replace(_limits(settings, live), wakeful=wakeful(contracts, _rules(settings))),
+        limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
 
 
@@ -155,9 +155,14 @@ def _reasoners(
 ) -> Reasoners:
     interpreting = default_reasoners(rules=_rules(settings))
     following = (task_reasoner(tasks),) if tasks else ()
-    attending = (Attend(),) if settings.attention else ()
-    waking = waking_rules(contracts)
-    match = (*following, *attending, *((Wake(waking),) if waking else ()), runtime_fault_reasoner)
+    attending = (AttentionReasoner(),) if settings.attention else ()
+    waking = activation_rules(contracts)
+    match = (
+        *following,
+        *attending,
+        *((ActivationReasoner(waking),) if waking else ()),
+        runtime_fault_reasoner,
+    )
     return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 

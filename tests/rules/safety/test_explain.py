@@ -21,7 +21,7 @@ from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
 from visup.rules.reasoners import default_reasoners
-from visup.rules.relations.zones import SeeZones
+from visup.rules.relations.zones import ZoneReasoner
 from visup.rules.safety.explain import RuleExplanation
 from visup.rules.safety.queries import evaluation_of, explain, object_choices
 from visup.rules.safety.reasoner import SAFETY, RuleReasoner
@@ -199,7 +199,7 @@ def test_forbidden_zones_are_those_named_so_and_depth_must_be_known(
     mind = replace(MIND, zones=(zone,)).with_objects(*objects)
     for k in range(10):
         seen = [replace(b, last_seen=k * 0.1) for b in mind.objects.values()]
-        mind = SeeZones()(replace(mind, time=k * 0.1).with_objects(*seen), NOTHING).mind
+        mind = ZoneReasoner()(replace(mind, time=k * 0.1).with_objects(*seen), NOTHING).mind
     text = 'rule r(a): info when in_forbidden_zone(a) say "{a}"'
     assert {o[0] for _, o in concerns(text, mind)} == expected
 

@@ -12,7 +12,7 @@ import pytest
 from tests.tasks.scripted import ARM, INTRUDER, REGION, SATELLITE, Played, Script, Spell, play
 from visup.agent import Mind, Observation, Outcome, Status, TaskBelief, Verdict, Zone
 from visup.agent.model.errors import TaskError
-from visup.rules.relations.zones import SeeZones
+from visup.rules.relations.zones import ZoneReasoner
 from visup.tasks import load_task, load_tasks, parse_task
 from visup.tasks.actions.actions import ActionDefinition, known_actions, with_actions
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -213,7 +213,7 @@ def moved(
         arm = replace(before.objects[ARM], region=region)
         objects = MappingProxyType({**before.objects, ARM: arm})
         now = replace(before, objects=objects, **mind)  # type: ignore[arg-type]
-        return reasoner(SeeZones()(now, observation).mind, observation)
+        return reasoner(ZoneReasoner()(now, observation).mind, observation)
 
     return play(think, Script(), played_until).last
 

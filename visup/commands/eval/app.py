@@ -82,7 +82,7 @@ HEALTH_KEYS = (
 @app.command("motion")
 def motion(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
     """Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time."""
-    from visup.evaluation.motion.motion import evaluate_motion
+    from visup.evaluation.motion.runner import evaluate_motion
 
     checked(folder, json_file)
     with told("seeing") as tell:
@@ -93,7 +93,7 @@ def motion(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
 @app.command("shapes")
 def shapes(folder: Folder, json_file: Json = None, limit: Limit = None) -> None:
     """Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time."""
-    from visup.evaluation.shape.shapes import evaluate_shapes
+    from visup.evaluation.shape.retrieval import evaluate_shapes
 
     checked(folder, json_file)
     with told("comparing") as tell:
@@ -109,7 +109,7 @@ def missions(
     limit: Limit = None,
 ) -> None:
     """Whole missions: identity, events, stages, alerts, verdicts, speed."""
-    from visup.evaluation.missions.missions import evaluate_missions
+    from visup.evaluation.missions.runner import evaluate_missions
 
     checked(folder, json_file)
     with told("supervising") as tell:
@@ -129,7 +129,7 @@ def health(
     ] = None,
 ) -> None:
     """Camera faults put into sound video: found within 1 s, rightly named, false reports."""
-    from visup.evaluation.health.health import evaluate_health
+    from visup.evaluation.health.runner import evaluate_health
 
     checked(folder, json_file)
     with told("watching") as tell:

@@ -33,7 +33,7 @@ def clips(
 
     from visup.commands.eval.app import told, writable
     from visup.commands.render import needs_renderer
-    from visup.evaluation.motion.clips import evaluate_clips
+    from visup.evaluation.motion.rendered_clips import evaluate_clips
     from visup.evaluation.record import write_record
 
     needs_renderer()

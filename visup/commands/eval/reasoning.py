@@ -60,8 +60,8 @@ def reasoning(
 
             figures = evaluate_endurance(long, progress=tell)
         else:
-            from visup.evaluation.reasoning.reasoning import evaluate_reasoning
-            from visup.evaluation.simulation.truth_percepts import PerceptNoise
+            from visup.evaluation.reasoning.simulated_missions import evaluate_reasoning
+            from visup.evaluation.simulation.percepts import PerceptNoise
 
             figures = evaluate_reasoning(
                 folder,

@@ -29,7 +29,7 @@ def views(
 
     from visup.commands.eval.app import checked, told
     from visup.evaluation.record import write_record
-    from visup.evaluation.shape.views import evaluate_views
+    from visup.evaluation.shape.view_recognition import evaluate_views
 
     checked(folder, json_file)
     with told("recognising") as tell:

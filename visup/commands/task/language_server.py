@@ -9,7 +9,6 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
-from visup import __version__
 from visup.agent.model.errors import Place, VisupError
 from visup.commands.task.task import laid_out
 from visup.tasks.checks.diagnose import diagnose
@@ -18,6 +17,7 @@ from visup.tasks.diagnostics.diagnostic import Diagnostic
 from visup.tasks.diagnostics.explain import explain
 from visup.tasks.grammar.nodes import Span
 from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at, references
+from visup.version import __version__
 
 KINDS = {
     "stage": lsp.CompletionItemKind.Class,

@@ -35,7 +35,7 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class _Answer:
+class _QueryResult:
     """What came of one query in one condition."""
 
     name: str
@@ -122,7 +122,7 @@ def _asked(
 
 def _answers(
     database: ModelDatabase, query: Query, alike: NDArray[np.float64]
-) -> Iterator[_Answer]:
+) -> Iterator[_QueryResult]:
     """One query in all conditions."""
     for condition in CONDITIONS:
         mask, cut = query.masks[condition], condition in ("cut", "both")
@@ -131,7 +131,7 @@ def _answers(
         seconds = time.perf_counter() - begin
         names = [m.view.name for m in ranking.matches]
         own = database.query(mask, cut=cut, top=1, restrict={query.name}).matches
-        yield _Answer(
+        yield _QueryResult(
             query.name,
             condition,
             names.index(query.name) if query.name in names else None,
@@ -147,7 +147,7 @@ def _angle(own: Sequence[ViewMatch], query: Query, alike: NDArray[np.float64]) -
     return angle_to(np.asarray(own[0].direction), query.direction, alike)
 
 
-def _figures(answers: Sequence[_Answer]) -> dict[str, Any]:
+def _figures(answers: Sequence[_QueryResult]) -> dict[str, Any]:
     figures: dict[str, Any] = {}
     for condition in CONDITIONS:
         own = [a for a in answers if a.condition == condition]

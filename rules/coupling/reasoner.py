@@ -35,11 +35,16 @@ from visup.agent import (
 )
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
-from visup.rules.coupling.relative_motion import Joint, begun, follow, motion
-from visup.rules.geometry.regions import scale
-from visup.rules.presence.sightings import merged_pairs
+from visup.rules.coupling.relative_motion import (
+    RelativeTrack,
+    begin_relative_track,
+    relative_velocity,
+    update_relative_track,
+)
+from visup.rules.geometry.regions import image_diagonal
+from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.kinematics import RelationSettings
-from visup.rules.relations.reasoner import measured
+from visup.rules.relations.reasoner import kinematics
 from visup.rules.wording.sentences import sentence
 
 COUPLING = "rules.coupling"
@@ -84,7 +89,7 @@ class CouplingSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pending:
+class CouplingEvidence:
     """What is remembered of one pair: seconds since when each holds, or None.
 
     Attributes:
@@ -97,13 +102,13 @@ class Pending:
     converged_at: float | None = None
     rest_odds: float = 0.0
     apart_since: float | None = None
-    joint: Joint | None = None
+    joint: RelativeTrack | None = None
 
 
-NOTHING = Pending()
+NO_EVIDENCE = CouplingEvidence()
 
 
-class Sight(NamedTuple):
+class PairObservation(NamedTuple):
     """Two objects as they are seen now; lives only while the reasoner runs.
 
     Attributes:
@@ -124,22 +129,22 @@ class Sight(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Couple:
+class CouplingReasoner:
     """Reasoner of the cogitate phase, after the relations: couplings and the `coupled` relation."""
 
     settings: CouplingSettings = field(default_factory=CouplingSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[Pair, Pending] = mind.memory.get(COUPLING, MappingProxyType({}))
+        old: Mapping[Pair, CouplingEvidence] = mind.memory.get(COUPLING, MappingProxyType({}))
         coupled = {c.objects: c for c in mind.couplings}
         table = _table(mind)
-        sights = _sights(table, mind)
-        kept: dict[Pair, Pending] = {}
+        sights = _observed_pairs(table, mind)
+        kept: dict[Pair, CouplingEvidence] = {}
         events: list[Event] = []
         for sight in sights:
             pair = sight.pair
-            p = self._look(old.get(pair, NOTHING), sight, mind)
+            p = self._look(old.get(pair, NO_EVIDENCE), sight, mind)
             if pair not in coupled and self._joined(p, sight, mind):
                 coupled[pair] = Coupling(pair, mind.time)
                 events.append(
@@ -150,17 +155,19 @@ class Couple:
                 del coupled[pair]
                 text = "{0} and {1} {are} no longer coupled."
                 events.append(_event("decoupled", text, pair, mind, observation))
-                p = NOTHING
+                p = NO_EVIDENCE
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_cells(_coupled(sights, coupled, mind))
+        table = table.with_cells(_coupled_cells(sights, coupled, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
 
-    def _look(self, before: Pending, sight: Sight, mind: Mind) -> Pending:
+    def _look(
+        self, before: CouplingEvidence, sight: PairObservation, mind: Mind
+    ) -> CouplingEvidence:
         converging = sight.converging == YES and sight.touching != YES
-        far = sight.diverging == YES or sight.gap > 0.02 * scale(mind.frame_size)
+        far = sight.diverging == YES or sight.gap > 0.02 * image_diagonal(mind.frame_size)
         apart = sight.touching == NO and far
         joint = self._follow(before.joint, sight, mind)
         odds = before.rest_odds
@@ -172,40 +179,50 @@ class Couple:
         if same and apart == (before.apart_since is not None):
             return before  # as nearly always: most pairs are far from each other
         converged = mind.time if converging else before.converged_at
-        return Pending(converged, odds, _since(before.apart_since, apart, mind.time), joint)
+        return CouplingEvidence(
+            converged, odds, _since(before.apart_since, apart, mind.time), joint
+        )
 
-    def _follow(self, before: Joint | None, sight: Sight, mind: Mind) -> Joint | None:
+    def _follow(
+        self, before: RelativeTrack | None, sight: PairObservation, mind: Mind
+    ) -> RelativeTrack | None:
         """How the two move relative to each other; the same as before when they are not seen."""
         s = self.settings
         merged = sight.host is not None
-        if before is None and not merged and not sight.gap <= s.near * scale(mind.frame_size):
+        if (
+            before is None
+            and not merged
+            and not sight.gap <= s.near * image_diagonal(mind.frame_size)
+        ):
             return None
         regions = _regions(sight, mind)
         if regions is None:
             old = before is None or mind.time - before.path_end > s.path_s / 2
             return None if old else before
-        if not merged and not sight.gap <= s.near * scale(mind.frame_size):
+        if not merged and not sight.gap <= s.near * image_diagonal(mind.frame_size):
             return None
         if before is None and merged:
             # Not seen side by side before: one is followed as it was last seen, the other with it.
-            return begun(_apart(sight.pair, mind), mind.time, mind.frame_size)
-        return follow(
+            return begin_relative_track(_apart(sight.pair, mind), mind.time, mind.frame_size)
+        return update_relative_track(
             before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
         )
 
-    def _rest(self, odds: float, before: Joint | None, joint: Joint, mind: Mind) -> float:
+    def _rest(
+        self, odds: float, before: RelativeTrack | None, joint: RelativeTrack, mind: Mind
+    ) -> float:
         """The odds of rest after another sight of both."""
         s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
-        found = motion(joint, mind.time, s.window_s)
+        found = relative_velocity(joint, mind.time, s.window_s)
         if found is None:
             return odds
-        diagonal = scale(mind.frame_size)
+        diagonal = image_diagonal(mind.frame_size)
         told = found.rest_odds(s.relations.still_speed * diagonal, s.moving * diagonal)
         told *= min(1.0, waited / found.span)
         # Odds beyond the bound would only delay that the opposite is believed.
         return min(max(0.0, odds + told), 2 * s.odds)
 
-    def _joined(self, p: Pending, sight: Sight, mind: Mind) -> bool:
+    def _joined(self, p: CouplingEvidence, sight: PairObservation, mind: Mind) -> bool:
         s = self.settings
         watched = p.joint is not None and p.joint.path_end == mind.time
         if not watched or p.rest_odds < s.odds:
@@ -217,9 +234,9 @@ class Couple:
         return p.converged_at is not None and mind.time - p.converged_at <= s.approach_s
 
 
-def _sights(table: RelationTable, mind: Mind) -> list[Sight]:
+def _observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
     """All pairs of present objects as they are seen now."""
-    ids, now = table.ids, measured(mind)
+    ids, now = table.ids, kinematics(mind)
     hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
     gaps = now.gap.tolist() if now.ids == ids else None
     told = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
@@ -230,7 +247,7 @@ def _sights(table: RelationTable, mind: Mind) -> list[Sight]:
             gap = gaps[i][j] if gaps else now.pair("gap", a, b)
             touching, closing, parting = next(told)
             host = hosts.get((a, b))
-            sights.append(Sight((a, b), touching, closing, parting, gap, host))
+            sights.append(PairObservation((a, b), touching, closing, parting, gap, host))
     return sights
 
 
@@ -242,7 +259,9 @@ def _table(mind: Mind) -> RelationTable:
     return RelationTable(ids, extra=tuple(table))
 
 
-def _coupled(sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mind) -> Cells:
+def _coupled_cells(
+    sights: Sequence[PairObservation], coupled: Mapping[Pair, Coupling], mind: Mind
+) -> Cells:
     """The relation of being coupled."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
     state, since = [0] * len(sights), [mind.time] * len(sights)
@@ -255,7 +274,7 @@ def _coupled(sights: Sequence[Sight], coupled: Mapping[Pair, Coupling], mind: Mi
     return Cells(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
 
 
-def _regions(sight: Sight, mind: Mind) -> tuple[Region, Region] | None:
+def _regions(sight: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
     """The regions in which the two are seen now, twice the same one when they are merged."""
     if sight.host is not None:
         host = mind.objects[sight.host]

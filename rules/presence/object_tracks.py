@@ -13,18 +13,18 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Region
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.regions import Box, box_overlap, grow, shared_pixels, shift
+from visup.rules.geometry.regions import Box, box_intersection, expanded, shared_pixels, shifted
 
 TRACKS = "rules.presence"
-LEAVES_S = 6.0
+EXIT_HORIZON_S = 6.0
 """What is leaving is out of sight after so long, seconds."""
 
-Fix = tuple[float, float, float]
+TimedCentroid = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class ObjectTrack:
     """What is remembered of one object's sightings.
 
     Attributes:
@@ -53,7 +53,7 @@ class Track:
     seen_at: float
     coherent_since: float
     sightings: int = 1
-    fixes: tuple[Fix, ...] = ()
+    fixes: tuple[TimedCentroid, ...] = ()
     whole: Box = (0, 0, 0, 0)
     whole_at: float = 0.0
     drift: tuple[float, float] = (0.0, 0.0)
@@ -70,7 +70,7 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
-class Tracks:
+class PresenceMemory:
     """All tracks.
 
     Attributes:
@@ -79,27 +79,29 @@ class Tracks:
     """
 
     start: float | None = None
-    of: Mapping[int, Track] = field(default_factory=lambda: MappingProxyType({}))
+    of: Mapping[int, ObjectTrack] = field(default_factory=lambda: MappingProxyType({}))
 
 
-NO_TRACKS = Tracks()
+EMPTY_MEMORY = PresenceMemory()
 
 
-def tracks(mind: Mind) -> Tracks:
+def presence_memory(mind: Mind) -> PresenceMemory:
     """The tracks that the mind remembers."""
-    found: Tracks = mind.memory.get(TRACKS, NO_TRACKS)
+    found: PresenceMemory = mind.memory.get(TRACKS, EMPTY_MEMORY)
     return found
 
 
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
     """Pairs of objects that are seen as one region now."""
-    found = [(i, t.merged_with) for i, t in tracks(mind).of.items() if t.merged_with is not None]
+    found = [
+        (i, t.merged_with) for i, t in presence_memory(mind).of.items() if t.merged_with is not None
+    ]
     return tuple(sorted(found)) if found else ()
 
 
 def visible_share(mind: Mind, object_id: int) -> float:
     """Share of an object in sight, 0 to 1; 1 while nothing is known, 0 while it is in a merged region."""
-    of = tracks(mind).of
+    of = presence_memory(mind).of
     track = of.get(object_id)
     if track is None:
         return 1.0
@@ -107,10 +109,10 @@ def visible_share(mind: Mind, object_id: int) -> float:
     return 0.0 if merged else track.visible
 
 
-def first_sight(region: Region, now: float) -> Track:
+def new_track(region: Region, now: float) -> ObjectTrack:
     """The track of an object seen for the first time."""
     fix = (now, *region.centroid)
-    return Track(
+    return ObjectTrack(
         region,
         now,
         now,
@@ -123,7 +125,9 @@ def first_sight(region: Region, now: float) -> Track:
     )
 
 
-def follow(track: Track, region: Region, now: float, crowded: bool, allowed_gap_s: float) -> Track:
+def update_track(
+    track: ObjectTrack, region: Region, now: float, crowded: bool, allowed_gap_s: float
+) -> ObjectTrack:
     """The track after another sighting.
 
     Args:
@@ -139,10 +143,10 @@ def follow(track: Track, region: Region, now: float, crowded: bool, allowed_gap_
     """
     dt = now - track.seen_at
     smooth = dt <= allowed_gap_s and _coherent(track.region, region)
-    reference = _reference(track, region, dt, crowded)
+    reference = _reference_area(track, region, dt, crowded)
     visible = min(1.0, region.area / max(reference, 1.0))
     clear = not crowded and visible > 0.7
-    fixes = _fixes(track.fixes, (now, *region.centroid)) if clear else track.fixes
+    fixes = _recent_centroids(track.fixes, (now, *region.centroid)) if clear else track.fixes
     return replace(
         track,
         region=region,
@@ -152,32 +156,32 @@ def follow(track: Track, region: Region, now: float, crowded: bool, allowed_gap_
         fixes=fixes,
         whole=region.bbox if clear else track.whole,
         whole_at=now if clear else track.whole_at,
-        drift=_drift(track, region, fixes, dt) if clear else track.drift,
+        drift=_velocity(track, region, fixes, dt) if clear else track.drift,
         reference=reference,
         visible=visible,
     )
 
 
-def expected_box(track: Track, now: float) -> Box:
+def predicted_box(track: ObjectTrack, now: float) -> Box:
     """Where the whole object should be now, from where it was and how it drifted; 3 s ahead at most."""
     ahead = min(now - track.whole_at, 3.0)
-    return shift(track.whole, track.drift[0] * ahead, track.drift[1] * ahead)
+    return shifted(track.whole, track.drift[0] * ahead, track.drift[1] * ahead)
 
 
-def expected_outside(track: Track, now: float, frame_size: tuple[int, int]) -> float:
+def predicted_share_outside(track: ObjectTrack, now: float, frame_size: tuple[int, int]) -> float:
     """Share of the object's last box that should have left the image by now, 0 to 1."""
     vx, vy = track.drift
     ahead = now - track.seen_at
-    box = shift(track.region.bbox, vx * ahead, vy * ahead)
-    inside = box_overlap(box, (0, 0, *frame_size))
+    box = shifted(track.region.bbox, vx * ahead, vy * ahead)
+    inside = box_intersection(box, (0, 0, *frame_size))
     return 1.0 - inside / max(1, box[2] * box[3])
 
 
-def heading_out(track: Track, frame_size: tuple[int, int], margin: int = 3) -> bool:
+def heading_out(track: ObjectTrack, frame_size: tuple[int, int], margin: int = 3) -> bool:
     """Whether the object was at an edge of the image, moving over it, and may be out of sight soon.
 
-    What would need longer than `LEAVES_S` at its pace, such as an arm that reaches far into the image and
-    whose drift is noise, is not leaving whatever happens to it.
+    What would need longer than `EXIT_HORIZON_S` at its pace, such as an arm that reaches far into
+    the image and whose drift is noise, is not leaving whatever happens to it.
     """
     x, y, w, h = track.region.bbox
     vx, vy = track.drift
@@ -189,7 +193,9 @@ def heading_out(track: Track, frame_size: tuple[int, int], margin: int = 3) -> b
         (width - x - w, vx, width - x),
         (height - y - h, vy, height - y),
     )
-    return any(gap <= margin and pace > 1.0 and way < LEAVES_S * pace for gap, pace, way in edges)
+    return any(
+        gap <= margin and pace > 1.0 and way < EXIT_HORIZON_S * pace for gap, pace, way in edges
+    )
 
 
 def border_sides(region: Region, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
@@ -215,7 +221,7 @@ def at_border(region: Region, frame_size: tuple[int, int], margin: int = 3) -> b
 
 
 def _coherent(before: Region, after: Region) -> bool:
-    near = box_overlap(grow(before.bbox, 4), after.bbox) > 0
+    near = box_intersection(expanded(before.bbox, 4), after.bbox) > 0
     ratio = after.area / max(before.area, 1.0)
     if before.cut and after.cut and ratio >= 2.5:
         # What comes over the border shows in pieces that grow together: it goes on while it still
@@ -224,7 +230,7 @@ def _coherent(before: Region, after: Region) -> bool:
     return near and 0.4 < ratio < 2.5
 
 
-def _reference(track: Track, region: Region, dt: float, crowded: bool) -> float:
+def _reference_area(track: ObjectTrack, region: Region, dt: float, crowded: bool) -> float:
     if crowded:
         return track.reference
     if region.cut:
@@ -232,14 +238,18 @@ def _reference(track: Track, region: Region, dt: float, crowded: bool) -> float:
     return track.reference + (region.area - track.reference) * (1.0 - exp(-dt / 0.5))
 
 
-def _fixes(fixes: tuple[Fix, ...], fix: Fix) -> tuple[Fix, ...]:
+def _recent_centroids(
+    fixes: tuple[TimedCentroid, ...], fix: TimedCentroid
+) -> tuple[TimedCentroid, ...]:
     if fixes and fix[0] - fixes[-1][0] < 1.0 / 16.0:
         return fixes
     since = fix[0] - 1.0
     return (*[f for f in fixes if f[0] > since], fix)[-16:]
 
 
-def _drift(track: Track, region: Region, fixes: tuple[Fix, ...], dt: float) -> tuple[float, float]:
+def _velocity(
+    track: ObjectTrack, region: Region, fixes: tuple[TimedCentroid, ...], dt: float
+) -> tuple[float, float]:
     """How it moves: by image motion where that is known, else by how its centroid moved.
 
     A centroid moves as well when something unseen begins to hide the body.

@@ -19,19 +19,19 @@ import numpy as np
 from visup.agent import Frame, Mind, ObjectBelief, Presence
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
-from visup.evaluation.missions.mission_files import mission_folders
-from visup.evaluation.missions.mission_poses import true_spin
-from visup.evaluation.missions.mission_scores import UNSCORED_START_S, Truths, truths_of
-from visup.evaluation.missions.missions import (
+from visup.evaluation.missions.files import mission_folders
+from visup.evaluation.missions.pose_errors import true_spin
+from visup.evaluation.missions.runner import (
     COVERING_IOU,
     SMALLEST_SCORED_PX,
-    Record,
+    MissionRecorder,
     mission_total,
-    told_scores,
+    report_scores,
 )
+from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth, parse_truth
 from visup.evaluation.reasoning.calibration import Calibration
+from visup.evaluation.simulation.percepts import PerceptNoise, behaviours_of, frames_of
 from visup.evaluation.simulation.truth_masks import Mission, TrueMask, load_mission
-from visup.evaluation.simulation.truth_percepts import PerceptNoise, behaviours_of, frames_of
 from visup.rules.reasoners import default_reasoners
 from visup.tasks import load_task
 from visup.tasks.supervision.supervise import task_reasoner
@@ -41,7 +41,7 @@ SPIN_SPAN_S = 5.0
 
 
 @dataclass(slots=True)
-class Watch:
+class BeliefScorer:
     """Takes down what is believed of one mission, frame by frame.
 
     Attributes:
@@ -58,9 +58,9 @@ class Watch:
     """
 
     mission: Mission
-    truths: Truths
+    truths: MissionTruth
     who: Mapping[int, tuple[str, ...]]
-    said: Record = field(default_factory=Record)
+    said: MissionRecorder = field(default_factory=MissionRecorder)
     right: int = 0
     scored: int = 0
     calibration: Calibration = field(default_factory=Calibration)
@@ -152,23 +152,23 @@ def _iou(belief: ObjectBelief, parts: Sequence[TrueMask]) -> float:
     return both / max(1.0, belief.region.area + whole - both)
 
 
-def watch_mission(mission: Mission, noise: PerceptNoise, *, every: int = 1) -> Watch:
+def watch_mission(mission: Mission, noise: PerceptNoise, *, every: int = 1) -> BeliefScorer:
     """Supervise one mission on percepts made from its truth."""
     behaviours, who = behaviours_of(mission, noise)
-    watch = Watch(mission, truths_of(mission.truth, mission.fps), who)
+    watch = BeliefScorer(mission, parse_truth(mission.truth, mission.fps), who)
     rules = default_reasoners()
-    task = task_reasoner([load_task(str(mission.told["task"]))])
+    task = task_reasoner([load_task(str(mission.description["task"]))])
     agent = Agent(
         behaviours=behaviours,
         reasoners=Reasoners(rules.update, rules.cogitate, (task,)),
-        actors={a: (m,) for a, m in mission.told["actors"].items()},
+        actors={a: (m,) for a, m in mission.description["actors"].items()},
         observers=(watch,),
     )
     agent.run(frames_of(mission, every=every))
     return watch
 
 
-def run_scores(watch: Watch) -> dict[str, Any]:
+def run_scores(watch: BeliefScorer) -> dict[str, Any]:
     """Figures of one run."""
     names = watch.names()
     told = [(kind, ids) for kind, ids, _ in watch.said.events]
@@ -187,11 +187,11 @@ def run_scores(watch: Watch) -> dict[str, Any]:
         "false_coupled": false("coupled"),
         "false_exit": false("exit"),
         "spin_errors": _spin_errors(watch),
-        **told_scores(watch.truths, watch.said, names),
+        **report_scores(watch.truths, watch.said, names),
     }
 
 
-def _spin_errors(watch: Watch) -> list[float]:
+def _spin_errors(watch: BeliefScorer) -> list[float]:
     """Relative error of the satellite's spin at the end of a mission, where it is believed.
 
     What it is compared with is how the satellite truly turns then: what was caught turns as it is carried.
@@ -206,7 +206,7 @@ def _spin_errors(watch: Watch) -> list[float]:
     return [abs(told - true) / true] if true > 0 else []
 
 
-def _index(watch: Watch, time: float) -> int:
+def _index(watch: BeliefScorer, time: float) -> int:
     return round(time * watch.mission.fps)
 
 

@@ -30,7 +30,7 @@ FAULTY_S = 1.2
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
+class CameraFaultTrial:
     """One fault in one clip.
 
     Attributes:
@@ -49,7 +49,7 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class TrialResult:
     """What was reported in one trial.
 
     Attributes:
@@ -94,7 +94,7 @@ def evaluate_health(
         SettingsError: There is no video below the folder.
     """
     sources = find_sources(folder)
-    told: list[Told] = []
+    told: list[TrialResult] = []
     missed: list[dict[str, Any]] = []
     for number, trial in enumerate(plan(sources, faults, seed)):
         if progress is not None:
@@ -136,14 +136,14 @@ def _opens(path: Path) -> bool:
         return False
 
 
-def plan(sources: Sequence[Path], faults: int, seed: int) -> Iterator[Trial]:
+def plan(sources: Sequence[Path], faults: int, seed: int) -> Iterator[CameraFaultTrial]:
     """The trials of a campaign: kinds in turn, videos in a shuffled order, the rest drawn."""
     rng = np.random.default_rng(seed)
     kinds = list(EXPECTED)
     order: list[int] = []
     for number in range(faults):
         order = order or rng.permutation(len(sources)).tolist()
-        yield Trial(
+        yield CameraFaultTrial(
             source=sources[order.pop()],
             kind=kinds[number % len(kinds)],
             skip=float(rng.random()),
@@ -152,7 +152,7 @@ def plan(sources: Sequence[Path], faults: int, seed: int) -> Iterator[Trial]:
         )
 
 
-def run_trial(trial: Trial) -> Told:
+def run_trial(trial: CameraFaultTrial) -> TrialResult:
     """Inject one fault and tell how it was reported."""
     frames = _clip(trial)
     # A short video leaves less time before the fault: what counts is the second after it.
@@ -163,7 +163,7 @@ def run_trial(trial: Trial) -> Told:
     seen = [(f.time, s) for f, s in statuses(inject(frames, start, trial.kind, trial.seed))]
     bad = [(t, s) for t, s in seen if s is not HealthStatus.OK]
     within = [(t, s) for t, s in bad if since <= t <= since + WITHIN_S + 1e-6]
-    return Told(
+    return TrialResult(
         kind=trial.kind,
         found=bool(within),
         named=any(s is EXPECTED[trial.kind] for _, s in within),
@@ -172,7 +172,7 @@ def run_trial(trial: Trial) -> Told:
     )
 
 
-def _clip(trial: Trial) -> list[Frame]:
+def _clip(trial: CameraFaultTrial) -> list[Frame]:
     """The frames of a trial; all of a video that is not longer."""
     with open_source(str(trial.source)) as source:
         length = round((trial.sound_s + FAULTY_S) * source.fps) + 1
@@ -220,7 +220,7 @@ def _unharmed(
     }
 
 
-def _scores(told: Sequence[Told]) -> dict[str, Any]:
+def _scores(told: Sequence[TrialResult]) -> dict[str, Any]:
     if not told:
         return {}
     latencies = [t.latency_s for t in told if t.latency_s is not None]
@@ -235,5 +235,5 @@ def _scores(told: Sequence[Told]) -> dict[str, Any]:
     return out
 
 
-def _plain(told: Told) -> Mapping[str, Any]:
+def _plain(told: TrialResult) -> Mapping[str, Any]:
     return {"found": told.found, "named": told.named, "early": told.early}

@@ -20,19 +20,19 @@ import numpy as np
 from visup.agent import Frame, Mind, Pose, Region, Severity, Status, TaskBelief, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.evaluation.missions.mission_files import mission_folders, read_json
-from visup.evaluation.missions.mission_poses import Poses, spin_error, view_error
-from visup.evaluation.missions.mission_scores import (
+from visup.evaluation.missions.files import mission_folders, read_json
+from visup.evaluation.missions.pose_errors import Poses, spin_error, view_error
+from visup.evaluation.missions.scores import (
     UNSCORED_START_S,
+    MissionTruth,
+    ReportedEvent,
     StageSample,
-    Told,
-    Truths,
     failing_latency,
     matched_events,
+    parse_truth,
     precision_recall_f1,
     scored_alerts,
     stage_share,
-    truths_of,
 )
 from visup.runs.wiring import WatchSettings, build_agent, final_verdict, open_video
 
@@ -41,7 +41,7 @@ COVERING_IOU = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class SeenObject:
+class ObservedObject:
     """An object as it was believed at one frame."""
 
     id: int
@@ -51,10 +51,10 @@ class SeenObject:
 
 
 @dataclass(slots=True)
-class Record:
+class MissionRecorder:
     """What the supervisor said of one mission, frame by frame."""
 
-    seen: dict[int, tuple[SeenObject, ...]] = field(default_factory=dict)
+    seen: dict[int, tuple[ObservedObject, ...]] = field(default_factory=dict)
     events: list[tuple[str, tuple[int, ...], float]] = field(default_factory=list)
     alerts: list[tuple[str, tuple[int, ...], float, bool]] = field(default_factory=list)
     stages: list[StageSample] = field(default_factory=list)
@@ -64,7 +64,7 @@ class Record:
     def __call__(self, step: Step, frame: Frame) -> None:
         """Take down one step; the agent calls it."""
         self.seen[step.frame_index] = tuple(
-            SeenObject(b.id, b.name, b.region, b.pose)
+            ObservedObject(b.id, b.name, b.region, b.pose)
             for b in step.mind.objects.values()
             if b.last_seen == step.time
         )
@@ -167,12 +167,12 @@ def _database(
 def _evaluate(mission: Path, database: Path, limit: int | None) -> dict[str, Any]:
     record = _supervise(mission, database, limit)
     truth = read_json(mission / "truth.json")
-    truths = truths_of(truth, float(truth["fps"]))
+    truths = parse_truth(truth, float(truth["fps"]))
     overlaps = _overlaps(mission, truth["labels"], record)
     return _scores(truth, truths, record, overlaps)
 
 
-def _supervise(mission: Path, database: Path, limit: int | None) -> Record:
+def _supervise(mission: Path, database: Path, limit: int | None) -> MissionRecorder:
     told = read_json(mission / "mission.json")
     settings = WatchSettings(
         source=str(mission / "video.mp4"),
@@ -181,7 +181,7 @@ def _supervise(mission: Path, database: Path, limit: int | None) -> Record:
         actors={a: (m,) for a, m in told["actors"].items()},
         fov_vertical_deg=told.get("fov_vertical_deg"),
     )
-    record = Record()
+    record = MissionRecorder()
     agent = build_agent(settings, observers=(record,))
     begin = time.perf_counter()
     with open_video(settings) as source:
@@ -190,11 +190,11 @@ def _supervise(mission: Path, database: Path, limit: int | None) -> Record:
     return record
 
 
-Overlaps = Mapping[int, Mapping[str, tuple[int, dict[int, float]]]]
+ObjectOverlaps = Mapping[int, Mapping[str, tuple[int, dict[int, float]]]]
 """Frame -> true object -> (visible pixels, believed object's id -> IoU with it)."""
 
 
-def _overlaps(mission: Path, labels: Mapping[str, int], record: Record) -> Overlaps:
+def _overlaps(mission: Path, labels: Mapping[str, int], record: MissionRecorder) -> ObjectOverlaps:
     return {
         index: _overlap(mission / "masks" / f"{index:05d}.png", labels, seen)
         for index, seen in record.seen.items()
@@ -202,7 +202,7 @@ def _overlaps(mission: Path, labels: Mapping[str, int], record: Record) -> Overl
 
 
 def _overlap(
-    path: Path, labels: Mapping[str, int], seen: Sequence[SeenObject]
+    path: Path, labels: Mapping[str, int], seen: Sequence[ObservedObject]
 ) -> dict[str, tuple[int, dict[int, float]]]:
     mask = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if mask is None:
@@ -210,7 +210,7 @@ def _overlap(
     return {name: _ious(mask == label, seen) for name, label in labels.items()}
 
 
-def _ious(true: np.ndarray, seen: Sequence[SeenObject]) -> tuple[int, dict[int, float]]:
+def _ious(true: np.ndarray, seen: Sequence[ObservedObject]) -> tuple[int, dict[int, float]]:
     visible = int(true.sum())
     ious = {}
     for it in seen:
@@ -221,7 +221,7 @@ def _ious(true: np.ndarray, seen: Sequence[SeenObject]) -> tuple[int, dict[int, 
     return visible, ious
 
 
-def _true_names(overlaps: Overlaps) -> dict[int, str]:
+def _true_names(overlaps: ObjectOverlaps) -> dict[int, str]:
     """Believed object's id -> the true object that it overlaps most over the whole mission."""
     weight: Counter[tuple[int, str]] = Counter()
     for objects in overlaps.values():
@@ -235,7 +235,9 @@ def _true_names(overlaps: Overlaps) -> dict[int, str]:
     return {number: name for number, (_, name) in best.items()}
 
 
-def told_scores(truths: Truths, record: Record, names: Mapping[int, str]) -> dict[str, Any]:
+def report_scores(
+    truths: MissionTruth, record: MissionRecorder, names: Mapping[int, str]
+) -> dict[str, Any]:
     """Figures of all that was said: events, stages, alerts, verdict.
 
     Args:
@@ -250,8 +252,10 @@ def told_scores(truths: Truths, record: Record, names: Mapping[int, str]) -> dic
     def true_objects(ids: Sequence[int]) -> frozenset[str]:
         return frozenset(names.get(i, "?") for i in ids)
 
-    events = [Told(kind, true_objects(ids), t) for kind, ids, t in record.events]
-    alerts = [Told(kind, true_objects(ids), t, grave) for kind, ids, t, grave in record.alerts]
+    events = [ReportedEvent(kind, true_objects(ids), t) for kind, ids, t in record.events]
+    alerts = [
+        ReportedEvent(kind, true_objects(ids), t, grave) for kind, ids, t, grave in record.alerts
+    ]
     right, excess, missed = matched_events(events, truths.events)
     precision, recall, f1 = precision_recall_f1(right, excess, missed)
     found, false = scored_alerts(alerts, truths.alerts)
@@ -276,14 +280,17 @@ def told_scores(truths: Truths, record: Record, names: Mapping[int, str]) -> dic
 
 
 def _scores(
-    truth: Mapping[str, Any], truths: Truths, record: Record, overlaps: Overlaps
+    truth: Mapping[str, Any],
+    truths: MissionTruth,
+    record: MissionRecorder,
+    overlaps: ObjectOverlaps,
 ) -> dict[str, Any]:
     identified, scored = _identity(truths, record, overlaps)
     poses = _poses(truths, record, overlaps)
     scores: dict[str, Any] = {
         "identity": identified / scored if scored else None,
         "identity_counts": [identified, scored],
-        **told_scores(truths, record, _true_names(overlaps)),
+        **report_scores(truths, record, _true_names(overlaps)),
         "view_deg": view_error(truth, poses),
         "spin_error": spin_error(truth, poses),
         "fps": len(record.seen) / record.seconds if record.seconds else None,
@@ -291,7 +298,9 @@ def _scores(
     return {k: v for k, v in scores.items() if v is not None}
 
 
-def _identity(truths: Truths, record: Record, overlaps: Overlaps) -> tuple[int, int]:
+def _identity(
+    truths: MissionTruth, record: MissionRecorder, overlaps: ObjectOverlaps
+) -> tuple[int, int]:
     """Object-frames with the right first candidate, and all that are scored."""
     entered = {
         name: min(
@@ -314,7 +323,7 @@ def _identity(truths: Truths, record: Record, overlaps: Overlaps) -> tuple[int, 
     return right, scored
 
 
-def _poses(truths: Truths, record: Record, overlaps: Overlaps) -> Poses:
+def _poses(truths: MissionTruth, record: MissionRecorder, overlaps: ObjectOverlaps) -> Poses:
     """Poses told of true objects that are seen and rightly named, by frame and object."""
     found: dict[tuple[int, str], Pose] = {}
     for index, objects in overlaps.items():

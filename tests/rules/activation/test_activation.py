@@ -14,7 +14,7 @@ from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.step import Step
-from visup.rules.activation.waking import Wake, wakeful, waking_rules
+from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
@@ -57,7 +57,7 @@ class Lens:
 
 def run(*lenses: Lens, wakeful: frozenset[str] = frozenset()) -> list[Step]:
     rules = default_reasoners()
-    wake = Wake(waking_rules([b.contract for b in lenses]))
+    wake = ActivationReasoner(activation_rules([b.contract for b in lenses]))
     reasoners = Reasoners(rules.update, rules.cogitate, (wake,))
     limits = Limits(hang_s=None, wakeful=wakeful)
     return list(Agent([Eye(), *lenses], reasoners, limits=limits).steps(s.frame for s in CLIP))
@@ -148,7 +148,7 @@ def test_two_cannot_relieve_each_other() -> None:
 )
 def test_what_is_no_condition_about_an_object_is_refused_with_its_place(condition: str) -> None:
     with pytest.raises(BehaviourError) as told:
-        waking_rules([Contract("lens", gives=("detail",), awake=condition)])
+        activation_rules([Contract("lens", gives=("detail",), awake=condition)])
     assert "contract of 'lens'" in str(told.value)
     with pytest.raises(BehaviourError):
         build_agent(WatchSettings("clip"), also=[Lens(awake=condition)])
@@ -158,10 +158,11 @@ def test_what_safety_rules_read_is_given_by_someone_who_never_sleeps() -> None:
     rules = shipped_rules()
     sleeper = Contract("sleeper", gives=("region",), awake=NEAR)
     eye = Contract("eye", gives=("region",))
-    assert wakeful([sleeper], rules) == {"sleeper"}
-    assert wakeful([sleeper, eye], rules) == frozenset()
+    assert always_active([sleeper], rules) == {"sleeper"}
+    assert always_active([sleeper, eye], rules) == frozenset()
     assert (
-        wakeful([sleeper], parse_rules('rule r(a): info when moving(a) say "{a}"')) == frozenset()
+        always_active([sleeper], parse_rules('rule r(a): info when moving(a) say "{a}"'))
+        == frozenset()
     )
     agent = build_agent(WatchSettings("clip"), also=[Lens(awake=NEAR)])
     assert agent.limits.wakeful == frozenset()
@@ -179,7 +180,7 @@ def test_no_kind_that_safety_rules_read_sleeps_altogether(
         for k, (kinds, sleeps) in enumerate(drawn)
     ]
     rules = shipped_rules()
-    up = {c.name for c in contracts if not c.awake} | wakeful(contracts, rules)
+    up = {c.name for c in contracts if not c.awake} | always_active(contracts, rules)
     given_by = {kind for c in contracts if c.name in up for kind in c.gives}
     for kind in ("region", "health"):
         if any(kind in c.gives for c in contracts):
@@ -190,7 +191,9 @@ def test_going_back_and_on_wakes_alike() -> None:
     """What these rules remember is in the mind, like everything."""
     rules = default_reasoners()
     lens = Lens(awake=f"{NEAR} for 0.5 s")
-    reasoners = Reasoners(rules.update, rules.cogitate, (Wake(waking_rules([lens.contract])),))
+    reasoners = Reasoners(
+        rules.update, rules.cogitate, (ActivationReasoner(activation_rules([lens.contract])),)
+    )
     agent = Agent([Eye(), lens], reasoners, limits=Limits(hang_s=None))
     seen = [agent.step(s.frame).observation for s in CLIP]
     again = Agent([], reasoners)

@@ -88,7 +88,7 @@ def has_ghost(regions: Iterable[Mask], objects: Sequence[Mask]) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Overlaps:
+class MaskOverlaps:
     """How regions and objects overlap in one frame, in pixels; regions are taken as disjoint.
 
     Attributes:
@@ -130,7 +130,7 @@ def overlaps_of(
     labels: NDArray[np.uint8],
     names: Mapping[str, int],
     regions: Mapping[int, Mask],
-) -> Overlaps:
+) -> MaskOverlaps:
     """Count the overlaps of one frame.
 
     Args:
@@ -148,7 +148,7 @@ def overlaps_of(
     for i, mask in regions.items():
         counts = np.bincount(labels[mask], minlength=256)
         common |= {(i, n): int(counts[v]) for n, v in names.items()}
-    return Overlaps(index, time, objects, {i: int(m.sum()) for i, m in regions.items()}, common)
+    return MaskOverlaps(index, time, objects, {i: int(m.sum()) for i, m in regions.items()}, common)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ class ObjectScore:
 
 
 def object_scores(
-    frames: Sequence[Overlaps], coupled: Sequence[tuple[int, frozenset[str]]] = ()
+    frames: Sequence[MaskOverlaps], coupled: Sequence[tuple[int, frozenset[str]]] = ()
 ) -> dict[str, ObjectScore]:
     """J_object and id switches of each object of a mission.
 
@@ -192,11 +192,13 @@ def object_scores(
 
 
 def _periods(
-    frames: Sequence[Overlaps], names: Sequence[str], coupled: Sequence[tuple[int, frozenset[str]]]
-) -> tuple[dict[str, list[Overlaps]], dict[str, dict[frozenset[str], list[Overlaps]]]]:
+    frames: Sequence[MaskOverlaps],
+    names: Sequence[str],
+    coupled: Sequence[tuple[int, frozenset[str]]],
+) -> tuple[dict[str, list[MaskOverlaps]], dict[str, dict[frozenset[str], list[MaskOverlaps]]]]:
     """Scored frames of each object: those in which it is by itself, those in which it is coupled."""
-    apart: dict[str, list[Overlaps]] = {n: [] for n in names}
-    joined: dict[str, dict[frozenset[str], list[Overlaps]]] = {n: {} for n in names}
+    apart: dict[str, list[MaskOverlaps]] = {n: [] for n in names}
+    joined: dict[str, dict[frozenset[str], list[MaskOverlaps]]] = {n: {} for n in names}
     entered: dict[str, float] = {}
     for frame in frames:
         for name in names:
@@ -213,7 +215,7 @@ def _periods(
 
 
 def _together(
-    frames: Sequence[Overlaps], group: frozenset[str], own: set[int | None]
+    frames: Sequence[MaskOverlaps], group: frozenset[str], own: set[int | None]
 ) -> list[float]:
     ids = [i for i in own if i is not None]
     theirs = [f.iou(ids, group) for f in frames]

@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
 from visup.agent.model.errors import SettingsError, SourceError
-from visup.evaluation.motion.mot import Box, mot_scores, read_truth
-from visup.evaluation.motion.motion_scores import (
+from visup.evaluation.motion.mask_scores import (
     UNSCORED,
-    Overlaps,
+    MaskOverlaps,
     boundary_measure,
     has_ghost,
     object_scores,
     overlaps_of,
     region_similarity,
 )
+from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.video import open_source
 
@@ -36,7 +36,7 @@ KEYS = ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "rat
 
 
 @dataclass(frozen=True, slots=True)
-class Clip:
+class LabelledSequence:
     """One sequence to score.
 
     Attributes:
@@ -55,13 +55,13 @@ class Clip:
 
 
 @dataclass(slots=True)
-class Tally:
+class SequenceMeasurements:
     """What is gathered over the frames of one sequence."""
 
     j: list[float] = field(default_factory=list)
     f: list[float] = field(default_factory=list)
     ghosts: list[bool] = field(default_factory=list)
-    overlaps: list[Overlaps] = field(default_factory=list)
+    overlaps: list[MaskOverlaps] = field(default_factory=list)
     boxes: dict[int, dict[int, Box]] = field(default_factory=dict)
     ms: list[float] = field(default_factory=list)
     dis_ms: list[float] = field(default_factory=list)
@@ -94,14 +94,14 @@ def evaluate_motion(
         ExtraMissingError: MOT folders are to be scored and `motmetrics` is not installed.
     """
     items: dict[str, dict[str, Any]] = {}
-    for sequence in find_clips(folder):
+    for sequence in find_sequences(folder):
         if progress is not None:
             progress(sequence.name)
         items[sequence.name] = _scores(sequence, _run(sequence, every, limit))
     return {"total": _total(list(items.values())), "items": items}
 
 
-def find_clips(folder: Path) -> list[Clip]:
+def find_sequences(folder: Path) -> list[LabelledSequence]:
     """Everything below a folder that can be scored, by name.
 
     Raises:
@@ -115,12 +115,12 @@ def find_clips(folder: Path) -> list[Clip]:
         name = place.name if place == folder else str(place.relative_to(folder))
         masks = tuple(sorted((place / "masks").glob("*.png")))
         if (place / "frames").is_dir() and masks:
-            out.append(Clip(name, place / "frames", masks))
+            out.append(LabelledSequence(name, place / "frames", masks))
         elif (place / "video.mp4").is_file() and masks and (place / "truth.json").is_file():
             truth = place / "truth.json"
-            out.append(Clip(name, place / "video.mp4", masks, truth))
+            out.append(LabelledSequence(name, place / "video.mp4", masks, truth))
         elif (place / "img1").is_dir() and (place / "gt" / "gt.txt").is_file():
-            out.append(Clip(name, place, boxes=place / "gt" / "gt.txt"))
+            out.append(LabelledSequence(name, place, boxes=place / "gt" / "gt.txt"))
     if not out:
         raise SettingsError(
             "nothing to score was found",
@@ -130,9 +130,9 @@ def find_clips(folder: Path) -> list[Clip]:
     return out
 
 
-def _run(sequence: Clip, every: int, limit: int | None) -> Tally:
+def _run(sequence: LabelledSequence, every: int, limit: int | None) -> SequenceMeasurements:
     """Segment one sequence and gather what its scores need."""
-    tally = Tally()
+    tally = SequenceMeasurements()
     names = _truth(sequence).get("labels", {})
     segmenter = MotionSegmenter()
     dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
@@ -158,7 +158,9 @@ def _run(sequence: Clip, every: int, limit: int | None) -> Tally:
     return tally
 
 
-def _frames(sequence: Clip, every: int, limit: int | None) -> Iterator[tuple[Frame, bool]]:
+def _frames(
+    sequence: LabelledSequence, every: int, limit: int | None
+) -> Iterator[tuple[Frame, bool]]:
     """Frames, each with whether it is the last."""
     with open_source(str(sequence.source), every=every) as source:
         waiting: Frame | None = None
@@ -193,7 +195,7 @@ def _box(region: Region) -> Box:
 
 
 def _tally_masks(
-    tally: Tally,
+    tally: SequenceMeasurements,
     labels: NDArray[np.uint8],
     masks: Mapping[int, NDArray[np.bool_]],
     *,
@@ -216,11 +218,11 @@ def _tally_masks(
     tally.ghosts.append(has_ghost(masks.values(), [labels == v for v in values]))
 
 
-def _truth(sequence: Clip) -> dict[str, Any]:
+def _truth(sequence: LabelledSequence) -> dict[str, Any]:
     return dict(json.loads(sequence.truth.read_text())) if sequence.truth else {}
 
 
-def _scores(sequence: Clip, tally: Tally) -> dict[str, Any]:
+def _scores(sequence: LabelledSequence, tally: SequenceMeasurements) -> dict[str, Any]:
     """The figures of one sequence."""
     out: dict[str, Any] = {}
     if tally.j:

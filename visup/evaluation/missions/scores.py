@@ -1,8 +1,8 @@
 """Figures of a supervised mission against its truth, as pure functions.
 
 The definitions are those of the mission data's README: identity, events, stages, latency, alerts, verdict,
-view. What was reported comes in as plain records (`Told`, `StageSample`), what is true as `Truths`, and
-the two meet only here.
+view. What was reported comes in as plain records (`ReportedEvent`, `StageSample`), what is true as
+`MissionTruth`, and the two meet only here.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class TrueAlert:
 
 
 @dataclass(frozen=True, slots=True)
-class Truths:
+class MissionTruth:
     """What truly happened in a mission."""
 
     events: tuple[TrueEvent, ...]
@@ -58,7 +58,7 @@ class Truths:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ReportedEvent:
     """An event or alert that was reported: kind, true names of its objects, time, gravity.
 
     An object that covers nothing true is named '?'.
@@ -79,7 +79,7 @@ class StageSample:
     outcome: str | None
 
 
-def truths_of(truth: Mapping[str, object], fps: float) -> Truths:
+def parse_truth(truth: Mapping[str, object], fps: float) -> MissionTruth:
     """Truth of a mission from its `truth.json`, as read.
 
     Args:
@@ -101,7 +101,7 @@ def truths_of(truth: Mapping[str, object], fps: float) -> Truths:
         TrueAlert(str(a["kind"]), float(str(a["from_s"])), _objects(a)) for a in given["alerts"]
     )
     meshes: Mapping[str, str] = truth.get("meshes", {})  # type: ignore[assignment]
-    return Truths(events, stages, alerts, str(truth["verdict"]), meshes)
+    return MissionTruth(events, stages, alerts, str(truth["verdict"]), meshes)
 
 
 def _objects(entry: Mapping[str, object]) -> frozenset[str]:
@@ -110,7 +110,9 @@ def _objects(entry: Mapping[str, object]) -> frozenset[str]:
     return frozenset({str(entry["object"])}) if "object" in entry else frozenset()
 
 
-def matched_events(told: Sequence[Told], true: Sequence[TrueEvent]) -> tuple[int, int, int]:
+def matched_events(
+    told: Sequence[ReportedEvent], true: Sequence[TrueEvent]
+) -> tuple[int, int, int]:
     """How many events were right, told in excess, missed.
 
     An event is right when its kind and objects agree and it is within a second; each true event counts
@@ -151,7 +153,7 @@ def precision_recall_f1(right: int, excess: int, missed: int) -> tuple[float, fl
     return precision, recall, 2 * precision * recall / both if both else 0.0
 
 
-def true_outcome(truths: Truths, time: float) -> tuple[str, str] | None:
+def true_outcome(truths: MissionTruth, time: float) -> tuple[str, str] | None:
     """The stage that is truly under way and its outcome so far; None outside the listed stages."""
     for stage in truths.stages:
         if stage.from_s <= time < stage.to_s:
@@ -169,14 +171,14 @@ def _turns_bad(stage: TrueStage, alerts: Iterable[TrueAlert]) -> float | None:
     return min(within, default=stage.from_s)
 
 
-def changes(truths: Truths) -> list[float]:
+def changes(truths: MissionTruth) -> list[float]:
     """Times at which the true (stage, outcome so far) changes, where scoring pauses."""
     times = {t for s in truths.stages for t in (s.from_s, s.to_s)}
     turned = (_turns_bad(s, truths.alerts) for s in truths.stages)
     return sorted(times | {t for t in turned if t is not None})
 
 
-def stage_share(samples: Sequence[StageSample], truths: Truths) -> float | None:
+def stage_share(samples: Sequence[StageSample], truths: MissionTruth) -> float | None:
     """Share of scored time in which the reported (stage, outcome so far) is the true one.
 
     Returns:
@@ -193,7 +195,7 @@ def stage_share(samples: Sequence[StageSample], truths: Truths) -> float | None:
     return right / scored if scored else None
 
 
-def failing_latency(samples: Sequence[StageSample], truths: Truths) -> float | None:
+def failing_latency(samples: Sequence[StageSample], truths: MissionTruth) -> float | None:
     """Seconds from the true turn of a stage to the first report of it as failing, the worst of them.
 
     Returns:
@@ -209,7 +211,7 @@ def failing_latency(samples: Sequence[StageSample], truths: Truths) -> float | N
     return max(late, default=None)
 
 
-def scored_alerts(told: Sequence[Told], true: Sequence[TrueAlert]) -> tuple[int, int]:
+def scored_alerts(told: Sequence[ReportedEvent], true: Sequence[TrueAlert]) -> tuple[int, int]:
     """How many expected alerts were found, and how many grave ones were told in excess.
 
     Returns:

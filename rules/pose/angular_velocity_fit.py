@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.rules.pose.rotations import Floats, right_jacobian, rotation_vectors, turned
+from visup.rules.pose.rotations import Floats, right_jacobian, rotation_matrices, rotation_vectors
 
 Numbers = NDArray[np.intp]
 
@@ -54,7 +54,7 @@ class FitSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Turns:
+class OrientationSeries:
     """Orientations over time.
 
     Attributes:
@@ -65,13 +65,13 @@ class Turns:
     times: Floats
     orientations: Floats
 
-    def since(self, time: float) -> Turns:
+    def since(self, time: float) -> OrientationSeries:
         """Those from a time on."""
         first = int(np.searchsorted(self.times, time))
-        return Turns(self.times[first:], self.orientations[first:])
+        return OrientationSeries(self.times[first:], self.orientations[first:])
 
 
-def first_rate(turns: Turns, settings: FitSettings) -> Floats:
+def first_rate(turns: OrientationSeries, settings: FitSettings) -> Floats:
     """A first guess: the median over pairs some time apart, (3,) radians per second."""
     t, r = turns.times, turns.orientations
     found = []
@@ -86,7 +86,7 @@ def first_rate(turns: Turns, settings: FitSettings) -> Floats:
     return np.asarray(found[-1]) if found else np.zeros(3)
 
 
-def long_pieces(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
+def long_pieces(turns: OrientationSeries, rate: Floats, settings: FitSettings) -> Numbers:
     """Number of the piece to which each orientation belongs, or -1 when it is too short.
 
     An orientation goes on from the latest of the few before it from which it is no jump, so that
@@ -101,11 +101,11 @@ def long_pieces(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
     return np.asarray(number[piece], np.intp)
 
 
-def _linked(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
+def _linked(turns: OrientationSeries, rate: Floats, settings: FitSettings) -> Numbers:
     t, r = turns.times, turns.orientations
     links = []
     for back in range(1, min(settings.look_back, len(t) - 1) + 1):
-        ahead = turned(rate * (t[back:] - t[:-back])[:, None]) @ r[:-back]
+        ahead = rotation_matrices(rate * (t[back:] - t[:-back])[:, None]) @ r[:-back]
         turn = rotation_vectors(r[back:] @ np.swapaxes(ahead, 1, 2))
         near = (turn**2).sum(axis=1) < np.radians(settings.jump_deg) ** 2
         links.append([False] * back + near.tolist())
@@ -118,17 +118,19 @@ def _linked(turns: Turns, rate: Floats, settings: FitSettings) -> Numbers:
     return np.array(piece, np.intp)
 
 
-def thinned(turns: Turns, pieces: Numbers, settings: FitSettings) -> tuple[Turns, Numbers]:
+def thinned(
+    turns: OrientationSeries, pieces: Numbers, settings: FitSettings
+) -> tuple[OrientationSeries, Numbers]:
     """No more than `most` of the orientations that belong to a piece, evenly spread."""
     used = np.flatnonzero(pieces >= 0)
     if len(used) > settings.most:
         used = used[np.linspace(0, len(used) - 1, settings.most).round().astype(np.intp)]
     # A short piece may have lost all its orientations: the others are numbered anew.
     renumbered = np.unique(pieces[used], return_inverse=True)[1].astype(np.intp)
-    return Turns(turns.times[used], turns.orientations[used]), renumbered
+    return OrientationSeries(turns.times[used], turns.orientations[used]), renumbered
 
 
-class Fit:
+class SpinFit:
     """The least squares of one window.
 
     Args:
@@ -141,7 +143,7 @@ class Fit:
 
     def __init__(
         self,
-        turns: Turns,
+        turns: OrientationSeries,
         pieces: Numbers,
         rates: Floats,
         change: float | None,
@@ -155,7 +157,7 @@ class Fit:
         self._scale = (1 / spread)[:, None]
         self._anchor()
         near = [self._nearest(k) for k in range(self._count)]
-        back = turned(-self.rates[self._phase[near]] * self._lever[near][:, None])
+        back = rotation_matrices(-self.rates[self._phase[near]] * self._lever[near][:, None])
         self._middle = back @ turns.orientations[near]
         self.cost = np.inf
 
@@ -183,7 +185,7 @@ class Fit:
             phases = len(self.rates)
             self.rates = self.rates + change[: 3 * phases].reshape(-1, 3)
             ends = change[3 * phases : 3 * (phases + self._count)].reshape(-1, 3)
-            self._middle = turned(ends) @ self._middle
+            self._middle = rotation_matrices(ends) @ self._middle
             if self.change is not None:
                 self._move_change(float(change[-1]))
             if np.linalg.norm(self.rates, axis=1).max() > np.radians(self._s.fastest_deg_s):
@@ -216,7 +218,7 @@ class Fit:
         old, new = self.change, min(max(self.change + step, t[0] + 0.5), t[-1] - 0.5)
         # Pieces that hold the change are anchored at it: their orientation there moves along.
         held = self._held
-        half = turned(self.rates.mean(axis=0) * (new - old))
+        half = rotation_matrices(self.rates.mean(axis=0) * (new - old))
         self.change = new
         self._anchor()
         same = held & self._held
@@ -243,7 +245,7 @@ class Fit:
         """Residuals (N, 3) in standard deviations, their derivatives (N, 3, P), squares (N,)."""
         rate = self.rates[self._phase]
         turn = rate * self._lever[:, None]
-        there = turned(turn)
+        there = rotation_matrices(turn)
         before = np.swapaxes(self._middle[self._pieces], 1, 2)
         off = rotation_vectors(np.swapaxes(there, 1, 2) @ self._turns.orientations @ before)
         white = self._scale * there
@@ -277,10 +279,10 @@ class Fit:
         return inverse @ total, scores, inverse, float((square / soft).sum())
 
     def _covariance(self) -> Floats:
-        return np.asarray(self._inverse @ _long_run(self._scores) @ self._inverse, np.float64)
+        return np.asarray(self._inverse @ _newey_west(self._scores) @ self._inverse, np.float64)
 
 
-def _long_run(scores: Floats) -> Floats:
+def _newey_west(scores: Floats) -> Floats:
     """Covariance of the sum of scores (N, P) that are correlated over time (Newey and West)."""
     count = len(scores)
     reach = max(1, count // 5)

@@ -176,7 +176,7 @@ def _alone() -> None:
 
 def _score(name: str, cache: Path) -> dict[str, Any]:
     """The figures of one clip."""
-    from visup.evaluation.motion.motion import evaluate_motion
+    from visup.evaluation.motion.runner import evaluate_motion
 
     items: dict[str, dict[str, Any]] = evaluate_motion(rendered(name, cache))["items"]
     return items[name]

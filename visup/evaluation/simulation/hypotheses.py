@@ -4,7 +4,7 @@ Names are wrong in runs: what a silhouette is mistaken for, it is mistaken for a
 it may be mistaken for are the mission's other models and some that are not there; some of them far more
 often than others. Views are those of a database: directions spread over half the sphere, each standing
 for the opposite one too. As matching does, a few views of the right model are told at once, less similar the
-farther they are from the true direction (`told_views.py`).
+farther they are from the true direction (`view_noise.py`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Depth, Hypothesis, Region
 from visup.evaluation.simulation.truth_masks import Mission
-from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
+from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
 ABSENT = ("antenna", "barrel", "chair", "drill", "engine", "funnel", "guitar", "hammer", "iron")
@@ -34,7 +34,7 @@ _PERSISTS = 0.7  # how often a wrong name stays the same within a run of wrong n
 _TOLD = 4  # names told each time
 
 
-class Namer:
+class HypothesisSource:
     """Says what one object looks like, time after time.
 
     Args:
@@ -59,7 +59,7 @@ class Namer:
         rng: np.random.Generator,
     ) -> None:
         self._frames, self._name, self._size = mission.truth["frames"], name, mission.size
-        self._fov = np.deg2rad(float(mission.told.get("fov_vertical_deg", 40.0)))
+        self._fov = np.deg2rad(float(mission.description.get("fov_vertical_deg", 40.0)))
         self.model = str(mission.truth["meshes"].get(name, name))
         others = {*mission.truth["meshes"].values(), *ABSENT} - {self.model}
         self._others = [str(o) for o in rng.permutation(sorted(others))]
@@ -67,7 +67,7 @@ class Namer:
         self._odds /= self._odds.sum()
         self._end = 1.0 / run
         self._wrong, self._listed, self._depth, self._rng = wrong, listed, depth, rng
-        self._views = ToldViews(self.model, _DIRECTIONS, _NOISE, rng)
+        self._views = NoisyViews(self.model, _DIRECTIONS, _NOISE, rng)
         self._mistaken: str | None = None
         self._off = 0.0
 

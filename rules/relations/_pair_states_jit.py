@@ -16,20 +16,20 @@ GAP, RATE, SIGMA, RELATIVE = range(4)
 """Of the tables of `Measured`."""
 
 
-TOLD = (0, 1, 2, 8, 9, 10, 11, 12, 13, 14)
-JUDGED = (14, 15, 16, 17, 10, 11, 12, 13, 9, 8)
+TABLE_ROWS = (0, 1, 2, 8, 9, 10, 11, 12, 13, 14)
+STATE_ROWS = (14, 15, 16, 17, 10, 11, 12, 13, 9, 8)
 """Rows of what is told, and the rows of the latch that they are taken from."""
 
 
 @compiled
-def smoothed(before: float, now: float, share: float, jump: float) -> float:
+def smoothed_value(before: float, now: float, share: float, jump: float) -> float:
     """One value, smoothed; see `smooth.py`."""
     step = now - before
     return share * step + before if abs(step) <= jump else now
 
 
 @compiled
-def places(
+def smoothed_boxes(
     boxes: Floats,
     gaps: Floats,
     seen: Floats,
@@ -56,11 +56,11 @@ def places(
     for i in range(len(boxes)):
         if not seen[i, 0] > hold:
             for k in range(4):
-                now[i, k] = smoothed(boxes[i, k], seen[i, 4 + k], share, jump)
+                now[i, k] = smoothed_value(boxes[i, k], seen[i, 4 + k], share, jump)
     number = count = 0
     for i in range(len(boxes)):
         for j in range(i + 1, len(boxes)):
-            apart[number] = smoothed(gaps[number], tables[GAP, i, j], share, wide)
+            apart[number] = smoothed_value(gaps[number], tables[GAP, i, j], share, wide)
             if apart[number] <= near:
                 asked[count] = number
                 count += 1
@@ -69,7 +69,7 @@ def places(
 
 
 @compiled
-def outlines(
+def smoothed_outlines(
     before: Floats,
     gaps: Floats,
     asked: NDArray[np.int64],
@@ -95,13 +95,13 @@ def outlines(
         looked = k < len(asked) and asked[k] == number
         for row in range(3):
             value = found[row, k] if looked else np.nan if np.isnan(gaps[number]) else far
-            now[row, number] = smoothed(before[row, number], value, share, jump)
+            now[row, number] = smoothed_value(before[row, number], value, share, jump)
         k += looked
     return now
 
 
 @compiled
-def trend(
+def classify_trend(
     rate: float,
     sigma: float,
     before: int,
@@ -137,7 +137,7 @@ def trend(
 
 
 @compiled
-def with_depth(image: int, depth: int) -> int:
+def combined_trend(image: int, depth: int) -> int:
     """Judge the trends of an image distance and of a depth difference together.
 
     Args:
@@ -158,7 +158,7 @@ def with_depth(image: int, depth: int) -> int:
 
 
 @compiled
-def _held(before: int, enter: float, leave: float) -> float:
+def _threshold(before: int, enter: float, leave: float) -> float:
     """Up to which value a state is begun or kept; by the middle while it is not known yet."""
     return leave if before == 1 else 0.5 * (enter + leave) if before == UNKNOWN else enter
 
@@ -172,9 +172,9 @@ def _touching(
     if np.isnan(gap):
         return UNKNOWN
     nearest, between = min(depths[0], depths[1]), abs(depths[0] - depths[1])
-    if between > _held(before, level, apart) * nearest:
+    if between > _threshold(before, level, apart) * nearest:
         return 0
-    return int(gap <= _held(before, near, far))
+    return int(gap <= _threshold(before, near, far))
 
 
 @compiled
@@ -208,7 +208,7 @@ def _together(
 
 
 @compiled
-def wanted(
+def classify_motion(
     state: Codes,
     pending: Codes,
     tables: Floats,
@@ -247,10 +247,10 @@ def wanted(
     for i in range(count):
         for j in range(i + 1, count):
             k += 1
-            found = trend(
+            found = classify_trend(
                 tables[RATE, i, j], tables[SIGMA, i, j], state[0, k], pending[0, k], rates, sigmas
             )
-            found = with_depth(found, codes[3, k])
+            found = combined_trend(found, codes[3, k])
             touching = _touching(gap[k], (depth[i], depth[j]), state[1, k], touch)
             halves = _length(motion[1], i, j), _length(motion[2], i, j)
             slower = min(speed[i], speed[j])
@@ -264,7 +264,7 @@ def wanted(
 
 
 @compiled
-def told(
+def relation_rows(
     state: Codes,
     since: Floats,
     rcc8: Codes,
@@ -300,9 +300,12 @@ def told(
         np.empty((16, pairs)),
         np.empty((7, pairs)),
     )
-    for n in range(len(TOLD)):
+    for n in range(len(TABLE_ROWS)):
         for k in range(pairs):
-            codes[TOLD[n], k], moments[TOLD[n], k] = state[JUDGED[n], k], since[JUDGED[n], k]
+            codes[TABLE_ROWS[n], k], moments[TABLE_ROWS[n], k] = (
+                state[STATE_ROWS[n], k],
+                since[STATE_ROWS[n], k],
+            )
     for k in range(pairs):
         codes[3, k], codes[6, k], moments[15, k] = rcc8[0, k], rcc8[1, k], since[8, k]
         moments[3, k] = moments[4, k] = rcc8_since[0, k]

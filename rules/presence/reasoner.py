@@ -7,7 +7,7 @@ camera that sees motion loses what stops. A decision waits over several frames. 
 the place where a missing object should be is that object, which keeps its id; one at another
 object may be a part of it and has to show that it is not.
 
-Each of these stands in a file of its own, in the order in which `SeePresence` runs them.
+Each of these stands in a file of its own, in the order in which `PresenceReasoner` runs them.
 """
 
 from __future__ import annotations
@@ -18,26 +18,31 @@ from types import MappingProxyType
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome
 from visup.agent.model.fast_replace import replace
-from visup.rules.presence.fragments import FRAGMENTS, Doubt, Doubting, FragmentSettings
-from visup.rules.presence.initiation import enter
+from visup.rules.presence.fragments import (
+    FRAGMENTS,
+    FragmentHypothesis,
+    FragmentSettings,
+    FragmentTest,
+)
+from visup.rules.presence.initiation import initiate
 from visup.rules.presence.merging import merge
-from visup.rules.presence.occlusion import miss, show
-from visup.rules.presence.reidentification import adopt
-from visup.rules.presence.sightings import (
+from visup.rules.presence.object_tracks import (
     TRACKS,
-    Tracks,
-    first_sight,
-    follow,
-    tracks,
+    PresenceMemory,
+    new_track,
+    presence_memory,
+    update_track,
     visible_share,
 )
-from visup.rules.presence.step_context import PresenceSettings, Work
+from visup.rules.presence.occlusion import update_missing, update_visible
+from visup.rules.presence.reidentification import reidentify
+from visup.rules.presence.step_context import PresenceSettings, StepContext
 
-__all__ = ["PresenceSettings", "SeePresence", "visible_share"]
+__all__ = ["PresenceReasoner", "PresenceSettings", "visible_share"]
 
 
 @dataclass(frozen=True, slots=True)
-class SeePresence:
+class PresenceReasoner:
     """Reasoner of the cogitate phase: keeps who is there, tells who comes, goes, hides and shows.
 
     When no behaviour looked for regions in this step, nothing is concluded.
@@ -50,36 +55,36 @@ class SeePresence:
         """Judge one step; see `Reasoner`."""
         if not observation.observed("region"):
             return Outcome(mind)
-        old = tracks(mind)
+        old = presence_memory(mind)
         start = observation.time if old.start is None else old.start
         known = {i: t for i, t in old.of.items() if i in mind.objects}
-        doubts: Mapping[int, Doubt] = mind.memory.get(FRAGMENTS, MappingProxyType({}))
-        work = Work(mind, observation, known, doubts, self.settings)
-        adopt(work)
+        doubts: Mapping[int, FragmentHypothesis] = mind.memory.get(FRAGMENTS, MappingProxyType({}))
+        work = StepContext(mind, observation, known, doubts, self.settings)
+        reidentify(work)
         merge(work)
-        _follow(work)
+        _update_tracks(work)
         starting = work.now - start <= self.settings.start_s
-        work.doubts = Doubting(self.fragments)(doubts, work.mind, work.of, starting=starting)
-        enter(work, start)
-        show(work)
-        miss(work)
+        work.doubts = FragmentTest(self.fragments)(doubts, work.mind, work.of, starting=starting)
+        initiate(work, start)
+        update_visible(work)
+        update_missing(work)
         kept = {i: t for i, t in work.of.items() if i in work.mind.objects}
         told = {
-            TRACKS: Tracks(start, MappingProxyType(kept)),
+            TRACKS: PresenceMemory(start, MappingProxyType(kept)),
             FRAGMENTS: MappingProxyType(dict(work.doubts)),
         }
         memory = MappingProxyType({**work.mind.memory, **told})
         return Outcome(replace(work.mind, memory=memory), tuple(work.events))
 
 
-def _follow(work: Work) -> None:
+def _update_tracks(work: StepContext) -> None:
     seen = work.seen()
-    around = _around(work)
+    around = _recently_seen(work)
     hosts = {t.merged_with for t in work.of.values()}
     for belief in seen:
         track = work.of.get(belief.id)
         if track is None:
-            work.of[belief.id] = first_sight(belief.region, work.now)
+            work.of[belief.id] = new_track(belief.region, work.now)
             continue
         if track.merged_with is not None:
             # It has a region of its own again.
@@ -90,12 +95,12 @@ def _follow(work: Work) -> None:
             for other in around
             if other.id != belief.id and not work.doubted(other, belief)
         )
-        work.of[belief.id] = follow(
+        work.of[belief.id] = update_track(
             track, belief.region, work.now, crowded, work.settings.allowed_gap_s
         )
 
 
-def _around(work: Work) -> list[ObjectBelief]:
+def _recently_seen(work: StepContext) -> list[ObjectBelief]:
     """Objects that are seen, or were a flicker ago: all that may hide a part of another."""
     since = work.now - work.settings.allowed_gap_s
     return [b for b in work.mind.objects.values() if b.last_seen >= since]

@@ -21,11 +21,11 @@ from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.inputs_missing import percepts_read
 from visup.rules.safety.reasoner import SAFETY, RuleMemory, RuleReasoner
 
-WAKING = "rules.waking"
+ACTIVATION = "rules.waking"
 _PREFIX = "awake_"
 
 
-def waking_rules(contracts: Sequence[Contract]) -> tuple[Rule, ...]:
+def activation_rules(contracts: Sequence[Contract]) -> tuple[Rule, ...]:
     """A rule for each behaviour that sleeps at times: when it is awake.
 
     Raises:
@@ -50,7 +50,7 @@ def _rule(contract: Contract) -> Rule:
     return rule
 
 
-def wakeful(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[str]:
+def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[str]:
     """Names of behaviours that must not sleep: safety rules read what nobody else gives all the time.
 
     Args:
@@ -70,11 +70,11 @@ def wakeful(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[s
 
 
 @dataclass(frozen=True, slots=True)
-class Wake:
+class ActivationReasoner:
     """Reasoner of the match phase, after the tasks: calls behaviours that are asleep else.
 
     Attributes:
-        rules: From `waking_rules`.
+        rules: From `activation_rules`.
     """
 
     rules: tuple[Rule, ...]
@@ -86,9 +86,9 @@ class Wake:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         # What these rules remember stands, while they look, where rules look for it.
-        own = mind.remember(SAFETY, mind.memory.get(WAKING, RuleMemory()))
+        own = mind.remember(SAFETY, mind.memory.get(ACTIVATION, RuleMemory()))
         asked = self._reasoner(own, observation)
-        mind = mind.remember(WAKING, asked.mind.memory[SAFETY])
+        mind = mind.remember(ACTIVATION, asked.mind.memory[SAFETY])
         return Outcome(mind, directives=tuple(_directives(mind, asked.concerns)))
 
 

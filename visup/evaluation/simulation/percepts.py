@@ -4,7 +4,8 @@ What reasons is measured on these apart from what sees: outlines are off by pixe
 now and then, alone and in runs, and of the names told of a region the first one is often wrong, again in
 runs. Truth goes nowhere else: the agent is given these percepts as it would be given others.
 
-Read next: `reasoning.py` (what is measured), `truth_views.py` (what is said of one region).
+Read next: `hypotheses.py` (what is reported of one region), then `reasoning/simulated_missions.py` (what is
+measured).
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from visup.agent import (
 )
 from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.execution.pipeline import in_order, perceive
+from visup.evaluation.simulation.hypotheses import HypothesisSource
 from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, region_from_mask, shaken
-from visup.evaluation.simulation.truth_views import Namer
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class PerceptNoise:
     merge_coupled: bool = False
 
 
-class Gaps:
+class Dropouts:
     """When an object's region is missing: alone, or in runs.
 
     Args:
@@ -103,11 +104,11 @@ class Gaps:
 
 
 @dataclass(slots=True)
-class _Seen:
+class _ObjectNoise:
     """What is kept of one object, or of several that are one region."""
 
     contour: ContourNoise
-    gaps: Gaps
+    gaps: Dropouts
     rng: np.random.Generator
     number: int = 0
     last: float = -1.0
@@ -127,7 +128,7 @@ class _Seen:
 
 
 @dataclass(slots=True)
-class SeesTruth:
+class SimulatedSegmenter:
     """A behaviour that reports the regions of a mission.
 
     Attributes:
@@ -140,7 +141,7 @@ class SeesTruth:
     noise: PerceptNoise = field(default_factory=PerceptNoise)
     who: dict[int, tuple[str, ...]] = field(default_factory=dict, init=False)
     contract: Contract = field(default=Contract("truth", gives=("region", "health")), init=False)
-    _seen: dict[str, _Seen] = field(default_factory=dict, init=False)
+    _seen: dict[str, _ObjectNoise] = field(default_factory=dict, init=False)
     _coupled: tuple[tuple[float, frozenset[str]], ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
@@ -153,7 +154,7 @@ class SeesTruth:
             contour = ContourNoise(
                 n.contour_px, n.contour_length_px, n.contour_tau_s, self.mission.size, rng
             )
-            self._seen[name] = _Seen(contour, Gaps(n, dt, rng), rng)
+            self._seen[name] = _ObjectNoise(contour, Dropouts(n, dt, rng), rng)
         self._coupled = tuple(
             (e["frame"] / self.mission.fps, frozenset(e["objects"]))
             for e in self.mission.truth["events"]
@@ -213,16 +214,16 @@ class SeesTruth:
 
 
 @dataclass(slots=True)
-class NamesTruth:
+class SimulatedRecogniser:
     """A behaviour that says of each region what it looks like, and how far it is.
 
     Attributes:
         seeing: What reports the regions.
     """
 
-    seeing: SeesTruth
+    seeing: SimulatedSegmenter
     contract: Contract = field(init=False)
-    _namers: dict[str, Namer] = field(default_factory=dict, init=False)
+    _namers: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         noise, mission = self.seeing.noise, self.seeing.mission
@@ -231,7 +232,7 @@ class NamesTruth:
         )
         seeds = np.random.SeedSequence([noise.seed, 2]).spawn(len(mission.truth["labels"]))
         for name, seed in zip(sorted(mission.truth["labels"]), seeds, strict=True):
-            self._namers[name] = Namer(
+            self._namers[name] = HypothesisSource(
                 mission,
                 name,
                 wrong=noise.wrong,
@@ -266,8 +267,8 @@ def behaviours_of(
     Returns:
         The behaviours for an agent; and region id -> names of true objects, filled as it runs.
     """
-    seeing = SeesTruth(mission, noise)
-    return [seeing, NamesTruth(seeing)], seeing.who
+    seeing = SimulatedSegmenter(mission, noise)
+    return [seeing, SimulatedRecogniser(seeing)], seeing.who
 
 
 def frames_of(mission: Mission, *, every: int = 1) -> Iterator[Frame]:
