@@ -19,10 +19,10 @@ from visup.agent.model.memory import MemoryKey
 from visup.agent.model.records import WAKE
 from visup.rules.formula.nodes import Rule, calls
 from visup.rules.language.parser import parse_rules
-from visup.rules.predicates.inputs_missing import inputs
-from visup.rules.safety.reasoner import Kept, RuleReasoner
+from visup.rules.predicates.inputs_missing import percepts_read
+from visup.rules.safety.reasoner import RuleMemory, RuleReasoner
 
-ACTIVATION = MemoryKey("rules.waking", Kept())
+ACTIVATION = MemoryKey("rules.waking", RuleMemory())
 _PREFIX = "awake_"
 
 
@@ -64,7 +64,7 @@ def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> froze
         if rule.severity > Severity.INFO
         for formula in rule.formulas
         for call in calls(formula)
-        for kind in inputs(call.name)
+        for kind in percepts_read(call.name)
     }
     always = {kind for c in contracts if not c.awake for kind in c.gives}
     return frozenset(c.name for c in contracts if c.awake and set(c.gives) & (read - always))

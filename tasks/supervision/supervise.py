@@ -26,8 +26,8 @@ from visup.agent import (
 )
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
-from visup.tasks.actions.actions import Meaning, known_actions
-from visup.tasks.actions.vocabulary import vocabulary
+from visup.tasks.actions.actions import ActionDefinition, known_actions
+from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
@@ -62,7 +62,7 @@ UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often t
 def task_reasoner(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
-    actions: Mapping[str, Meaning] | None = None,
+    actions: Mapping[str, ActionDefinition] | None = None,
 ) -> Reasoner:
     """The reasoner that supervises some tasks.
 
@@ -110,9 +110,9 @@ def finish(belief: TaskBelief) -> Verdict:
 
 
 def _follower(
-    task: Task, actions: Mapping[str, Meaning], settings: TaskSettings
+    task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
 ) -> HypothesisTracker:
-    words = vocabulary(task, actions)
+    words = task_vocabulary(task, actions)
     tracker = HypothesisTracker(task, words.meanings, settings, words.looks)
     tracker.success(tracker.start(0.0))  # so that no step has to work out the whole course
     return tracker
