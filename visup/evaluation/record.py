@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import visup
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.jsonable import plain
+from visup.version import __version__
 
 RECORD_VERSION = 1
 
@@ -24,7 +24,7 @@ def write_record(path: Path, figures: Mapping[str, Any], settings: Mapping[str, 
     """
     record = {
         "version": RECORD_VERSION,
-        "settings": {"visup": visup.__version__, **settings},
+        "settings": {"visup": __version__, **settings},
         "machine": machine(),
         **figures,
     }

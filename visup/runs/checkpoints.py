@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import visup
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import StateError, frozen, thawed
+from visup.version import __version__
 
 CHECKPOINT = "state.bin"
 
@@ -84,7 +84,7 @@ class CheckpointWriter:
             raise StateError("a behaviour has no save and load")
         return frozen(
             {
-                "visup": visup.__version__,
+                "visup": __version__,
                 "frame_index": step.frame_index,
                 "agent": state,
                 "kept": dict(kept),
@@ -100,7 +100,7 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
     """
     try:
         told = thawed((folder / CHECKPOINT).read_bytes())
-        if told["visup"] != visup.__version__:
+        if told["visup"] != __version__:
             return None, f"its state is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None
     except FileNotFoundError:

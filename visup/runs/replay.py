@@ -14,7 +14,6 @@ from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 
-import visup
 from visup.agent import Severity, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
@@ -25,6 +24,7 @@ from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict, reasoning_agent
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import task_actors
+from visup.version import __version__
 
 Line = Mapping[str, Any]
 STAGE = "stage_"
@@ -198,7 +198,5 @@ def _journal(recording: Recording, settings: WatchSettings, out: Path, stack: Ex
     journal = Journal(out / JOURNAL)
     stack.callback(journal.close)
     kept = {k: v for k, v in recording.facts().items() if k in ("source", "fps", "size")}
-    journal.note(
-        **kept, visup=visup.__version__, settings=plain(settings), replayed=str(recording.path)
-    )
+    journal.note(**kept, visup=__version__, settings=plain(settings), replayed=str(recording.path))
     return journal

@@ -23,7 +23,7 @@ from visup.stepping.cursor import StepResult
 from visup.stepping.diff import MindDiff, mind_diff
 from visup.stepping.explanations import questions as asking
 from visup.stepping.explanations.evidence import Why
-from visup.stepping.explanations.why import Reasons
+from visup.stepping.explanations.why import ReasonFinder
 from visup.stepping.history import LATEST, SPACING, StepHistory
 from visup.stepping.observation_sources import (
     LiveObservations,
@@ -292,7 +292,7 @@ class Stepper(Timeline):
         Raises:
             VisupError: Nothing is known of it.
         """
-        reasons = Reasons(self, self.at, self.mind)
+        reasons = ReasonFinder(self, self.at, self.mind)
         return asking.why(reasons, what) if isinstance(what, str) else reasons.of(what)
 
     def why_not(self, text: str) -> Why:

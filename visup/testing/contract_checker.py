@@ -22,7 +22,7 @@ from visup.agent.execution.process_runner import parcel
 from visup.agent.execution.worker import packed_bytes
 from visup.agent.model.errors import BehaviourError, VisupError
 from visup.agent.plugins.loader import checked
-from visup.rules.activation.waking import waking_rules
+from visup.rules.activation.activation import activation_rules
 from visup.testing.clips import CLIPS, LabelledFrame
 from visup.testing.scripted import Script, stub_behaviours
 
@@ -140,7 +140,7 @@ def _contract_results(
 def _wakes(contract: Contract) -> CheckResult:
     said = "says when it is awake"
     try:
-        waking_rules([contract])
+        activation_rules([contract])
     except BehaviourError as fault:
         return CheckResult(said, False, str(fault))
     return CheckResult(said, True, contract.awake)

@@ -22,7 +22,7 @@ from visup.agent import (
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.evaluation.runtime.soak import scripted
 from visup.percepts.shape.behaviour import _rest_intervals
-from visup.rules.activation.attention import Attend
+from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -41,7 +41,9 @@ def asked(belief: ObjectBelief, seconds: float = 3.0, expected: bool = False) ->
     mind = Mind(objects={1: belief}, tasks=(task,))
     found: tuple[Directive, ...] = ()
     for n in range(round(seconds * 10) + 1):
-        outcome = Attend()(replace(mind, time=n / 10), Observation(n, n / 10, (160, 120)))
+        outcome = AttentionReasoner()(
+            replace(mind, time=n / 10), Observation(n, n / 10, (160, 120))
+        )
         mind, found = outcome.mind, outcome.directives
     return list(found)
 
@@ -96,7 +98,7 @@ def test_only_directives_for_the_behaviour_count() -> None:
 
 def test_attention_is_a_reasoner_like_any_other() -> None:
     rules = default_reasoners()
-    agent = Agent([], Reasoners(rules.update, rules.cogitate, (Attend(),)))
+    agent = Agent([], Reasoners(rules.update, rules.cogitate, (AttentionReasoner(),)))
     last = [agent.reason(seen) for seen in scripted(90)][-1]
     assert last.directives
     assert {d.data["region"] for d in last.directives} <= {1, 2, 3}

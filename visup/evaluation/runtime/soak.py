@@ -181,14 +181,14 @@ def _long(
     folder: Path, frames: int, tell: Callable[[str], None]
 ) -> tuple[list[float], list[float], list[float]]:
     """Costs of the steps of a long run, of a fresh run beside its last tenth, and memory."""
-    long, fresh = _Run(folder, LIMITS), None
+    long, fresh = _JournaledAgent(folder, LIMITS), None
     last_tenth = frames - frames // 10
     memory: list[float] = []
     for seen in scripted(frames):
         long.step(seen)
         if seen.frame_index == last_tenth:
             memory.append(rss_mb())
-            fresh = _Run(folder / "fresh", LIMITS)
+            fresh = _JournaledAgent(folder / "fresh", LIMITS)
         if fresh:
             fresh.step(seen)
         if seen.frame_index == frames // 10:
@@ -201,7 +201,7 @@ def _long(
     return long.costs.tolist(), fresh.costs.tolist(), memory
 
 
-class _Run:
+class _JournaledAgent:
     """An agent with its journal, and what its steps cost, in milliseconds of processor time."""
 
     def __init__(self, folder: Path, limits: Limits) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from visup.agent import Depth, Hypothesis, Observation, Percept, Region
 from visup.agent.model.notebook import showing
-from visup.rules.safety.explain import Explanation
+from visup.rules.safety.explain import RuleExplanation
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +55,12 @@ class Why:
         return "\n".join(self.lines())
 
 
-def because(explained: Explanation) -> Why:
+def explanation_tree(explained: RuleExplanation) -> Why:
     """What the rule language explains, as a tree of reasons."""
-    return Why(explained.line(), tuple(because(p) for p in explained.parts))
+    return Why(explained.line(), tuple(explanation_tree(p) for p in explained.parts))
 
 
-def of_region(seen: Observation, region_id: int, *, names: bool = False) -> tuple[Why, ...]:
+def region_percepts(seen: Observation, region_id: int, *, names: bool = False) -> tuple[Why, ...]:
     """The percepts of a frame about one region.
 
     Args:
@@ -70,7 +70,7 @@ def of_region(seen: Observation, region_id: int, *, names: bool = False) -> tupl
     """
     kinds = (Region, Hypothesis, Depth) if names else (Region,)
     return tuple(
-        told(percept, seen)
+        percept_reason(percept, seen)
         for report in seen.reports
         for percept in report.percepts
         if isinstance(percept.value, kinds) and _about(percept.value) == region_id
@@ -81,13 +81,13 @@ def _about(value: Region | Hypothesis | Depth) -> int:
     return value.id if isinstance(value, Region) else value.region_id
 
 
-def told(percept: Percept, seen: Observation) -> Why:
+def percept_reason(percept: Percept, seen: Observation) -> Why:
     """A percept as the last of reasons."""
-    text = f"{percept.source} reported {worded(percept.value)}"
+    text = f"{percept.source} reported {percept_text(percept.value)}"
     return Why(text, (), seen.frame_index, seen.time, percept)
 
 
-def worded(value: object) -> str:
+def percept_text(value: object) -> str:
     """What was perceived, in a few words."""
     match value:
         case Region():
