@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NotRequired, TypedDict, Unpack
 
 import cv2
 import numpy as np
@@ -297,26 +297,29 @@ def _directions(
     return np.where(length > 1e-9, way / np.maximum(length, 1e-9), 0.0)
 
 
-def frozen_graph(
-    *,
-    kinds: NDArray[np.int8],
-    edges: NDArray[np.int16],
-    weights: NDArray[np.float32],
-    lengths: NDArray[np.float32],
-    profiles: NDArray[np.float32],
-    contexts: NDArray[np.float32],
-    positions: NDArray[np.float32],
-    directions: NDArray[np.float32],
-    signatures: NDArray[np.float32] | None = None,
-) -> ShockGraph:
+class NodeArrays(TypedDict):
+    """Those arrays of `ShockGraph` that have a row for each node."""
+
+    kinds: NDArray[np.int8]
+    weights: NDArray[np.float32]
+    lengths: NDArray[np.float32]
+    profiles: NDArray[np.float32]
+    contexts: NDArray[np.float32]
+    positions: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    signatures: NotRequired[NDArray[np.float32]]
+
+
+def frozen_graph(edges: NDArray[np.int16], **nodes: Unpack[NodeArrays]) -> ShockGraph:
     """A graph from its stored arrays; what follows from them is computed. See `ShockGraph`."""
     digest = hashlib.blake2b(digest_size=12)
-    for array in (kinds, edges, weights, profiles, contexts, positions):
+    parts = (nodes["weights"], nodes["profiles"], nodes["contexts"], nodes["positions"])
+    for array in (nodes["kinds"], edges, *parts):
         digest.update(np.ascontiguousarray(array).tobytes())
-    size = len(kinds)
-    arrays = (kinds, edges, weights, lengths, profiles, contexts, positions, directions)
-    vectors = topological_signatures(edges, size) if signatures is None else signatures
-    return ShockGraph(*arrays, vectors, descendants(edges, size), digest.digest())
+    size = len(nodes["kinds"])
+    if "signatures" not in nodes:
+        nodes["signatures"] = topological_signatures(edges, size)
+    return ShockGraph(edges=edges, below=descendants(edges, size), key=digest.digest(), **nodes)
 
 
 def _sample_area(silhouette: Silhouette) -> NDArray[np.float64]:
