@@ -135,6 +135,6 @@ def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(tmp_path:
     )
     assert done.returncode == 1, done.stderr
     assert done.stderr == ""
-    assert "The behaviour 'mine' failed; what it gives is unknown." in done.stdout
+    assert "The behaviour 'mine' failed; its output is unavailable." in done.stdout
     assert "its process ended with exit code 7" in done.stdout
     assert '"frames": 12' in done.stdout
