@@ -202,8 +202,8 @@ def test_one_setting_given_twice_is_refused() -> None:
         (None, "cannot be read"),
         ("x =", "it is not TOML"),
         ("[lamp]\nx = 1", "'lamp' is unknown"),
-        ("behaviours = 3", "no table of tables"),
-        ("[behaviours]\nlamp = 3", "no table of tables"),
+        ("behaviours = 3", "not a table of tables"),
+        ("[behaviours]\nlamp = 3", "not a table of tables"),
     ],
 )
 def test_a_settings_file_that_will_not_do_is_refused(
