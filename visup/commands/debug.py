@@ -59,11 +59,11 @@ def _write(video: VideoSource, target: Path, limit: int | None, advance: Progres
 
     from visup.percepts.motion.segmenter import MotionSegmenter
     from visup.report.motion_debug.panels import draw_motion
-    from visup.report.video import VideoWriter
+    from visup.report.video import WebmWriter
 
     segmenter, written = MotionSegmenter(), 0
     known = [n for n in (_given(video), limit) if n is not None]
-    with VideoWriter(target, video.fps / video.every, MOST_WIDTH) as writer:
+    with WebmWriter(target, video.fps / video.every, MOST_WIDTH) as writer:
         for frame in islice(video, limit):
             regions = segmenter.step(frame)
             writer.write(draw_motion(frame, segmenter.trace, regions))

@@ -20,7 +20,7 @@ MOST_WIDTH = 960
 FOURCC = "VP80"
 
 
-class VideoWriter:
+class WebmWriter:
     """Writes pictures as WebM with VP8, which every browser plays.
 
     The first picture fixes the size; the file appears with it.
@@ -88,7 +88,7 @@ class VideoWriter:
         return writer
 
 
-class AnnotatedVideo(VideoWriter):
+class AnnotatedVideo(WebmWriter):
     """Writes each frame with what is believed drawn over it. Give its `add` to an agent as an observer.
 
     Args:

@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import visup
 from visup.agent.model.errors import DatabaseError, VisupError
 from visup.percepts.shape.database.catalogue import Shapes, Views
 from visup.percepts.shape.database.storage import VERSION
 from visup.percepts.shape.index.view_records import LAYOUT, NewView
 from visup.percepts.shape.silhouette.silhouette import SMOOTHING
+from visup.version import __version__
 
 VIEWS_OF_A_PART = 64
 """Views of a part at most: one mesh with many views keeps all processes busy."""
@@ -57,7 +57,7 @@ def parts_of(mesh: Path, folder: Path, views: int, seed: int) -> list[BuildPart]
             where=str(mesh),
             expected="a mesh file",
         ) from e
-    settings = (visup.__version__, VERSION, LAYOUT, SMOOTHING, mesh.name, views, seed)
+    settings = (__version__, VERSION, LAYOUT, SMOOTHING, mesh.name, views, seed)
     key = hashlib.sha256(content + repr(settings).encode()).hexdigest()[:32]
     return [
         BuildPart(

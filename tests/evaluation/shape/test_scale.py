@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape, small_database
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.shape.augment import deformed, multiplied
+from visup.evaluation.shape.augment import augmented, deformed
 from visup.evaluation.shape.scale import evaluate_scale, noisy
 from visup.percepts.shape.database.model_database import CANDIDATES, ModelDatabase
 from visup.percepts.shape.database.time_budget import SEARCH_MS, SHAPE_MS, VIEW_MS
@@ -53,7 +53,7 @@ def test_a_spectrum_does_not_tell_where_a_sketch_starts(
 @pytest.fixture(scope="module")
 def many(tmp_path_factory: pytest.TempPathFactory) -> ModelDatabase:
     folder = tmp_path_factory.mktemp("scale")
-    return multiplied(small_database(folder / "zoo.db"), folder / "many.db", 800, seed=3)
+    return augmented(small_database(folder / "zoo.db"), folder / "many.db", 800, seed=3)
 
 
 def test_deformed_views_are_the_same_for_a_seed_and_unlike_their_source() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from tests.percepts.motion.clips import texture
 from visup.agent import Frame, HealthStatus
-from visup.evaluation.health.health import statuses
+from visup.evaluation.health.runner import statuses
 from visup.percepts.health.frozen_under_noise import change_statistics
 from visup.percepts.health.image_quality import measure_quality
 

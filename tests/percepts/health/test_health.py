@@ -19,7 +19,7 @@ from tests.percepts.motion.clips import clip, texture
 from visup.agent import Frame, HealthStatus
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.health.camera_faults import EXPECTED, inject
-from visup.evaluation.health.health import evaluate_health, find_sources, plan, statuses
+from visup.evaluation.health.runner import evaluate_health, find_sources, plan, statuses
 from visup.percepts.health.frame_timing import ArrivalMonitor
 from visup.percepts.health.image_quality import measure_quality
 

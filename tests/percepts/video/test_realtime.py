@@ -16,8 +16,8 @@ from visup.agent import Frame, Severity
 from visup.percepts.video import Ending, VideoSource, open_source
 from visup.percepts.video import realtime as module
 from visup.percepts.video.realtime import LatestFrames, PacedRecording, in_real_time
-from visup.runs.runner import RunOptions, supervise
-from visup.runs.settings import WatchSettings
+from visup.runs.runner import supervise
+from visup.runs.settings import RunOptions, WatchSettings
 
 IMAGE = np.zeros((4, 4, 3), np.uint8)
 
@@ -165,7 +165,7 @@ import time
 from visup.agent import Contract
 class Slow:
     contract = Contract("slow", gives=("slow",))
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         time.sleep(0.2)
         return []
 """

@@ -27,7 +27,7 @@ from visup.agent import (
     Report,
     ReportState,
 )
-from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
+from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 from visup.rules.pose.reasoner import PoseReasoner, PoseSettings, pose_support, pose_tracks
 from visup.rules.presence.association import OWNERS
@@ -73,7 +73,7 @@ def spinning(rate: float, seconds: float, seed: int, every: float = 0.12) -> tup
 def told_views(orientations: Floats, seed: int, views: int = 48) -> Callable[[int], Said]:
     rng = np.random.default_rng(seed)
     directions = half_sphere_directions(views)
-    told = ToldViews("sat", directions, ViewNoise(), rng, others=("horse", "mir"))
+    told = NoisyViews("sat", directions, ViewNoise(), rng, others=("horse", "mir"))
     return lambda k: told(orientations[k], 1)
 
 
@@ -130,7 +130,7 @@ def test_the_direction_is_nearer_than_the_best_hypothesis_tells() -> None:
     assert np.mean(poses) < 0.6 * np.mean(raw)
 
 
-def hearing(told: ToldViews, orientations: Floats) -> Callable[[int], Said]:
+def hearing(told: NoisyViews, orientations: Floats) -> Callable[[int], Said]:
     return lambda k: told(orientations[k], 1)
 
 
@@ -144,7 +144,7 @@ def test_confidence_promises_no_more_than_it_holds() -> None:
     for seed, twin in enumerate([0.05, 0.3, 0.45, 0.5]):
         times, true = spinning((0.0, 4.0)[seed % 2], 14.0, seed)
         noise = ViewNoise(twin=twin, wrong=0.4)
-        told = ToldViews("sat", half_sphere_directions(48), noise, np.random.default_rng(seed))
+        told = NoisyViews("sat", half_sphere_directions(48), noise, np.random.default_rng(seed))
         for k, (_, pose) in enumerate(believed(times, hearing(told, true))):
             if pose is not None and times[k] > 1.0:
                 told_sure.append(pose.confidence)
@@ -161,7 +161,7 @@ def test_a_model_whose_views_do_not_hang_together_loses_support() -> None:
     """The wrong model is the most similar at every look, but each time from another side."""
     times, true = spinning(3.0, 10.0, 1)
     rng = np.random.default_rng(0)
-    right = ToldViews(
+    right = NoisyViews(
         "sat", half_sphere_directions(48), ViewNoise(missing=0.0, wrong=0.0, similarity=0.78), rng
     )
 

@@ -25,7 +25,7 @@ _WAVES = 3
 Warp = Callable[[NDArray[np.floating]], NDArray[np.float64]]
 
 
-def multiplied(
+def augmented(
     database: ModelDatabase,
     path: Path,
     views: int,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Region
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.missions.mission_files import read_json
+from visup.evaluation.missions.files import read_json
 from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
 from visup.rules.geometry.regions import outline
 
@@ -59,7 +59,7 @@ class Mission:
     """
 
     name: str
-    told: Mapping[str, Any]
+    description: Mapping[str, Any]
     truth: Mapping[str, Any]
     masks: tuple[Mapping[str, TrueMask], ...]
 
