@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ import numpy as np
 from visup.agent import Frame, Mind, Pose, Region, Severity, Status, TaskBelief, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.files import mission_folders, read_json
 from visup.evaluation.missions.pose_errors import Poses, spin_error, view_error
 from visup.evaluation.missions.scores import (
@@ -108,7 +109,7 @@ def evaluate_missions(
     *,
     models: Path | None = None,
     limit: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Figures over all missions below a folder.
 
@@ -117,7 +118,7 @@ def evaluate_missions(
         models: Model database; by default one is built from `../models/*.ply` beside `folder` and, for
             each model that an actor stands for, from silhouettes in `../shapes/<model>`.
         limit: Frames of each mission, for a quick look; all by default.
-        progress: Told a line as each mission is done.
+        progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {mission: {...}}} with the keys of the data's README.
@@ -131,14 +132,11 @@ def evaluate_missions(
         items: dict[str, dict[str, Any]] = {}
         for mission in missions:
             items[mission.name] = _evaluate(mission, database, limit)
-            if progress:
-                progress(f"{mission.name}: {items[mission.name]['verdict']}")
+            progress(f"{mission.name}: {items[mission.name]['verdict']}")
     return {"total": mission_total(list(items.values())), "items": items}
 
 
-def _database(
-    folder: Path, missions: Sequence[Path], scratch: Path, progress: Callable[[str], None] | None
-) -> Path:
+def _database(folder: Path, missions: Sequence[Path], scratch: Path, progress: Progress) -> Path:
     """A model database from the meshes and silhouettes that stand beside the missions."""
     from visup.percepts.shape.building.build import build_database, read_silhouettes
 
@@ -152,8 +150,7 @@ def _database(
         )
     told = [read_json(mission / "mission.json") for mission in missions]
     wanted = {m for t in told for m in t["actors"].values()}
-    if progress:
-        progress(f"building a database from {len(meshes)} meshes")
+    progress(f"building a database from {len(meshes)} meshes")
     path = scratch / "models.db"
     silhouettes = {
         name: read_silhouettes(beside / "shapes" / name)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from visup.agent import (
     Report,
     ReportState,
 )
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.simulation.truth_masks import region_from_mask
 from visup.rules.reasoners import default_reasoners
 
@@ -42,14 +43,14 @@ _NAMES = ("arm", "satellite", "guitar", "barrel", "drill", "engine")
 
 
 def evaluate_endurance(
-    frames: int, *, seed: int = 0, progress: Callable[[str], None] | None = None
+    frames: int, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
     """Run a script with three objects for so many frames, and one with ten for a tenth of them.
 
     Args:
         frames: How many.
         seed: Of the script.
-        progress: Told now and then.
+        progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {}}: `ms` and `ms_ten` (median per step), `rss_mb` at the end and
@@ -65,7 +66,7 @@ def evaluate_endurance(
             spent.append(took)
         if k == settled:
             at_rest = resident_mb()
-        if progress and k % 5000 == 0:
+        if k % 5000 == 0:
             progress(f"{k} of {frames} frames")
     end = resident_mb()
     ten = [took for took, _ in _thought(10, max(200, min(frames // 10, 2000)), seed, Mind())]

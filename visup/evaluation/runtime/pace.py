@@ -10,7 +10,6 @@ from __future__ import annotations
 import gc
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -24,6 +23,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.agent.storage.jsonable import plain
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.runtime.endurance import SIZE, resident_mb, script
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
@@ -82,14 +82,14 @@ rule was_apart(a, b): info
 
 
 def evaluate_pace(
-    steps: int = 2000, *, kept: int = 10_000, progress: Callable[[str], None] | None = None
+    steps: int = 2000, *, kept: int = 10_000, progress: Progress = silent
 ) -> dict[str, Any]:
     """Measure the pace of reasoning.
 
     Args:
         steps: Of each script.
         kept: Minds that are kept in a row.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` for '3 objects' and '10 objects' with `ms` and `ms_low` (median and lowest decile of
@@ -103,20 +103,19 @@ def evaluate_pace(
     """
     if steps < LEAST_STEPS:
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
-    tell = progress or (lambda _: None)
     items: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as scratch:
         settings = _settings(Path(scratch))
         for count in COUNTS:
-            tell(f"{count} objects")
+            progress(f"{count} objects")
             items[f"{count} objects"] = _stepped(
                 settings, list(script(count, steps, count)), Path(scratch) / str(count)
             )
-        tell("replay")
+        progress("replay")
         fps = _replay_fps(Path(scratch) / str(COUNTS[0]))
-        tell("observers")
+        progress("observers")
         share = _observers(settings, Path(scratch) / "alerts.jsonl")
-    tell(f"{kept} minds")
+    progress(f"{kept} minds")
     total = {"observers": share, "replay_fps": fps, "mind_kb": _mind_kb(kept)}
     return {"items": items, "total": total}
 

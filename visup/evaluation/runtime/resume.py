@@ -22,6 +22,7 @@ from rich.console import Console
 
 from visup.agent.model.errors import OutputError, SettingsError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text
+from visup.evaluation.figures import Progress, silent
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import Audience, supervise
 from visup.runs.settings import RunOptions, WatchSettings
@@ -41,7 +42,7 @@ def evaluate_resume(
     kills: int = 200,
     seed: int = 0,
     state_every_s: float = STATE_EVERY_S,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Kill runs and resume them.
 
@@ -50,7 +51,7 @@ def evaluate_resume(
         kills: How many runs are killed.
         seed: Of the moments.
         state_every_s: Seconds between states, in the runs that keep them.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` 'with states' and 'without', each with `kills`, `early` (killed before anything was
@@ -76,8 +77,7 @@ def evaluate_resume(
         whole_s = time.perf_counter() - begin
         expected = _outcome(place / "whole")
         for trial in range(kills):
-            if progress:
-                progress(f"{trial} of {kills} runs killed")
+            progress(f"{trial} of {kills} runs killed")
             stateless = rng.random() < STATELESS
             every = 0.0 if stateless else state_every_s
             one = tally["without" if stateless else "with states"]

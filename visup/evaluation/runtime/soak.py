@@ -36,6 +36,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, Limits, segments
 from visup.agent.storage.journal_reader import JOURNAL, Recording, export_events
+from visup.evaluation.figures import Progress, silent
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -50,14 +51,12 @@ NAMES = ("arm", "spartan", "hubble")
 PAIRS = 12  # blocks with and without sinks, in turn
 
 
-def evaluate_soak(
-    frames: int = 200_000, *, progress: Callable[[str], None] | None = None
-) -> dict[str, Any]:
+def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict[str, Any]:
     """Measure a long run.
 
     Args:
         frames: Its length.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` for the run's 'start' and 'end' (a tenth of the run each, the first hundredth left out)
@@ -73,17 +72,16 @@ def evaluate_soak(
     """
     if frames < LEAST_FRAMES:
         raise SettingsError(f"--frames is {frames}", expected=f"at least {LEAST_FRAMES}")
-    tell = progress or (lambda _: None)
     with tempfile.TemporaryDirectory() as scratch:
         place = Path(scratch)
-        tell("the same twice")
+        progress("the same twice")
         prints = [_events_of(place / name, LEAST_FRAMES) for name in ("once", "twice")]
         rate = _replay_fps(place / "once")
-        tell("sinks")
+        progress("sinks")
         ratio = sinks_ratio(place, LEAST_FRAMES)
         folder = place / "long"
         folder.mkdir()
-        costs, beside, memory = _long(folder, frames, tell)
+        costs, beside, memory = _long(folder, frames, progress)
         disk = sum(p.stat().st_size for p in segments(folder / JOURNAL))
     tenth = frames // 10
     start, end = costs[frames // 100 : tenth], costs[-tenth:]
@@ -178,7 +176,7 @@ def _journal(folder: Path, limits: Limits | None = None) -> Journal:
 
 
 def _long(
-    folder: Path, frames: int, tell: Callable[[str], None]
+    folder: Path, frames: int, progress: Progress
 ) -> tuple[list[float], list[float], list[float]]:
     """Costs of the steps of a long run, of a fresh run beside its last tenth, and memory."""
     long, fresh = _JournaledAgent(folder, LIMITS), None
@@ -194,7 +192,7 @@ def _long(
         if seen.frame_index == frames // 10:
             memory.append(rss_mb())
         if seen.frame_index % 1000 == 0:
-            tell(f"{seen.frame_index} of {frames} frames")
+            progress(f"{seen.frame_index} of {frames} frames")
     long.journal.close()
     assert fresh is not None
     fresh.journal.close()

@@ -20,6 +20,7 @@ from visup.agent import Mind, Observation, Region
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import frozen
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.runtime.soak import rss_mb, scripted
 from visup.rules.relations.reasoner import RELATIONS
 from visup.runs.settings import WatchSettings
@@ -37,14 +38,14 @@ PLACES = 30
 
 
 def evaluate_stepping(
-    steps: int = KEPT_STEPS, *, seed: int = 0, progress: Callable[[str], None] | None = None
+    steps: int = KEPT_STEPS, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
     """Measure a long course.
 
     Args:
         steps: How many are made.
         seed: Of the places from which one goes back.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` for going 'back' (by `BACK` steps, from anywhere), for `step` number n told without
@@ -59,8 +60,7 @@ def evaluate_stepping(
     """
     if steps < LEAST_STEPS:
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
-    tell = progress or (lambda _: None)
-    tell("by itself and stepped, in turn")
+    progress("by itself and stepped, in turn")
     slower = _slower()
     it = _stepper(steps + 10)
     prints: dict[int, bytes] = {}
@@ -72,10 +72,10 @@ def evaluate_stepping(
         assert step is not None
         prints[it.at] = _print(step)
         if it.at % 1000 == 0:
-            tell(f"{it.at} of {steps} steps")
+            progress(f"{it.at} of {steps} steps")
     gc.collect()
     kept = rss_mb() - before
-    tell("going back")
+    progress("going back")
     places = np.random.default_rng(seed).integers(BACK + 1, steps, PLACES)
     back, look, branch, same = [], [], [], []
     for place in map(int, places):

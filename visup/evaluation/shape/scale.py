@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.shape.augment import augmented
 from visup.percepts.shape.building.build import build_database
 from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
@@ -45,7 +46,7 @@ def evaluate_scale(
     *,
     most: int = 100_000,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure databases of a folder's meshes, as they are, ten times as large, and as large as asked.
 
@@ -53,7 +54,7 @@ def evaluate_scale(
         folder: Meshes, `*.ply`.
         most: Views of the largest database.
         seed: Of the deformations and of the queries.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` by number of views, each with `open_ms`, `first_ms` (the first query), `ms_query` (median
@@ -70,9 +71,8 @@ def evaluate_scale(
     meshes = sorted(folder.glob("*.ply"))
     if not meshes:
         raise SettingsError("there are no meshes here", where=str(folder), expected="*.ply")
-    tell = progress or (lambda _: None)
     with tempfile.TemporaryDirectory() as scratch:
-        tell(f"{len(meshes)} meshes")
+        progress(f"{len(meshes)} meshes")
         begin = time.perf_counter()
         base = build_database(Path(scratch) / "base.db", meshes, views=VIEWS_OF_A_MESH, jobs=2)
         rate = len(base.views) / (time.perf_counter() - begin)
@@ -82,8 +82,8 @@ def evaluate_scale(
         counts = [len(base.views) * k for k in SIZES]
         for views in (*counts, *([most] if most > counts[-1] else [])):
             path = Path(scratch) / f"{views}.db"
-            augmented(base, path, views, seed, lambda n, of=views: tell(f"{n} of {of} views"))  # type: ignore[misc]
-            tell(f"queries among {views} views")
+            augmented(base, path, views, seed, lambda n, of=views: progress(f"{n} of {of} views"))  # type: ignore[misc]
+            progress(f"queries among {views} views")
             items[f"{views} views"] = _probed(path, masks, exhaustive=views in counts)
             path.unlink()
     once, ten = (items[f"{views} views"]["ms_cpu"] for views in counts)
