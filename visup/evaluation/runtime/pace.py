@@ -1,6 +1,6 @@
 """How fast an agent thinks: a step without perception, observers, replay, and minds that are kept.
 
-Scripted percepts (`endurance.py`), twenty rules, two tasks, the journal on. Times are processor time of the
+Scripted observations, twenty rules, two tasks, the journal on. Times are processor time of the
 process, and of each figure the median as well as the lowest decile is told: what else a busy machine
 does makes steps slower, never faster.
 """
@@ -23,8 +23,8 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.agent.storage.jsonable import plain
-from visup.evaluation.figures import Progress, silent
-from visup.evaluation.runtime.endurance import SIZE, resident_mb, script
+from visup.evaluation.figures import Progress, resident_mb, silent
+from visup.evaluation.runtime.scripted_observations import SIZE, drifting_boxes
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -109,7 +109,7 @@ def evaluate_pace(
         for count in COUNTS:
             progress(f"{count} objects")
             items[f"{count} objects"] = _stepped(
-                settings, list(script(count, steps, count)), Path(scratch) / str(count)
+                settings, list(drifting_boxes(count, steps, count)), Path(scratch) / str(count)
             )
         progress("replay")
         fps = _replay_fps(Path(scratch) / str(COUNTS[0]))
@@ -166,7 +166,7 @@ def _observers(settings: WatchSettings, place: Path) -> float:
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     agent = reasoning_agent(settings)
     thought, told = [], []
-    for one in script(COUNTS[0], LEAST_STEPS, 2):
+    for one in drifting_boxes(COUNTS[0], LEAST_STEPS, 2):
         begin = time.thread_time()
         step = agent.reason(one)
         middle = time.thread_time()
@@ -180,7 +180,7 @@ def _observers(settings: WatchSettings, place: Path) -> float:
 def _mind_kb(count: int) -> float:
     agent: Agent = reasoning_agent(WatchSettings("scripted"))
     minds: list[Mind] = []
-    for k, one in enumerate(script(COUNTS[0], WARM + count, 1)):
+    for k, one in enumerate(drifting_boxes(COUNTS[0], WARM + count, 1)):
         if k == WARM:
             gc.collect()
             before = resident_mb()

@@ -1,6 +1,6 @@
 """`visup eval stepping`: what going back costs, what is kept for it, and whether it leads to the same.
 
-Three bodies that move, meet and part (as of `soak`), all reasoning, one task. Every region owns its mask
+Three ellipses that move, meet and part, all reasoning, one task. Every region owns its mask
 and outline, as regions that were seen do.
 """
 
@@ -20,8 +20,8 @@ from visup.agent import Mind, Observation, Region
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import frozen
-from visup.evaluation.figures import Progress, silent
-from visup.evaluation.runtime.soak import rss_mb, scripted
+from visup.evaluation.figures import Progress, resident_mb, silent
+from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.rules.relations.reasoner import RELATIONS
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -66,7 +66,7 @@ def evaluate_stepping(
     prints: dict[int, bytes] = {}
     it.step(100)
     gc.collect()
-    before = rss_mb()
+    before = resident_mb()
     while it.at < steps:
         step = it.step(50).step
         assert step is not None
@@ -74,7 +74,7 @@ def evaluate_stepping(
         if it.at % 1000 == 0:
             progress(f"{it.at} of {steps} steps")
     gc.collect()
-    kept = rss_mb() - before
+    kept = resident_mb() - before
     progress("going back")
     places = np.random.default_rng(seed).integers(BACK + 1, steps, PLACES)
     back, look, branch, same = [], [], [], []
@@ -110,7 +110,7 @@ def missed(figures: dict[str, Any]) -> list[str]:
 
 
 def _stepper(steps: int) -> Stepper:
-    return Stepper(_agent(), ScriptedObservations(_own(seen) for seen in scripted(steps)))
+    return Stepper(_agent(), ScriptedObservations(_own(seen) for seen in moving_ellipses(steps)))
 
 
 def _agent() -> Any:
@@ -135,7 +135,7 @@ def _own(seen: Observation) -> Observation:
 def _slower() -> float:
     """Short blocks with and without take turns, so that what else the machine does meets both."""
     agent, it = _agent(), _stepper((BLOCKS + 1) * BLOCK)
-    frames: Iterator[Observation] = (_own(seen) for seen in scripted((BLOCKS + 1) * BLOCK))
+    frames: Iterator[Observation] = (_own(seen) for seen in moving_ellipses((BLOCKS + 1) * BLOCK))
     alone, stepped = [], []
     for _ in range(BLOCKS + 1):
         block = [next(frames) for _ in range(BLOCK)]
@@ -155,7 +155,7 @@ def _making() -> float:
     taken = []
     for _ in range(5):
         begin = time.process_time()
-        for seen in scripted(BLOCK):
+        for seen in moving_ellipses(BLOCK):
             _own(seen)
         taken.append(time.process_time() - begin)
     return float(np.percentile(taken, 25))

@@ -11,7 +11,7 @@ measured).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,11 @@ from visup.agent import (
 from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.execution.pipeline import in_order, perceive
 from visup.evaluation.simulation.hypotheses import HypothesisSource
-from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, region_from_mask, shaken
+from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, shaken
+from visup.testing import region_of
+
+CONFIDENCE = 0.9
+"""Confidence of a simulated region."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +179,9 @@ class SimulatedSegmenter:
             known = true if frame.time - kept.last < 0.1 else None
             velocity, sigma = kept.velocity(known, self.noise, 1.0 / self.mission.fps)
             number = self._number(names, frame.time)
-            region = region_from_mask(number, mask, velocity=velocity, velocity_sigma=sigma)
+            region = replace(
+                region_of(mask, number, velocity), velocity_sigma=sigma, confidence=CONFIDENCE
+            )
             self.who[region.id] = names
             yield Percept("region", region, frame.time, "truth", region.confidence)
 
