@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import Mind, Observation, Region
 from visup.agent.model.errors import SettingsError
@@ -34,7 +35,9 @@ KEPT_STEPS = 10_000
 LEAST_STEPS = 1000
 BLOCK = 50  # steps made in turn with and without a stepper
 BLOCKS = 12
-PLACES = 30
+VISITS = 30
+WARM = 100
+EVERY = 50  # steps between those whose digests are compared
 
 
 def evaluate_stepping(
@@ -62,40 +65,53 @@ def evaluate_stepping(
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
     progress("by itself and stepped, in turn")
     slower = _slower()
-    it = _stepper(steps + 10)
-    prints: dict[int, bytes] = {}
-    it.step(100)
-    gc.collect()
-    before = resident_mb()
-    while it.at < steps:
-        step = it.step(50).step
-        assert step is not None
-        prints[it.at] = _print(step)
-        if it.at % 1000 == 0:
-            progress(f"{it.at} of {steps} steps")
-    gc.collect()
-    kept = resident_mb() - before
+    stepper = _stepper(steps + 10)
+    digests, grown_mb = _stepped(stepper, steps, progress)
     progress("going back")
-    places = np.random.default_rng(seed).integers(BACK + 1, steps, PLACES)
-    back, look, branch, same = [], [], [], []
-    for place in map(int, places):
-        it.go(place)
-        back.append(_ms(lambda: it.back(BACK)))
-        near = -(-it.at // 50) * 50
-        step = it.go(max(near, 150))
-        same.append(step is not None and _print(step) == prints[it.at])
-        it.go(place)
-        look.append(_ms(partial(it.at_step, place - BACK)))
-        it.back(BACK)
-        branch.append(_ms(lambda: it.branch().step(1)))
-    items = {"back": _times(back), "look": _times(look), "branch": _times(branch)}
+    items, same = _visits(
+        stepper, np.random.default_rng(seed).integers(BACK + 1, steps, VISITS), digests
+    )
     total = {
         "steps": steps,
-        "kept_mb": kept * KEPT_STEPS / (steps - 100),
+        "kept_mb": grown_mb * KEPT_STEPS / (steps - WARM),
         "same": float(np.mean(same)),
         "slower": slower,
     }
     return {"items": items, "total": total}
+
+
+def _stepped(stepper: Stepper, steps: int, progress: Progress) -> tuple[dict[int, bytes], float]:
+    """Digests of every 50th step on the way to the last, and by how much memory grew meanwhile, MB."""
+    digests: dict[int, bytes] = {}
+    stepper.step(WARM)
+    gc.collect()
+    before = resident_mb()
+    while stepper.at < steps:
+        step = stepper.step(EVERY).step
+        assert step is not None
+        digests[stepper.at] = _digest(step)
+        if stepper.at % 1000 == 0:
+            progress(f"{stepper.at} of {steps} steps")
+    gc.collect()
+    return digests, resident_mb() - before
+
+
+def _visits(
+    stepper: Stepper, places: NDArray[np.int64], digests: dict[int, bytes]
+) -> tuple[dict[str, dict[str, float]], list[bool]]:
+    """Times of going back, looking and branching from these steps; whether the steps after are the same."""
+    back, look, branch, same = [], [], [], []
+    for place in map(int, places):
+        stepper.go(place)
+        back.append(_ms(lambda: stepper.back(BACK)))
+        near = -(-stepper.at // EVERY) * EVERY
+        step = stepper.go(max(near, WARM + EVERY))
+        same.append(step is not None and _digest(step) == digests[stepper.at])
+        stepper.go(place)
+        look.append(_ms(partial(stepper.at_step, place - BACK)))
+        stepper.back(BACK)
+        branch.append(_ms(lambda: stepper.branch().step(1)))
+    return {"back": _times(back), "look": _times(look), "branch": _times(branch)}, same
 
 
 def missed(figures: dict[str, Any]) -> list[str]:
@@ -169,7 +185,7 @@ def whole(mind: Mind) -> Mind:
     return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
 
 
-def _print(step: Step) -> bytes:
+def _digest(step: Step) -> bytes:
     return hashlib.sha256(
         frozen((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
     ).digest()

@@ -26,6 +26,8 @@ from visup.evaluation.shape.augment import augmented
 from visup.percepts.shape.building.build import build_database
 from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
+from visup.percepts.shape.silhouette.silhouette import normalise
 
 VIEWS_OF_A_MESH = 16
 SIZES = (1, 10)
@@ -82,7 +84,7 @@ def evaluate_scale(
         counts = [len(base.views) * k for k in SIZES]
         for views in (*counts, *([most] if most > counts[-1] else [])):
             path = Path(scratch) / f"{views}.db"
-            augmented(base, path, views, seed, lambda n, of=views: progress(f"{n} of {of} views"))  # type: ignore[misc]
+            augmented(base, path, views, seed, progress)
             progress(f"queries among {views} views")
             items[f"{views} views"] = _probed(path, masks, exhaustive=views in counts)
             path.unlink()
@@ -121,16 +123,24 @@ def _probed(path: Path, masks: Path, *, exhaustive: bool) -> dict[str, Any]:
 
 def probe(path: Path, masks: Sequence[NDArray[np.bool_]], *, exhaustive: bool) -> dict[str, Any]:
     """Figures of one database; see `evaluate_scale`."""
-    # What is imported when it is first needed is no part of opening or answering.
-    from visup.percepts.shape.matching.shape_similarity import shape_of
-    from visup.percepts.shape.silhouette.silhouette import normalise
-
     shapes = [shape_of(s) for m in masks if (s := normalise(m)) is not None]
     begin = time.perf_counter()
     database = ModelDatabase.open(path)
     opened = time.perf_counter() - begin
     database.query(shapes[0], top=_WANTED)
     first = time.perf_counter() - begin - opened
+    figures = {
+        "open_ms": 1e3 * opened,
+        "first_ms": 1e3 * first,
+        **_query_figures(database, masks),
+        # Kilobytes on Linux; taken before exhaustive search, which looks at everything.
+        "rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return figures | ({"lost": _lost(database, shapes)} if exhaustive else {})
+
+
+def _query_figures(database: ModelDatabase, masks: Sequence[NDArray[np.bool_]]) -> dict[str, float]:
+    """Times from mask to ranked list, and the share of views that was compared."""
     whole, search, spent, compared = [], [], [], []
     for mask in masks:
         begin, busy = time.perf_counter(), time.process_time()
@@ -143,26 +153,27 @@ def probe(path: Path, masks: Sequence[NDArray[np.bool_]], *, exhaustive: bool) -
         whole.append(time.perf_counter() - begin)
         search.append(time.perf_counter() - seen)
         spent.append(time.process_time() - busy)
-    figures = {
-        "open_ms": 1e3 * opened,
-        "first_ms": 1e3 * first,
+    return {
         "ms_query": 1e3 * float(np.median(whole)),
         "ms_search": 1e3 * float(np.median(search)),
         "ms_cpu": 1e3 * float(np.median(spent)),
         "ms_worst": 1e3 * max(whole),
-        # Kilobytes on Linux; taken before exhaustive search, which looks at everything.
-        "rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "compared": float(np.mean(compared)),
     }
-    if exhaustive:
-        some = shapes[:: max(1, round(len(shapes) * len(database.views) / _EXHAUSTIVE))]
-        lost = [
-            database.query(s, top=1).matches[0].view.id
-            != database.query(s, top=1, budget=1.0).matches[0].view.id
-            for s in some
-        ]
-        figures["lost"] = float(np.mean(lost))
-    return figures
+
+
+def _lost(database: ModelDatabase, shapes: Sequence[Shape]) -> float:
+    """Share of exhaustive search's best matches that the index loses; among many views, of a sample."""
+    some = shapes[:: max(1, round(len(shapes) * len(database.views) / _EXHAUSTIVE))]
+    return float(
+        np.mean(
+            [
+                database.query(s, top=1).matches[0].view.id
+                != database.query(s, top=1, budget=1.0).matches[0].view.id
+                for s in some
+            ]
+        )
+    )
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ from visup.agent import (
 )
 from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.execution.pipeline import in_order, perceive
-from visup.evaluation.simulation.hypotheses import HypothesisSource
+from visup.evaluation.simulation.hypotheses import HypothesisSource, NamingNoise
 from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, shaken
 from visup.testing import region_of
 
@@ -229,24 +229,19 @@ class SimulatedRecogniser:
 
     seeing: SimulatedSegmenter
     contract: Contract = field(init=False)
-    _namers: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
+    _sources: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         noise, mission = self.seeing.noise, self.seeing.mission
         self.contract = Contract(
             "truth_names", ("hypothesis", "depth"), ("region",), noise.names_every_s
         )
+        run = max(1.0, noise.wrong_run_s / noise.names_every_s)
+        naming = NamingNoise(noise.wrong, run, noise.listed, noise.depth)
         seeds = np.random.SeedSequence([noise.seed, 2]).spawn(len(mission.truth["labels"]))
         for name, seed in zip(sorted(mission.truth["labels"]), seeds, strict=True):
-            self._namers[name] = HypothesisSource(
-                mission,
-                name,
-                wrong=noise.wrong,
-                run=max(1.0, noise.wrong_run_s / noise.names_every_s),
-                listed=noise.listed,
-                depth=noise.depth,
-                rng=np.random.default_rng(seed),
-            )
+            rng = np.random.default_rng(seed)
+            self._sources[name] = HypothesisSource(mission, name, naming, rng)
 
     def perceive(
         self, frame: Frame, seen: Observation, directives: Sequence[Directive]
@@ -262,7 +257,7 @@ class SimulatedRecogniser:
         names = self.seeing.who[region.id]
         # What two bodies look like together is taken for the larger one, or for anything else.
         name = max(names, key=lambda n: masks[n].visible_px if n in masks else 0)
-        yield from self._namers[name].says(region, index, alone=len(names) == 1)
+        yield from self._sources[name].says(region, index, alone=len(names) == 1)
 
 
 def behaviours_of(
