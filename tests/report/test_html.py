@@ -20,7 +20,8 @@ from tests.report.scene import TOLD, run
 from visup.agent import Event, Severity, Verdict
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report.collector import Collector
-from visup.report.figures import distance_figures, fitted_lines, vote_figures
+from visup.report.distance_figures import distance_figures, fitted_lines
+from visup.report.figures import vote_figures
 from visup.report.html import embedded, plotly_source, report_page, write_report
 from visup.report.records import RunData, StateSpan
 from visup.report.sections import flat, narrative, nearest

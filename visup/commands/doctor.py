@@ -12,7 +12,6 @@ LIBRARIES = {
     "numba": "compiled loops",
     "scipy": "assignment, sparse systems, distances",
     "opencv-python-headless": "reading video, image processing",
-    "scikit-image": "region properties, image metrics",
     "networkx": "task graphs and shock graphs",
     "pillow": "pictures with text",
     "lark": "grammars of tasks and rules",

@@ -10,13 +10,8 @@ from string import Template
 
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report import sections
-from visup.report.figures import (
-    Figure,
-    distance_figures,
-    presence_figure,
-    stage_figure,
-    vote_figures,
-)
+from visup.report.distance_figures import distance_figures
+from visup.report.figures import Figure, presence_figure, stage_figure, vote_figures
 from visup.report.records import RunData
 from visup.report.summary import title_of, verdict_words
 from visup.report.task_trees import courses

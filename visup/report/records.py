@@ -1,4 +1,4 @@
-"""What a report is made of: values only, small enough to keep, made by `data.py`."""
+"""What a report is made of: values only, small enough to keep, made by `collector.py`."""
 
 from __future__ import annotations
 

@@ -23,6 +23,7 @@ from visup.stepping.diff import MindDiff, mind_diff
 from visup.stepping.explanations import questions as asking
 from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import ReasonFinder
+from visup.stepping.explanations.why_not import LastStep
 from visup.stepping.history import LATEST, SPACING, StepHistory
 from visup.stepping.observation_sources import (
     LiveObservations,
@@ -296,7 +297,10 @@ class Stepper(Timeline):
         """
         reasoners = self.agent.reasoners
         every = (*reasoners.update, *reasoners.cogitate, *reasoners.match)
-        return asking.why_not(self.mind, every, text)
+        made = self.at > self.begin
+        before = self.mind_at(self.at - 1) if made else None
+        seen = self.observation_at(self.at) if made else None
+        return asking.why_not(LastStep(self.mind, before, seen, every), text)
 
     def close(self) -> None:
         """Let go of what the agent's behaviours have started."""
