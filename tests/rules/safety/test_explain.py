@@ -281,7 +281,7 @@ def test_the_command_checks_and_lists_rules(tmp_path: Path) -> None:
     bad.write_text('rule q(a): info when sen(a) for 2 px say "{a}"\n')
     fine = CliRunner().invoke(app, ["rules", "check", str(good)])
     assert fine.exit_code == 0
-    assert "r: told 2 s late, at most" in fine.output
+    assert "r: reported 2 s late, at most" in fine.output
     wrong = CliRunner().invoke(app, ["rules", "check", str(good), str(bad)])
     assert "'sen'" in str(wrong.exception)
     assert "'for' wants a time" in str(wrong.exception)
