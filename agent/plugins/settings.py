@@ -8,13 +8,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
 
 Values = dict[str, dict[str, Any]]
 """Name of a behaviour -> its settings."""
 
 
-def validated(model: type | None, values: Mapping[str, Any], name: str) -> object:
+def validate_settings(model: type | None, values: Mapping[str, Any], name: str) -> object:
     """Settings of one behaviour, as its model makes them.
 
     Args:
@@ -96,14 +96,14 @@ def read_settings(path: Path) -> Values:
         )
     if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
         raise SettingsError(
-            "`behaviours` is no table of tables",
+            "`behaviours` is not a table of tables",
             where=str(path),
             expected="[behaviours.NAME] with KEY = VALUE below it",
         )
     return tables
 
 
-def merged(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
+def merge_settings(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
     """Settings in layers; a later one goes over those before it, key by key."""
     names = dict.fromkeys(name for layer in layers for name in layer)
     return {n: {k: v for layer in layers for k, v in layer.get(n, {}).items()} for n in names}
@@ -135,11 +135,11 @@ def _worded(fault: Mapping[str, Any], name: str) -> VisupError:
     wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if fault["type"] == "missing":
         return SettingsError("a setting is missing", where=place, hint=f"--set {place}=VALUE")
-    return SettingsError(f"{fault['input']!r} will not do", where=place, expected=wanted)
+    return SettingsError(f"{fault['input']!r} is not valid", where=place, expected=wanted)
 
 
 def _refuse(faults: list[VisupError]) -> None:
     if len(faults) == 1:
         raise faults[0]
     if faults:
-        raise ManyErrors(faults)
+        raise ErrorGroup(faults)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 
-from visup.agent.model.errors import Place, RuleError
+from visup.agent.model.errors import RuleError, SourceLocation
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,
@@ -82,7 +82,7 @@ class TypeChecker:
     def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
         """A fault as an error with its line."""
         line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
-        where = Place(self.file, span.line, span.column, line, span.length)
+        where = SourceLocation(self.file, span.line, span.column, line, span.length)
         return RuleError(what, where=where, expected=expected, hint=hint)
 
     def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:
@@ -122,9 +122,7 @@ class TypeChecker:
                 yield rule.span, f"'{word}' is a word of the language", "another name", None
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
-                what = (
-                    f"the sentence of '{rule.name}' mentions '{word}', which is no variable of it"
-                )
+                what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
                 yield rule.span, what, _listed((*rule.variables, "is")), None
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:

@@ -41,7 +41,8 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.relation_columns import Cells, Columns
+from visup.agent.model.memory import MemoryKey
+from visup.agent.model.relation_columns import ColumnLayout, RelationBlock
 from visup.rules.geometry._fit_jit import binned_trends
 from visup.rules.geometry.ema import new_share
 from visup.rules.geometry.hysteresis import UNKNOWN, Codes, HysteresisState, advance, unknown_states
@@ -77,7 +78,6 @@ from visup.rules.relations.samples import SampleWindow, covers_window, sampled
 from visup.rules.relations.thresholds import AWAY, BOX_ROWS, ORDER, SIDE, least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 
-RELATIONS = "rules.relations"
 DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
 TOWARDS_NAMES = ("moving_towards", "steady_to", "moving_away_from")
 SIDE_NAMES = ("moving_left_of", "", "moving_right_of")
@@ -106,7 +106,7 @@ ROWS = BOX_ROWS + 7
 """Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
 
 _SURE, _MOSTLY, _TREND, _GAP, _RATE, _SIGMA, _RELATIVE = range(7)
-COLUMNS = Columns(
+COLUMNS = ColumnLayout(
     (
         Column(TREND_NAMES, (0, 0), _TREND, _RATE, _SIGMA),
         Column(("", "touching"), (1, 1), _MOSTLY, _GAP),
@@ -164,12 +164,12 @@ class RelationMemory:
     smooth: SmoothedGeometry = field(default_factory=lambda: _no_smooth())
 
 
-EMPTY_MEMORY = RelationMemory()
+RELATIONS = MemoryKey("rules.relations", RelationMemory())
 
 
 def kinematics(mind: Mind) -> Kinematics:
     """The quantities of the last step, as `RelationReasoner` left them in the mind."""
-    kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
+    kept = mind.recall(RELATIONS)
     return kept.measured
 
 
@@ -193,7 +193,7 @@ def related(mind: Mind, name: str, a: int, b: int) -> Truth:
 
 def qtc(mind: Mind, a: int, b: int) -> str | None:
     """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
-    kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
+    kept = mind.recall(RELATIONS)
     k, turned = RelationTable(kept.history.ids).pair(a, b)
     if k < 0:
         return None
@@ -215,7 +215,7 @@ class RelationReasoner:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         s = self.settings
-        kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
+        kept = mind.recall(RELATIONS)
         objects = mind.present()
         before = _reindexed_memory(kept, tuple(b.id for b in objects), mind.time)
         history = sampled(kept.history, objects, mind, observation, s.window_s, s.samples)
@@ -326,7 +326,7 @@ class RelationReasoner:
         codes[at] = found
         return codes
 
-    def _cells(self, kept: RelationMemory, mind: Mind) -> Cells:
+    def _cells(self, kept: RelationMemory, mind: Mind) -> RelationBlock:
         s, now = self.settings, kept.measured
         floor = s.rate_enter * image_diagonal(mind.frame_size) / 3.0
         found = relation_rows(
@@ -340,7 +340,7 @@ class RelationReasoner:
             DIRECTION_CONVERSE,
             (mind.time, s.image_only_confidence, floor),
         )
-        return Cells(COLUMNS, *found)
+        return RelationBlock(COLUMNS, *found)
 
 
 PairLimits = tuple[

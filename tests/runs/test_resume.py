@@ -18,7 +18,7 @@ from tests.percepts.video.test_live_source import FakeCapture
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
-from visup.agent.storage.codec import packed
+from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
@@ -58,7 +58,7 @@ def outcome(folder: Path) -> object:
     run = Recording.open(folder)
     facts = run.facts()
     told = (folder / "events.jsonl").read_bytes(), facts["verdict"], facts["steps"]
-    return told, list(run.summaries()), [packed(o) for o in run.observations()]
+    return told, list(run.summaries()), [pack_observation(o) for o in run.observations()]
 
 
 def test_killed_runs_that_are_resumed_equal_an_unbroken_one() -> None:
@@ -83,7 +83,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     assert (past.state is not None) == (state == "kept")
     result = supervise(past.settings, parts, options=options, past=past)
     assert outcome(parts) == outcome(whole)
-    assert any("looked at again" in n for n in result.notes) == (state != "kept")
+    assert any("perceived again" in n for n in result.notes) == (state != "kept")
     assert any("check sum" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is over"):
         interrupted_run(parts)
@@ -287,7 +287,7 @@ def test_a_camera_run_goes_on_with_new_numbers_and_later_times(
     assert before_ids
     assert after_ids
     assert min(after_ids) > max(before_ids)
-    assert any("not seen" in n for n in result.notes)
+    assert any("Nothing was seen in between" in n for n in result.notes)
 
 
 def times(*given: float) -> Iterator[Frame]:

@@ -37,8 +37,8 @@ def plug(does: Does, **declared: Any) -> type:
         def __init__(self) -> None:
             self.kept: list[Any] = []
 
-        def perceive(self, frame: Any, seen: Any, directives: Any) -> Any:
-            return [self.contract.percept(frame, does(self, frame, seen))]
+        def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
+            return [self.contract.percept(frame, does(self, frame, observation))]
 
     return Plug
 
@@ -65,7 +65,7 @@ CHEATS: dict[str, tuple[type, str]] = {
     "keeps": (plug(keep), "percepts of earlier frames changed later"),
     "chance": (plug(lambda s, f, seen: next(TICKET)), "is deterministic: a second run"),
     "slow": (plug(lambda s, f, seen: time.sleep(0.01), cost_ms=5), "keeps its budget: "),
-    "unknown need": (plug(lambda s, f, seen: 0, needs=("smell",)), "know nothing of 'smell'"),
+    "unknown need": (plug(lambda s, f, seen: 0, needs=("smell",)), "have no 'smell'"),
 }
 
 
@@ -83,7 +83,7 @@ class Held:
     def __init__(self) -> None:
         self.held = (n for n in range(3))
 
-    def perceive(self, frame: Any, seen: Any, directives: Any) -> Any:
+    def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
         return ()
 
 

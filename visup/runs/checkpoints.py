@@ -11,7 +11,7 @@ from typing import Any
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
-from visup.agent.storage.checkpoint import StateError, frozen, thawed
+from visup.agent.storage.checkpoint import StateError, dump_state, load_state
 from visup.version import __version__
 
 CHECKPOINT = "state.bin"
@@ -69,7 +69,7 @@ class CheckpointWriter:
         try:
             data = self._frozen(agent, step, kept())
         except StateError as fault:
-            self.note = f"no state of this run is kept ({fault}): resuming it looks at all again"
+            self.note = f"no checkpoint of this run is kept ({fault}): resuming it perceives all frames again"
             return
         self.largest = max(self.largest, len(data))
         self._writing = self._disk.submit(_replace, self._path, data)
@@ -82,7 +82,7 @@ class CheckpointWriter:
         state = agent.save()
         if state["behaviours"] is None:
             raise StateError("a behaviour has no save and load")
-        return frozen(
+        return dump_state(
             {
                 "visup": __version__,
                 "frame_index": step.frame_index,
@@ -99,9 +99,9 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
         It, or None when there is none that can be used, and then why, when there is one.
     """
     try:
-        told = thawed((folder / CHECKPOINT).read_bytes())
+        told = load_state((folder / CHECKPOINT).read_bytes())
         if told["visup"] != __version__:
-            return None, f"its state is of visup {told['visup']}"
+            return None, f"its checkpoint is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None
     except FileNotFoundError:
         return None, None

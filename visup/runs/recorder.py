@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from visup.agent import Concern, Frame, Severity, TaskBelief
+from visup.agent import AlertCondition, Frame, Severity, TaskBelief
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.model.step import Step
-from visup.agent.storage.journal import Journal, Limits
+from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.percepts.video import VideoSource
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.tasks import load_tasks
@@ -68,14 +69,14 @@ class Recorder:
 
         self.folder = folder
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
-        self.journal = Journal(folder / JOURNAL, Limits(keep_bytes=keep), resume=resume)
+        self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
         self.facts: dict[str, Any] = {
             "visup": __version__,
             "source": source.name,
             "fps": source.fps,
             "size": source.size,
             "live": source.live,
-            "settings": plain(settings),
+            "settings": to_jsonable(settings),
         }
         if not resume:
             self.journal.note(**self.facts)
@@ -106,11 +107,11 @@ class Recorder:
         """Take note of a step that the journal holds already."""
         self._derive(step, frame, ["report"])
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with recording now."""
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
-            yield Concern(
+            yield AlertCondition(
                 "not_recorded",
                 (),
                 Severity.WARNING,
@@ -196,13 +197,17 @@ class Recorder:
         return path
 
     def _run_data(self, result: RunResult) -> RunData:
-        return self.collector.finish(
+        collected = self.collector.finish(
             result.verdict,
             self.facts,
             problem=result.problem,
             notes=self.notes,
             courses=self._courses,
         )
+        videos = self.folder.glob("annotated*.webm")
+        # In the order of writing: `annotated.webm`, `annotated-2.webm`, ...
+        names = sorted((path.name for path in videos), key=lambda name: (len(name), name))
+        return replace(collected, videos=tuple(names))
 
 
 def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:

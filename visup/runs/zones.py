@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import VisupError, Zone
-from visup.agent.model.errors import ManyErrors, SettingsError
+from visup.agent.model.errors import ErrorGroup, SettingsError
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _KEYS = ("name", "polygon", "depth")
@@ -42,7 +42,7 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
         except SettingsError as fault:
             faults.append(fault)
     if len(faults) > 1:
-        raise ManyErrors(faults)
+        raise ErrorGroup(faults)
     if faults:
         raise faults[0]
     return tuple(zones)
@@ -71,7 +71,7 @@ def _entries(path: Path) -> list[Any]:
 
 def _zone(entry: object, where: str) -> Zone:
     if not isinstance(entry, dict):
-        raise SettingsError("this is no zone", where=where, expected=_EXAMPLE)
+        raise SettingsError("this is not a zone", where=where, expected=_EXAMPLE)
     strange = next((key for key in entry if key not in _KEYS), None)
     if strange is not None:
         raise SettingsError(

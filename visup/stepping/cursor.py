@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from visup.agent import Observation, Outcome
 from visup.agent.contract.phases import Phase, Snapshot
-from visup.agent.model.notebook import showing
+from visup.agent.model.display import enable_display
 from visup.agent.model.step import Step
 from visup.stepping.history import StepHistory
 
@@ -56,13 +56,13 @@ class Bookmark:
 
     Attributes:
         number: How many steps led there.
-        was: What the agent was.
-        course: The history that it belongs to.
+        snapshot: What the agent was.
+        history: The history that it belongs to.
     """
 
     number: int
-    was: Snapshot
-    course: StepHistory = field(repr=False)
+    snapshot: Snapshot
+    history: StepHistory = field(repr=False)
 
 
-showing(PausedStep, StepResult)
+enable_display(PausedStep, StepResult)

@@ -28,7 +28,7 @@ from visup.agent import (
 )
 from visup.agent.cycle.agent import Reasoners
 from visup.agent.model.mind import UNKNOWN_OBJECT
-from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
+from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.formula.nodes import Rule
 from visup.rules.safety.reasoner import RuleReasoner
 from visup.tasks.supervision.supervise import MEMORY, task_reasoner
@@ -143,9 +143,7 @@ def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> R
     def wrapped(some: tuple[Reasoner, ...]) -> tuple[Reasoner, ...]:
         return tuple(AssumingReasoner(t, tuple(beliefs)) for t in some)
 
-    return Reasoners(
-        wrapped(reasoners.update), wrapped(reasoners.cogitate), wrapped(reasoners.match)
-    )
+    return Reasoners(*(wrapped(some) for _, some in reasoners.by_phase()))
 
 
 def with_rules(reasoners: Reasoners, rules: Sequence[Rule]) -> Reasoners:
@@ -164,7 +162,7 @@ def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
 
 def without_tasks(mind: Mind) -> Mind:
     """The mind as if no task had been supervised yet."""
-    memory = {k: v for k, v in mind.memory.items() if k != MEMORY}
+    memory = {k: v for k, v in mind.memory.items() if k != MEMORY.name}
     return replace(mind, tasks=(), memory=MappingProxyType(memory))
 
 
@@ -190,7 +188,7 @@ def _others(relations: Iterable[Relation], told: Relation) -> tuple[Relation, ..
     return tuple(r for r in relations if r.name != told.name or frozenset(r.objects) != who)
 
 
-def _with_cell(cells: Cells, told: Relation, row: int, k: int) -> Cells:
+def _with_cell(cells: RelationBlock, told: Relation, row: int, k: int) -> RelationBlock:
     column, code = cells.columns.named[told.name]
     if told.truth is Truth.UNKNOWN:
         code = UNKNOWN_CODE
@@ -205,4 +203,4 @@ def _with_cell(cells: Cells, told: Relation, row: int, k: int) -> Cells:
     numbers[-1, k] = told.confidence
     own = replace(column, confidence=len(numbers) - 1)
     each = tuple(own if c is column else c for c in cells.columns.each)
-    return Cells(Columns(each), state, since, numbers)
+    return RelationBlock(ColumnLayout(each), state, since, numbers)

@@ -2,7 +2,7 @@
 
 `shown(record)` gives what rich prints; `html(record)` the same for Jupyter. The records of `visup.agent`
 know nothing of it: they are shown so when they are printed with rich or stand last in a notebook's
-cell, once `visup.terminal.display` can be imported (see `visup/agent/model/notebook.py`).
+cell, once `visup.terminal.display` can be imported (see `visup/agent/model/display.py`).
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def _in_words(record: Any) -> RenderableType:
 def _step_in_words(record: Step) -> RenderableType:
     head = Text(f"step of frame {record.frame_index}, {record.time:.2f} s", style="bold")
     told: list[RenderableType] = [event_row(e) for e in worded_once(record.events)]
-    told = told or [Text("nothing was told", style="dim")]
+    told = told or [Text("no events", style="dim")]
     asked = [shown(d) for d in record.directives]
     return Group(head, *told, objects_table(record.mind.objects.values()), *asked)
 
@@ -133,7 +133,9 @@ def _(record: Mind) -> RenderableType:
     parts += [alerts_list(record.alerts)] if record.alerts else []
     parts += [questions_list(record.questions)] if record.questions else []
     if record.unknown:
-        parts.append(Text(f"not known now: {', '.join(sorted(record.unknown))}", style="yellow"))
+        parts.append(
+            Text(f"currently unknown: {', '.join(sorted(record.unknown))}", style="yellow")
+        )
     return Group(*parts)
 
 

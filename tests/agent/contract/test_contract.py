@@ -7,16 +7,16 @@ import pytest
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Contract
 from visup.agent.contract.contract import CONTRACT_VERSION, MOST_HISTORY
-from visup.agent.execution.pipeline import in_order
+from visup.agent.execution.pipeline import ordered_slots
 from visup.agent.model.errors import BehaviourError
 
 
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"name": ""}, "no name for a behaviour"),
-        ({"name": "two words"}, "no name for a behaviour"),
-        ({"name": 3}, "no name for a behaviour"),
+        ({"name": ""}, "not a valid name for a behaviour"),
+        ({"name": "two words"}, "not a valid name for a behaviour"),
+        ({"name": 3}, "not a valid name for a behaviour"),
         ({"gives": ()}, "at least one kind"),
         ({"gives": "lamp"}, r"a tuple of one has a comma: gives=\('lamp',\)"),
         ({"gives": ("lamp", 3)}, "a tuple of words"),
@@ -55,4 +55,4 @@ def test_a_contract_makes_percepts_of_its_own() -> None:
 
 def test_what_needs_only_what_it_gives_itself_is_refused() -> None:
     with pytest.raises(BehaviourError, match="which no behaviour but itself gives"):
-        in_order([Scripted("eye", ("x",), needs=("x",))])
+        ordered_slots([Scripted("eye", ("x",), needs=("x",))])

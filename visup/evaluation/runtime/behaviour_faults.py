@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -26,8 +26,9 @@ import numpy as np
 from visup.agent import Contract, Depth, Health, HealthStatus, Hypothesis
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.model.records import BROKEN, ReportState
+from visup.agent.model.records import FAULT_STATES, ReportState
 from visup.agent.model.step import Step
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
@@ -74,14 +75,14 @@ def evaluate_faults(
     *,
     count: int = COUNT,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Inject faults, one a run.
 
     Args:
         count: How many; they go round the kinds of fault.
         seed: Of all that is drawn.
-        progress: Told what is tried.
+        progress: Shows what is being done.
 
     Returns:
         `items` by kind of fault and `total`, with the keys `trials`, `isolated`, `ended`,
@@ -91,8 +92,7 @@ def evaluate_faults(
     trials = []
     for number in range(count):
         trial = draw(number, seed)
-        if progress:
-            progress(f"{number + 1} of {count}, {trial.fault}")
+        progress(f"{number + 1} of {count}, {trial.fault}")
         run(trial)
         trials.append(trial)
     names = [name for name in FAULTS if any(t.fault == name for t in trials)]
@@ -163,7 +163,7 @@ def _watch(trial: BehaviourFaultTrial, agent: Agent) -> None:
 
 def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
     """Look for what is taken for known in one step although it is unknown."""
-    broken = _report(step).state in BROKEN
+    broken = _report(step).state in FAULT_STATES
     if broken and (trial.kind not in step.mind.unknown or step.observation.observed(trial.kind)):
         trial.problems.append(f"unknown: '{trial.kind}' counts as observed")
     if broken and not _told(step):
@@ -184,7 +184,7 @@ def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
 
 def _told(step: Step) -> bool:
     open_now = any(a.kind == "behaviour_failed" and a.key == "culprit" for a in step.mind.alerts)
-    return open_now and _report(step).state in BROKEN
+    return open_now and _report(step).state in FAULT_STATES
 
 
 def _report(step: Step) -> Any:
