@@ -15,7 +15,7 @@ from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 from visup.agent.model.errors import ManyErrors, Place, RuleError, VisupError
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.transform import read_tree
-from visup.rules.language.typecheck import Checker
+from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
 
 _HEAD = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
@@ -60,7 +60,7 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         ManyErrors: It has several; each rule is read by itself, so that one syntax fault in a rule
             hides nothing of the others.
     """
-    checker = Checker(text, file)
+    checker = TypeChecker(text, file)
     errors: list[VisupError] = []
     rules: list[Rule] = []
     sound: list[Rule] = []
@@ -98,7 +98,7 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
         tree = _parser().parse(text, start="formula")
     except UnexpectedInput as fault:
         raise _syntax_error(fault, text, file) from None
-    checker = Checker(text, file, vocabulary)
+    checker = TypeChecker(text, file, vocabulary)
     found, faults = read_tree(tree, file)
     raise_all([checker.fault(*f) for f in faults] or list(checker.formula(found)))
     return cast("Formula", found)

@@ -84,7 +84,7 @@ CODES = {
 """Every code with what it stands for; a code never changes its meaning."""
 
 
-class TaskFault(TaskError):
+class Diagnostic(TaskError):
     """A mistake in a task file.
 
     Args:
@@ -150,9 +150,9 @@ class Source:
         span: Span,
         expected: str | None = None,
         hint: str | None = None,
-    ) -> TaskFault:
+    ) -> Diagnostic:
         """A fault at the place of a node."""
-        return TaskFault(code, what, self.at(span), expected=expected, hint=hint)
+        return Diagnostic(code, what, self.at(span), expected=expected, hint=hint)
 
     def _line(self, line: int) -> str:
         return self._lines[line - 1].rstrip("\r")

@@ -18,12 +18,12 @@ from visup.agent.model.mind import Pose, Spin, Zone
 from visup.cli import app
 from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.predicates.snapshot import Facts
+from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
 from visup.rules.reasoners import default_reasoners
 from visup.rules.relations.zones import ZoneReasoner
-from visup.rules.safety.explain import Explanation
-from visup.rules.safety.queries import choices, explain, values_of
+from visup.rules.safety.explain import RuleExplanation
+from visup.rules.safety.queries import evaluation_of, explain, object_choices
 from visup.rules.safety.reasoner import SAFETY, RuleReasoner
 
 NOTHING = Observation(0, 0.0, (640, 480))
@@ -61,7 +61,7 @@ def test_a_verdict_is_explained_down_to_its_facts() -> None:
     assert explain(mind, "collision_course", 1, 2).verdict is not told.verdict
 
 
-def nodes(one: Explanation) -> Iterator[Explanation]:
+def nodes(one: RuleExplanation) -> Iterator[RuleExplanation]:
     yield one
     for part in one.parts:
         yield from nodes(part)
@@ -73,10 +73,10 @@ def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
         mind = mind if memory is None else mind.remember(SAFETY, memory)
         outcome = reasoner(mind, NOTHING)
         memory = outcome.mind.memory[SAFETY]
-    values = values_of(outcome.mind)
+    values = evaluation_of(outcome.mind)
     raised = {(rule.name, ids) for rule, ids in values.true()}
     for rule in values.prepared.rules:
-        for ids in choices(values, rule):
+        for ids in object_choices(values, rule):
             told = explain(outcome.mind, rule.name, *ids)
             assert (told.verdict == "true") == ((rule.name, ids) in raised)
             assert all(low <= high for low, high in (n.interval for n in nodes(told)))
@@ -142,7 +142,7 @@ def test_objects_are_distinct_unless_they_may_repeat() -> None:
 def values_for(text: str) -> set[tuple[int, ...]]:
     rules = parse_rules(text)
     outcome = RuleReasoner(rules)(MIND, NOTHING)
-    return {ids for _, ids in values_of(outcome.mind).true()}
+    return {ids for _, ids in evaluation_of(outcome.mind).true()}
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_contact_is_told_where_depths_agree_and_no_task_brought_the_two_together
 
 def test_facts_of_pairs_stand_in_the_order_of_their_objects() -> None:
     mind = watched()[-1].mind
-    facts = Facts(mind)
+    facts = Snapshot(mind)
     assert facts.ids == (1, 2)
     assert facts.related("converging").tolist() == [[-1, 1], [1, -1]]
     soonest, latest = RULES.quantities["time_to_contact"].look(facts)

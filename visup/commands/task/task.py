@@ -31,7 +31,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     """Tell every mistake of some task files; exit code 2 when there is any."""
     from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
     from visup.tasks.actions.actions import ALL_PERCEPTS
-    from visup.tasks.checks.examine import examine
+    from visup.tasks.checks.diagnose import diagnose
     from visup.tasks.checks.files import read_text
 
     odd = set(without or ()) - ALL_PERCEPTS
@@ -41,7 +41,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     found: dict[str, list[VisupError]] = {}
     for file in files:
         try:
-            faults = examine(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
+            faults = diagnose(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
             found[file] = [*faults]
         except VisupError as e:
             found[file] = [e]
@@ -183,14 +183,14 @@ def laid_out(text: str, file: str) -> str:
         TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
         ManyErrors: The same, for several reasons.
     """
-    from visup.tasks.checks.examine import raise_all
+    from visup.tasks.checks.diagnose import raise_all
     from visup.tasks.diagnostics.diagnostic import Source
-    from visup.tasks.diagnostics.normalise import clean
+    from visup.tasks.diagnostics.normalise import normalise
     from visup.tasks.diagnostics.recovery import parse
     from visup.tasks.tools.formatter import formatted
 
     source = Source(text, file)
-    code, odd = clean(text, source)
+    code, odd = normalise(text, source)
     raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
     return formatted(text)
 

@@ -31,8 +31,8 @@ from visup.agent.model.step import Step
 from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.predicates.inputs_missing import inputs
-from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
+from visup.rules.predicates.inputs_missing import percepts_read
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.reasoners import default_reasoners
 from visup.testing import LabelledFrame, Scripted, crossing
 
@@ -175,7 +175,7 @@ def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
             return  # no rule was read in this step
         word = alert.kind.removeprefix(PROBE).rpartition("_")[0]
         fresh = alert.updated == step.time
-        if alert.kind.startswith(PROBE) and fresh and unknown & inputs(word):
+        if alert.kind.startswith(PROBE) and fresh and unknown & percepts_read(word):
             trial.problems.append(f"fine: {alert.kind} holds while {sorted(unknown)} is unknown")
     for alert in step.alerts:
         if alert.closed is not None and unknown.intersection(alert.needs):
@@ -195,7 +195,7 @@ def _report(step: Step) -> Any:
 def probes() -> tuple[Rule, ...]:
     """Two rules for each word: one is true when the word is, the other when its negation is."""
     lines = []
-    for name, word in WORDS.items():
+    for name, word in PREDICATES.items():
         lines += _pair(name, word.takes, "{call}", "not {call}")
     for name, quantity in QUANTITIES.items():
         one = f"1 {quantity.unit}"

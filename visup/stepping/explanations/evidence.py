@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from visup.agent import Depth, Hypothesis, Observation, Percept, Region
 from visup.agent.model.notebook import showing
-from visup.rules.safety.explain import Explanation
+from visup.rules.safety.explain import RuleExplanation
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Why:
         return "\n".join(self.lines())
 
 
-def explanation_tree(explained: Explanation) -> Why:
+def explanation_tree(explained: RuleExplanation) -> Why:
     """What the rule language explains, as a tree of reasons."""
     return Why(explained.line(), tuple(explanation_tree(p) for p in explained.parts))
 
