@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 
-from visup.agent.model.errors import Place, RuleError
+from visup.agent.model.errors import RuleError, SourceLocation
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,
@@ -82,7 +82,7 @@ class TypeChecker:
     def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
         """A fault as an error with its line."""
         line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
-        where = Place(self.file, span.line, span.column, line, span.length)
+        where = SourceLocation(self.file, span.line, span.column, line, span.length)
         return RuleError(what, where=where, expected=expected, hint=hint)
 
     def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:
