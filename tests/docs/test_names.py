@@ -6,6 +6,7 @@ import re
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,7 +39,7 @@ def missing_name(dotted: str) -> bool:
                 continue
         except ModuleNotFoundError:
             continue
-        found = import_module(module)
+        found: Any = import_module(module)
         for name in parts[end:]:
             if not hasattr(found, name) and name not in getattr(found, "__annotations__", {}):
                 return True
