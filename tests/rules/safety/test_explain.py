@@ -14,7 +14,8 @@ from tests.rules.safety.test_reasoner import NAMES, believed
 from tests.rules.scenes import box_region, seen
 from visup.agent import Binding, Expectation, Mind, Observation, Outcome, TaskBelief, Verdict
 from visup.agent.model.errors import RuleError
-from visup.agent.model.mind import Pose, Spin, Zone
+from visup.agent.model.mind import Zone
+from visup.agent.model.object_beliefs import Pose, Spin
 from visup.cli import app
 from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
