@@ -61,6 +61,13 @@ def extended(
     return backpointer
 
 
+def steps_behind(backpointer: Backpointer | None) -> Iterator[TaskStep]:
+    """The steps that lie behind, the last first, as far as they are remembered."""
+    while backpointer is not None:
+        yield backpointer.step
+        backpointer = backpointer.before
+
+
 def _cut(backpointer: Backpointer, most: int) -> Backpointer:
     before = None if backpointer.before is None or most <= 1 else _cut(backpointer.before, most - 1)
     return replace(backpointer, before=before)

@@ -17,8 +17,14 @@ from typing import Any
 
 from visup.evaluation.oracles import oracle
 from visup.tasks.automaton.automaton import END
+from visup.tasks.automaton.hidden_phases import (
+    ActionEvidence,
+    ActionKey,
+    HiddenFilter,
+    HiddenPosterior,
+    hidden_filter,
+)
 from visup.tasks.automaton.stage_hmm import ActionStatus, StageHmm
-from visup.tasks.automaton.task_filter import ActionEvidence, ActionKey, TaskFilter, TaskPosterior
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import read
 
@@ -75,7 +81,7 @@ def _compare(rng: random.Random, seed: int, result: Agreement) -> None:
     rules, model = draw.rules(), drawn_process(rng)
     stream = draw.stream(LONGEST)
     oracle = recognition_oracle.Oracle(rules, model)
-    recogniser = TaskFilter(read(recognition_tasks.text_of(rules)), model, most=10**9, least=0.0)
+    recogniser = hidden_filter(read(recognition_tasks.text_of(rules)), model, most=10**9, least=0.0)
     belief = recogniser.start()
     result.grammars += 1
     for (dt, seen), truth in zip(stream, oracle.told(stream, MOST_HISTORIES), strict=False):
@@ -142,7 +148,7 @@ def play(
         wrong: Share of verdicts that are wrong: each of the two others alike.
         most: No more than so many steps, whether or not the task is over.
     """
-    automaton = TaskFilter(task).automaton
+    automaton = hidden_filter(task).automaton
     keys = sorted(
         {(s.action, s.actors) for n in automaton.explored(10**6) for s in automaton.steps(n)}
     )
@@ -196,7 +202,7 @@ def follow(stages: int, seed: int, mean_s: float) -> Followed:
     rng = random.Random(seed)
     task = read(recognition_tasks.large_task(stages, rng))
     played = play(task, rng, mean_s)
-    pruned, whole = TaskFilter(task), TaskFilter(task, most=10**9, least=0.0)
+    pruned, whole = hidden_filter(task), hidden_filter(task, most=10**9, least=0.0)
     told = list(_beliefs(pruned, played))
     said = [pruned.ranking(b) for b in told]
     # Without pruning every place is worked out at every step, which takes a while.
@@ -206,14 +212,14 @@ def follow(stages: int, seed: int, mean_s: float) -> Followed:
     return Followed(
         right=sum(r[0][0] == s for r, s in zip(said, played.stages, strict=True)) / count,
         steps=count,
-        kept=statistics.fmean(len(b.states) for b in told),
+        kept=statistics.fmean(len(b.hypotheses) for b in told),
         lost=told[-1].lost,
         differs=sum(r[0][0] != s for r, s in zip(said, exact, strict=False)) / len(exact),
         dropped_truth=sum(s not in dict(r) for r, s in zip(said, played.stages, strict=True)),
     )
 
 
-def _beliefs(recogniser: TaskFilter, played: Played) -> Iterator[TaskPosterior]:
+def _beliefs(recogniser: HiddenFilter, played: Played) -> Iterator[HiddenPosterior]:
     belief = recogniser.start()
     for i, seen in enumerate(played.seen):
         belief = recogniser.step(belief, seen, FRAME_S if i else 0.0)
@@ -228,7 +234,7 @@ def speed(stages: int, seed: int = 0, steps: int = 2_000) -> float:
     rng = random.Random(seed)
     task = read(recognition_tasks.large_task(stages, rng))
     seen = play(task, rng, 4.0, most=steps).seen[:steps]
-    recogniser = TaskFilter(task)
+    recogniser = hidden_filter(task)
     begin = time.process_time()
     belief = recogniser.start()
     for i, now in enumerate(seen):
@@ -240,7 +246,7 @@ def speed(stages: int, seed: int = 0, steps: int = 2_000) -> float:
 def speed_unsure(stages: int, steps: int = 200) -> float:
     """Steps per second when nothing at all is seen of rows of ten stages, one of which is taken."""
     rows = [" ".join(f"act_{i}(x)" for i in range(n, n + 10)) for n in range(0, stages, 10)]
-    recogniser = TaskFilter(read(f"<t> ::= {' | '.join(rows)}"))
+    recogniser = hidden_filter(read(f"<t> ::= {' | '.join(rows)}"))
     belief = recogniser.start()
     begin = time.process_time()
     for i in range(steps):
