@@ -138,7 +138,8 @@ class MonitoredPhases:
         if len(posterior.hypotheses) == 1:
             return
         since, until = posterior.time - self.hmm.look_s, now - self.hmm.look_s
-        for step in dict.fromkeys(s for node in posterior.hypotheses for s in self._due(node)):
+        nodes = dict.fromkeys(w.value.node for w in posterior.hypotheses.values())
+        for step in dict.fromkeys(s for node in nodes for s in self._due(node)):
             held_by = observe(step).held_by
             if held_by is not None and since < held_by.since <= until:
                 yield step, held_by
@@ -180,7 +181,9 @@ class MonitoredPhases:
 
     def next_stages(self, key: int, hypothesis: TaskHypothesis) -> Mapping[str, float]:
         """See `TaskModel`."""
-        return {} if hypothesis.finished is not None else self.prognosis.next_stages(key)
+        return (
+            {} if hypothesis.finished is not None else self.prognosis.next_stages(hypothesis.node)
+        )
 
     def success(self, key: int, hypothesis: TaskHypothesis) -> float:
         """See `TaskModel`; a course of which a stage has failed for good has no success."""

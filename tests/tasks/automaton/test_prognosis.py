@@ -103,7 +103,7 @@ def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> 
     assert played.last.tasks[0].current == "approach"
     taken = [e for e in played.events if e.kind == "stage_revised"]
     assert [e.data["stage"] for e in taken] == ["approach"]
-    assert "told done at 5." in taken[0].text
+    assert "reported complete at 5." in taken[0].text
     assert "is now believed not to have happened" in taken[0].text
     assert not [e for e in watch(*SUCCEEDS).events if e.kind == "stage_revised"]
 
@@ -122,7 +122,7 @@ def test_prospects_are_said_in_one_line() -> None:
     said = prospects_text(belief(played, 6.0))
     assert said.startswith("next: `captured` (")
     assert "ends well with a probability of 8" in said
-    assert prospects_text(TaskBelief("t", Verdict.UNKNOWN)) == "next: not known"
+    assert prospects_text(TaskBelief("t", Verdict.UNKNOWN)) == "next: unknown"
 
 
 def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:

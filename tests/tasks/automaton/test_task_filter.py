@@ -194,8 +194,8 @@ def test_what_later_evidence_overturns_is_taken_back() -> None:
     beliefs = followed(recogniser, "aaaaabbb" + "a" * 12, among="ab")
     taken = taken_back(beliefs)
     assert [r.step.stage for r in taken] == ["one"]
-    assert 1.0 < taken[0].told < taken[0].revised
-    assert "`one`, told done at" in str(taken[0])
+    assert 1.0 < taken[0].reported < taken[0].revised
+    assert "`one`, reported complete at" in str(taken[0])
     assert "now believed not to have happened" in str(taken[0])
     steady = followed(hidden_filter(read(task)), "bbbbbbccccc")
     assert not taken_back(steady)
