@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.runs.demo import demo_settings
 
 if __name__ == "__main__":

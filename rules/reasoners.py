@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from visup.agent import Reasoner
-from visup.rules.coupling.coupling import Couple, CouplingSettings
+from visup.rules.coupling.reasoner import CouplingReasoner, CouplingSettings
 from visup.rules.formula.nodes import Rule
-from visup.rules.identity.depth import BelieveDepth, DepthSettings
-from visup.rules.identity.questions import Ask, QuestionSettings
-from visup.rules.identity.votes import Votes, VoteSettings
+from visup.rules.identity.depth import DepthReasoner, DepthSettings
+from visup.rules.identity.questions import QuestionReasoner, QuestionSettings
+from visup.rules.identity.votes import IdentityReasoner, VoteSettings
 from visup.rules.language.parser import shipped_rules
-from visup.rules.pose.reasoner import BelievePose, PoseSettings
-from visup.rules.presence.association import ObjectSettings, UpdateObjects
-from visup.rules.presence.lifecycle import PresenceSettings, SeePresence
+from visup.rules.pose.reasoner import PoseReasoner, PoseSettings
+from visup.rules.presence.association import ObjectReasoner, ObjectSettings
+from visup.rules.presence.reasoner import PresenceReasoner, PresenceSettings
 from visup.rules.relations.kinematics import RelationSettings
-from visup.rules.relations.reasoner import Relations
-from visup.rules.relations.zones import SeeZones, ZoneSettings
+from visup.rules.relations.reasoner import RelationReasoner
+from visup.rules.relations.zones import ZoneReasoner, ZoneSettings
 from visup.rules.safety.reasoner import RuleReasoner
-from visup.rules.wording.relation_events import NarrativeSettings, TellRelations
+from visup.rules.wording.relation_events import RelationEventReasoner, RelationEventSettings
 
 
 @dataclass(frozen=True, slots=True)
-class RuleSettings:
+class ReasonerSettings:
     """Settings of all reasoners of rules/, one group for each."""
 
     objects: ObjectSettings = field(default_factory=ObjectSettings)
@@ -34,11 +34,11 @@ class RuleSettings:
     relations: RelationSettings = field(default_factory=RelationSettings)
     zones: ZoneSettings = field(default_factory=ZoneSettings)
     coupling: CouplingSettings = field(default_factory=CouplingSettings)
-    narrative: NarrativeSettings = field(default_factory=NarrativeSettings)
+    narrative: RelationEventSettings = field(default_factory=RelationEventSettings)
 
 
 @dataclass(frozen=True, slots=True)
-class RuleSet:
+class ReasonerSet:
     """Reasoners by phase, in order.
 
     Attributes:
@@ -51,8 +51,8 @@ class RuleSet:
 
 
 def default_reasoners(
-    settings: RuleSettings | None = None, rules: tuple[Rule, ...] | None = None
-) -> RuleSet:
+    settings: ReasonerSettings | None = None, rules: tuple[Rule, ...] | None = None
+) -> ReasonerSet:
     """The reasoners that ship with visup.
 
     Args:
@@ -63,19 +63,19 @@ def default_reasoners(
         The reasoners of the update and cogitate phases. Each is a pure function of mind and
         observation, so that one set may serve many agents.
     """
-    s = settings or RuleSettings()
-    return RuleSet(
-        update=(UpdateObjects(s.objects),),
+    s = settings or ReasonerSettings()
+    return ReasonerSet(
+        update=(ObjectReasoner(s.objects),),
         cogitate=(
-            SeePresence(s.presence),
-            Votes(s.votes),
-            Ask(s.questions),
-            BelievePose(s.pose),
-            BelieveDepth(s.depth),
-            Relations(s.relations),
-            SeeZones(s.zones),
-            Couple(replace(s.coupling, relations=s.relations)),
-            TellRelations(s.narrative),
+            PresenceReasoner(s.presence),
+            IdentityReasoner(s.votes),
+            QuestionReasoner(s.questions),
+            PoseReasoner(s.pose),
+            DepthReasoner(s.depth),
+            RelationReasoner(s.relations),
+            ZoneReasoner(s.zones),
+            CouplingReasoner(replace(s.coupling, relations=s.relations)),
+            RelationEventReasoner(s.narrative),
             RuleReasoner(shipped_rules() if rules is None else rules),
         ),
     )

@@ -1,6 +1,15 @@
 """visup, the visual supervisor: it watches machines work and says in plain words whether it goes well.
 
-Where to read first:
+    import visup
+
+    for step in visup.watch("clip.mp4", task="dock", models="things.models"):
+        for event in step.events:
+            print(f"{event.time:6.1f} s  {event.text}")
+
+What stands in `__all__` is the public API; docs/api.md lists it with examples. Names are loaded when they
+are first used, so that `import visup` costs next to nothing.
+
+To read the source, begin here:
 
 1. `visup/agent/model/`: what flows (`records.py`) and what is believed (`mind.py`).
 2. `visup/agent/cycle/agent.py`: the cogitation-action cycle on one screen.
@@ -8,12 +17,94 @@ Where to read first:
 4. `visup/rules/` and `visup/tasks/`: interpreting what is seen, and verifying tasks.
 5. `visup/runs/wiring.py`: all of it wired together; `visup/cli.py`: the command.
 
-`docs/tour.md` follows one frame through all of it.
+`docs/tour.md` follows one frame through all of it, and `docs/architecture.md` is the map.
 """
 
-from importlib.metadata import PackageNotFoundError, version
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-try:
-    __version__ = version("visup")
-except PackageNotFoundError:  # run from a checkout that was never installed
-    __version__ = "0+unknown"
+if TYPE_CHECKING:
+    from visup.agent import (
+        Alert,
+        Behaviour,
+        Contract,
+        Directive,
+        Event,
+        Frame,
+        Mind,
+        Observation,
+        Percept,
+        Region,
+        Severity,
+        Verdict,
+        VisupError,
+    )
+    from visup.agent.cycle.agent import Agent
+    from visup.agent.model.step import Step
+    from visup.api import RecordedRun, Run, open_run, watch
+    from visup.percepts.shape.database.model_database import ModelDatabase
+    from visup.runs.settings import WatchSettings as Settings
+    from visup.stepping import Stepper
+    from visup.tasks import Task, load_task
+    from visup.version import __version__
+
+__all__ = [
+    "Agent",
+    "Alert",
+    "Behaviour",
+    "Contract",
+    "Directive",
+    "Event",
+    "Frame",
+    "Mind",
+    "ModelDatabase",
+    "Observation",
+    "Percept",
+    "RecordedRun",
+    "Region",
+    "Run",
+    "Settings",
+    "Severity",
+    "Step",
+    "Stepper",
+    "Task",
+    "Verdict",
+    "VisupError",
+    "__version__",
+    "load_task",
+    "open_run",
+    "watch",
+]
+
+# Where each name is found when it is first used; type checkers and editors read the imports above.
+_HOMES = {
+    "visup.agent": (
+        *("Alert", "Behaviour", "Contract", "Directive", "Event", "Frame", "Mind", "Observation"),
+        *("Percept", "Region", "Severity", "Verdict", "VisupError"),
+    ),
+    "visup.agent.cycle.agent": ("Agent",),
+    "visup.agent.model.step": ("Step",),
+    "visup.api": ("RecordedRun", "Run", "open_run", "watch"),
+    "visup.percepts.shape.database.model_database": ("ModelDatabase",),
+    "visup.runs.settings": ("WatchSettings as Settings",),
+    "visup.stepping": ("Stepper",),
+    "visup.tasks": ("Task", "load_task"),
+    "visup.version": ("__version__",),
+}
+_HOME_OF = {
+    name.rpartition(" as ")[2]: (module, name.partition(" as ")[0])
+    for module, names in _HOMES.items()
+    for name in names
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'visup' has no attribute {name!r}")
+    module, there = _HOME_OF[name]
+    found = globals()[name] = getattr(import_module(module), there)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

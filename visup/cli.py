@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
-import visup
 from visup.agent.model.errors import VisupError
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
-from visup.commands.eval.app import app as evaluate_app
+from visup.commands.eval.catalogue import eval_app
 from visup.commands.models import app as models_app
 from visup.commands.render import render
 from visup.commands.replay import replay
@@ -21,6 +20,7 @@ from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.watch import demo, watch
+from visup.version import __version__
 
 BAD_INPUT = 2
 
@@ -46,13 +46,13 @@ app.add_typer(task_app, name="task", help="Check, show and list task files.")
 app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
 app.add_typer(behaviours_app, name="behaviours", help="List, check and begin behaviours.")
-app.add_typer(evaluate_app, name="eval", help="Compute figures against ground truth.")
+app.add_typer(eval_app(), name="eval", help="Compute figures against ground truth.")
 app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")
 
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"visup {visup.__version__}")
+        print(f"visup {__version__}")
         raise typer.Exit
 
 

@@ -38,7 +38,7 @@ class Limits:
         isolate: Names of behaviours that run in processes of their own, whatever their contracts say.
         here: Whether all run in this process, whatever contracts say: for debuggers and checkers.
         wakeful: Names of behaviours that never sleep, whatever their contracts say: those that safety
-            rules need (`rules/activation/waking.py`).
+            rules need (`rules/activation/activation.py`).
         clock: Seconds, by which the time of a run is measured.
     """
 

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.display import drawn
+from visup.agent.model.errors import SettingsError
 from visup.agent.model.mind import Mind
 from visup.agent.model.records import (
     Alert,
@@ -28,6 +33,7 @@ class Step:
         events: What happened, in order.
         alerts: Alerts that were opened or closed in this step.
         directives: What is asked of behaviours in the next step.
+        frame: The frame itself, where whoever gives the step keeps it, as `visup.watch` does; else None.
     """
 
     frame_index: int
@@ -37,11 +43,37 @@ class Step:
     events: tuple[Event, ...] = ()
     alerts: tuple[Alert, ...] = ()
     directives: tuple[Directive, ...] = ()
+    frame: Frame | None = field(default=None, repr=False)
 
     @property
     def reports(self) -> tuple[Report, ...]:
         """What each behaviour did."""
         return self.observation.reports
+
+    def draw(self, frame: Frame | None = None) -> NDArray[np.uint8]:
+        """The frame with what is believed drawn over it: contours, names, alerts, stages.
+
+        Args:
+            frame: The frame of this step; None for the one that the step carries.
+
+        Returns:
+            (H, W, 3) uint8 BGR, a new image.
+
+        Raises:
+            SettingsError: The step carries no frame, or the frame is another one.
+        """
+        frame = frame or self.frame
+        if frame is None:
+            raise SettingsError(
+                f"the step of frame {self.frame_index} does not carry its image",
+                hint="draw steps while `visup.watch` yields them, or give the frame: step.draw(frame)",
+            )
+        if frame.index != self.frame_index:
+            raise SettingsError(
+                f"frame {frame.index} was given to draw the step of frame {self.frame_index}",
+                expected=f"frame {self.frame_index}",
+            )
+        return drawn(frame.image, self.mind)
 
 
 Observer = Callable[[Step, Frame], None]

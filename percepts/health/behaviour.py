@@ -20,13 +20,13 @@ from visup.agent import (
     Observation,
     Percept,
 )
-from visup.agent.storage.checkpoint import held
-from visup.percepts.health.frozen_cells import Cells
-from visup.percepts.health.image_quality import Picture, measure
-from visup.percepts.health.noise import Grain
-from visup.percepts.health.repeated_frames import Repeats
+from visup.agent.contract.saving import saved_attributes
+from visup.percepts.health.frame_timing import ArrivalMonitor
+from visup.percepts.health.frozen_under_noise import NoiseOnlyDetector
+from visup.percepts.health.image_quality import ImageQuality, measure_quality
+from visup.percepts.health.repeated_frames import RepeatDetector
 from visup.percepts.health.settings import HealthSettings
-from visup.percepts.health.timing import Arrivals
+from visup.percepts.health.standstill import StandstillDetector
 
 OK = Health(HealthStatus.OK)
 USUAL = 25  # sound images that say what is usual
@@ -45,25 +45,27 @@ class HealthBehaviour:
 
     def __init__(self, settings: HealthSettings | None = None) -> None:
         self._settings = settings or HealthSettings()
-        self._usual: deque[Picture] = deque(maxlen=USUAL)
-        self._cells = Cells(self._settings.covered)
-        self._arrivals = Arrivals(self._settings.lost, self._settings.gap, self._settings.same_s)
-        self._repeats = Repeats()
-        self._grain = Grain()
+        self._usual: deque[ImageQuality] = deque(maxlen=USUAL)
+        self._standstill = StandstillDetector(self._settings.covered)
+        self._arrivals = ArrivalMonitor(
+            self._settings.lost, self._settings.gap, self._settings.same_s
+        )
+        self._repeats = RepeatDetector()
+        self._noise_only = NoiseOnlyDetector()
         self._same_since: float | None = None
         self._fault_since: float | None = None
         self._harmed = False
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return held(self, "_settings")
+        return saved_attributes(self, "_settings")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a behaviour of the same settings remembered."""
         vars(self).update(state)
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report the health of one frame; one percept of kind 'health'.
 
@@ -76,23 +78,23 @@ class HealthBehaviour:
         return [Percept("health", health, frame.time, self.contract.name, confidence)]
 
     def _judge(self, frame: Frame) -> Health:
-        picture = measure(frame.image)
+        picture = measure_quality(frame.image)
         same, near = self._repeats.compare(frame.image, picture.small)
         # An image that is all dark repeats itself too, and no frame is missing for that.
         repeated = None if self._harmed else near
-        missing = self._arrivals.come(frame.index, frame.time, repeated)
+        missing = self._arrivals.arrive(frame.index, frame.time, repeated)
         frozen = self._frozen(frame.time, same)
         health = _of_picture(picture, self._usual, self._settings)
         self._harmed = health is not OK
         noise_alone = False
         if not self._harmed:
             health = self._of_cells(picture, frame.time)
-            noise_alone = self._grain.see(picture, frame.time)
-            if self._cells.halt is None:
+            noise_alone = self._noise_only.update(picture, frame.time)
+            if self._standstill.standstill is None:
                 self._usual.append(picture)
         else:
-            self._cells.forget()
-            self._grain.forget()
+            self._standstill.forget()
+            self._noise_only.forget()
         health = self._lasting(health, frame.time)
         if health is OK and noise_alone:
             return Health(HealthStatus.FROZEN, "Nothing changes any more but noise.")
@@ -102,8 +104,8 @@ class HealthBehaviour:
             return Health(HealthStatus.DROPPED, f"About {missing} frames are missing.")
         return health
 
-    def _of_cells(self, picture: Picture, now: float) -> Health:
-        halt = self._cells.see(picture.small, picture.factor, now)
+    def _of_cells(self, picture: ImageQuality, now: float) -> Health:
+        halt = self._standstill.update(picture.small, picture.factor, now)
         if halt is None:
             return OK
         if halt.whole:
@@ -127,7 +129,9 @@ class HealthBehaviour:
         return now - self._same_since >= self._settings.same_s
 
 
-def _of_picture(picture: Picture, usual: Sequence[Picture], settings: HealthSettings) -> Health:
+def _of_picture(
+    picture: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings
+) -> Health:
     """What one image shows, in the light of those before it."""
     known = len(usual) >= FEWEST
     if _dark(picture, usual, settings, known):
@@ -144,25 +148,31 @@ def _of_picture(picture: Picture, usual: Sequence[Picture], settings: HealthSett
     return OK
 
 
-def _most(usual: Sequence[Picture], name: str) -> float:
+def _most(usual: Sequence[ImageQuality], name: str) -> float:
     return max((float(getattr(p, name)) for p in usual), default=0.0)
 
 
-def _dark(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+def _dark(
+    p: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings, known: bool
+) -> bool:
     if p.high < settings.dark:
         return True
     sudden = known and p.high < 0.25 * min(u.high for u in usual)
     return sudden and p.high < 2 * settings.dark
 
 
-def _saturated(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+def _saturated(
+    p: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings, known: bool
+) -> bool:
     if p.low > settings.bright:
         return True
     sudden = known and p.low > 30 + _most(usual, "low")
     return sudden and p.low > settings.bright - 30 and p.spread < 2 * settings.flat
 
 
-def _noisy(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+def _noisy(
+    p: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings, known: bool
+) -> bool:
     if p.noise > settings.noisy or p.impulses > settings.impulses:
         return True
     if not known:
@@ -172,7 +182,9 @@ def _noisy(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known
     return grain or specks
 
 
-def _broken(p: Picture, usual: Sequence[Picture], settings: HealthSettings, known: bool) -> bool:
+def _broken(
+    p: ImageQuality, usual: Sequence[ImageQuality], settings: HealthSettings, known: bool
+) -> bool:
     if p.steps > settings.broken:
         return True
     return known and p.steps > settings.rather_broken + 1.7 * _most(usual, "steps")

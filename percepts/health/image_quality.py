@@ -21,7 +21,7 @@ LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class ImageQuality:
     """An image, and what was measured on it.
 
     Attributes:
@@ -49,7 +49,7 @@ class Picture:
     edges: float
 
 
-def measure(image: NDArray[np.uint8]) -> Picture:
+def measure_quality(image: NDArray[np.uint8]) -> ImageQuality:
     """Measure an image.
 
     Args:
@@ -71,7 +71,7 @@ def measure(image: NDArray[np.uint8]) -> Picture:
     # Grey averages the noise of three channels; one of them shows it whole.
     strips = _strips(image[..., 1] if colour else grey)
     steps, edges = _steps(grey)
-    return Picture(
+    return ImageQuality(
         grey=grey,
         small=small,
         factor=factor,

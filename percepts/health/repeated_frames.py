@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.health.frozen_cells import Floats, per_cell
+from visup.percepts.health.standstill import Floats, per_cell
 
 MOST = 25
 ENOUGH = 6
@@ -16,7 +16,7 @@ LIVELY = 1.5  # grey levels of change where most changes, from which near repeat
 NEARLY = 0.2  # share of the usual change
 
 
-class Repeats:
+class RepeatDetector:
     """Compares each image with the one before."""
 
     def __init__(self) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from visup.agent.contract.behaviour import Contract
 from visup.agent.model.records import Directive, Frame, Hypothesis, Observation, Percept, Region
-from visup.percepts.shape.database.database import ModelDatabase, ViewMatch
+from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 _THUMB = 48
@@ -51,7 +51,7 @@ class ShapeSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Remembered:
+class _MatchedRegion:
     """What a region looked like when it was last matched, and what came of it."""
 
     time: float
@@ -83,7 +83,7 @@ class ShapeBehaviour:
     ) -> None:
         self.database = database
         self.settings = settings or ShapeSettings()
-        self._remembered: dict[int, _Remembered] = {}
+        self._remembered: dict[int, _MatchedRegion] = {}
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
@@ -94,24 +94,26 @@ class ShapeBehaviour:
         self._remembered = dict(state["remembered"])
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Hypotheses for all regions of a frame, the best of each region first.
 
         Args:
             frame: The frame; its time and its size are used.
-            seen: Holds the regions.
+            observation: Holds the regions.
             directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
                 (data: names) has these compared whatever the index says; 'rest' (data: behaviour,
                 region, every_s) has a region matched no more often than that.
         """
         if self.database is None:
             return []
-        regions: tuple[Region, ...] = seen.of("region")
-        restrict, first = _wishes(directives)
+        regions: tuple[Region, ...] = observation.of("region")
+        restrict, first = _name_directives(directives)
         here = {r.id for r in regions}
         self._remembered = {k: v for k, v in self._remembered.items() if k in here}
-        due = self._due(regions, frame.time, restrict, _resting(directives, self.contract.name))
+        due = self._due(
+            regions, frame.time, restrict, _rest_intervals(directives, self.contract.name)
+        )
         found = self._match(self.database, due, frame, restrict, first)
         for region, matches in zip(due, found, strict=True):
             self._remembered[region.id] = _remembered(region, frame.time, restrict, matches)
@@ -146,7 +148,7 @@ class ShapeBehaviour:
             return False
         return since >= self.settings.renew_s or not self._unchanged(old, region)
 
-    def _unchanged(self, old: _Remembered, region: Region) -> bool:
+    def _unchanged(self, old: _MatchedRegion, region: Region) -> bool:
         stretch = _aspect(region) / old.aspect
         if (
             old.cut != region.cut
@@ -184,8 +186,8 @@ class ShapeBehaviour:
 
 def _remembered(
     region: Region, time: float, restrict: frozenset[str] | None, found: tuple[ViewMatch, ...]
-) -> _Remembered:
-    return _Remembered(
+) -> _MatchedRegion:
+    return _MatchedRegion(
         time=time,
         thumb=_thumb(region),
         aspect=_aspect(region),
@@ -216,7 +218,7 @@ def _thumb(region: Region) -> NDArray[np.bool_]:
     return np.asarray(small > 127)
 
 
-def _resting(directives: Sequence[Directive], behaviour: str) -> dict[int, float]:
+def _rest_intervals(directives: Sequence[Directive], behaviour: str) -> dict[int, float]:
     """Regions that need not be looked at so often: id -> least seconds between two looks."""
     return {
         d.data["region"]: float(d.data["every_s"])
@@ -225,7 +227,9 @@ def _resting(directives: Sequence[Directive], behaviour: str) -> dict[int, float
     }
 
 
-def _wishes(directives: Sequence[Directive]) -> tuple[frozenset[str] | None, frozenset[str]]:
+def _name_directives(
+    directives: Sequence[Directive],
+) -> tuple[frozenset[str] | None, frozenset[str]]:
     """Names that alone are to be considered (None for all), and names to be tried first."""
     restrict = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "restrict"]
     first = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "try_first"]

@@ -1,12 +1,14 @@
 """Video sources: a file, a folder of images, a camera or a URL, all read as frames.
 
-Start at `base.py` (what a source is); `open.py` chooses the kind for what the user named.
-OpenCV is imported only when a source is opened.
+Read `source.py` first (what a source is); `open.py` chooses the kind for what the user named:
+`video_file.py`, `image_folder.py` or `live_source.py`. `realtime.py` drops frames to keep pace with the
+clock; `capture.py` and `quiet_decoder.py` are the little of OpenCV that they share. OpenCV is imported only
+when a source is opened.
 """
 
 from __future__ import annotations
 
-from visup.percepts.video.base import Ending, Source
 from visup.percepts.video.open import open_source
+from visup.percepts.video.source import Ending, VideoSource
 
-__all__ = ["Ending", "Source", "open_source"]
+__all__ = ["Ending", "VideoSource", "open_source"]

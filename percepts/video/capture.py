@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.video.base import DEFAULT_FPS, to_bgr
-from visup.percepts.video.silence import hush_decoder, quiet
+from visup.percepts.video.quiet_decoder import hush_decoder, quiet
+from visup.percepts.video.source import DEFAULT_FPS, to_bgr
 
 CONNECT_MS = 10_000
 HIGHEST_FPS = 1000.0

@@ -7,16 +7,16 @@ import re
 from pathlib import Path
 
 from visup.agent.model.errors import SettingsError, SourceError
-from visup.percepts.video.base import Source
 from visup.percepts.video.capture import (
     Capture,
     CaptureFactory,
     announced_frames,
     open_capture,
 )
-from visup.percepts.video.file import VideoFile, open_file
-from visup.percepts.video.folder import open_folder
-from visup.percepts.video.live import LiveSource
+from visup.percepts.video.image_folder import open_folder
+from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.source import VideoSource
+from visup.percepts.video.video_file import VideoFile, open_file
 
 URL = re.compile(r"^[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 SCHEMES = ("rtsp", "rtsps", "rtmp", "http", "https", "udp", "tcp", "srt")
@@ -29,7 +29,7 @@ def open_source(
     fps: float | None = None,
     factory: CaptureFactory = open_capture,
     patience_s: float = 0.0,
-) -> Source:
+) -> VideoSource:
     """Open a source of frames.
 
     Args:
@@ -121,7 +121,7 @@ def _open_url(
 
 def _open_path(
     path: Path, every: int, fps: float | None, factory: CaptureFactory, patience_s: float
-) -> Source:
+) -> VideoSource:
     try:
         if path.is_dir():
             return open_folder(path, every=every, fps=fps)

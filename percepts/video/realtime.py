@@ -19,8 +19,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 
-from visup.agent import Concern, Frame, Severity
-from visup.percepts.video.base import Source
+from visup.agent import AlertCondition, Frame, Severity
+from visup.percepts.video.source import VideoSource
 
 NAME = "frames_dropped"
 WINDOW_S = 5.0
@@ -34,7 +34,7 @@ PATIENCE_S = 5.0
 """How long a reader may take to end; one that is stuck in its capture is left alone."""
 
 
-class RealTime(Iterator[Frame], ABC):
+class RealTimeFrames(Iterator[Frame], ABC):
     """Frames as time brings them.
 
     Args:
@@ -60,7 +60,7 @@ class RealTime(Iterator[Frame], ABC):
             self._recent.popleft()
         return frame
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """That frames are dropped, while more than a tenth of those of late were."""
         lost = sum(missed for _, missed in self._recent)
         if lost < SHARE * (lost + len(self._recent)):
@@ -72,7 +72,7 @@ class RealTime(Iterator[Frame], ABC):
             f"{lost + len(times)} were dropped; for up to {longest:.1f} s nobody looked."
         )
         severity = Severity.WARNING if longest >= LONG_S else Severity.INFO
-        yield Concern(NAME, (), severity, text, key=self.name, needs=())
+        yield AlertCondition(NAME, (), severity, text, key=self.name, needs=())
 
     def note(self) -> str | None:
         """One sentence for the end of a run; None when nothing was dropped."""
@@ -93,7 +93,7 @@ class RealTime(Iterator[Frame], ABC):
         """
 
 
-class Played(RealTime):
+class PacedRecording(RealTimeFrames):
     """A recording, played as a camera would deliver it.
 
     Args:
@@ -131,7 +131,7 @@ class Played(RealTime):
         return frame, missed
 
 
-class Newest(RealTime):
+class LatestFrames(RealTimeFrames):
     """A live source, read as fast as it delivers.
 
     Args:
@@ -139,7 +139,7 @@ class Newest(RealTime):
         source: The source itself.
     """
 
-    def __init__(self, frames: Iterator[Frame], source: Source) -> None:
+    def __init__(self, frames: Iterator[Frame], source: VideoSource) -> None:
         super().__init__(source.name)
         self._frames, self._source = frames, source
         self._changed = threading.Condition()
@@ -184,11 +184,11 @@ class Newest(RealTime):
             self._source.abandon()
 
 
-def in_real_time(source: Source, frames: Iterator[Frame]) -> RealTime:
+def in_real_time(source: VideoSource, frames: Iterator[Frame]) -> RealTimeFrames:
     """Frames of a source as time brings them, whatever the source.
 
     Args:
         source: The source.
         frames: Its frames, from any of them on.
     """
-    return Newest(frames, source) if source.live else Played(frames, source.name)
+    return LatestFrames(frames, source) if source.live else PacedRecording(frames, source.name)

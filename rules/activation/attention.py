@@ -37,7 +37,7 @@ class AttentionSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Attend:
+class AttentionReasoner:
     """Reasoner of the match phase, after the tasks: says which regions need not be matched now."""
 
     settings: AttentionSettings = field(default_factory=AttentionSettings)

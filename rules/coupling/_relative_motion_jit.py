@@ -9,11 +9,11 @@ from visup.rules.geometry.hysteresis import Floats
 
 
 @compiled
-def recent_of(path: Floats, now: float, window: float, least: int) -> int:
+def first_recent(path: Floats, now: float, window: float, least: int) -> int:
     """Number of the first place on a path that tells how it goes on now.
 
     Args:
-        path: (N, 6); see `course`.
+        path: (N, 6); see `fused_velocity`.
         now: Seconds.
         window: Over how long, seconds; longer where gaps leave too few places within.
         least: Fewest places.
@@ -27,7 +27,7 @@ def recent_of(path: Floats, now: float, window: float, least: int) -> int:
 
 
 @compiled
-def course(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floats]:
+def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floats]:
     """The slope of places, joined with the mean of velocities, each by its precision.
 
     Args:

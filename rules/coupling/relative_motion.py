@@ -23,30 +23,30 @@ import numpy as np
 
 from visup.agent import Region
 from visup.agent.model.fast_replace import replace
-from visup.rules.coupling._relative_motion_jit import course, recent_of
-from visup.rules.geometry._outlines_jit import beside, boxes_of, evenly, laid
-from visup.rules.geometry.outlines import EVEN_POINTS, ready
+from visup.rules.coupling._relative_motion_jit import first_recent, fused_velocity
+from visup.rules.geometry._outlines_jit import near_outline, register, resampled, run_boxes
+from visup.rules.geometry.outlines import TEMPLATE_POINTS, prepared_outline
 from visup.rules.geometry.regions import Floats
 
-REACH = 12.0
+ICP_REACH = 12.0
 """How far a point may be from the outline on which it is laid, pixels."""
 
-BESIDE = 6.0
+NEIGHBOUR_MARGIN = 6.0
 """How near the other body an outline is not trusted, pixels."""
 
 LEAST_SIGMA = 0.3
 """No velocity in the image is believed to be known better, pixels per second."""
 
-LASTS_S = 0.2
+CORRELATION_S = 0.2
 """Errors of velocities are alike for so long, seconds."""
 
 LEAST_POINTS = 12
-LEAST_PLACES = 5
-_WILD = 1.5  # pixels beyond which a point counts less
+LEAST_SAMPLES = 5
+_OUTLIER = 1.5  # pixels beyond which a point counts less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Kept:
+class OutlineTemplate:
     """Points of an outline that say how a body moves.
 
     Attributes:
@@ -61,7 +61,7 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint:
+class RelativeTrack:
     """What is remembered of two bodies that are near each other.
 
     Attributes:
@@ -74,8 +74,8 @@ class Joint:
             first.
     """
 
-    first: Kept
-    second: Kept
+    first: OutlineTemplate
+    second: OutlineTemplate
     since: float
     before: tuple[float, float] = (0.0, 0.0)
     path: tuple[tuple[float, ...], ...] = ()
@@ -86,7 +86,9 @@ class Joint:
         return self.path[-1][0] if self.path else self.since
 
 
-def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]) -> Kept | None:
+def outline_template(
+    region: Region, others: Sequence[Region], size: tuple[int, int]
+) -> OutlineTemplate | None:
     """The points of a region's outline that can be followed, or None when there are too few.
 
     Args:
@@ -94,20 +96,20 @@ def kept_outline(region: Region, others: Sequence[Region], size: tuple[int, int]
         others: Bodies near it.
         size: (width, height) of the image, pixels.
     """
-    points = evenly(ready(region).points, EVEN_POINTS)
+    points = resampled(prepared_outline(region).points, TEMPLATE_POINTS)
     tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     length = np.linalg.norm(tangent, axis=1)
     normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
     x, y = points.T
     free = (x > 3) & (y > 3) & (x < size[0] - 4) & (y < size[1] - 4) & (length > 0)
     for other in others:
-        near = ready(other)
-        free &= ~beside(points, near.points, near.boxes, BESIDE)
-    return Kept(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
+        near = prepared_outline(other)
+        free &= ~near_outline(points, near.points, near.boxes, NEIGHBOUR_MARGIN)
+    return OutlineTemplate(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Target:
+class TargetOutline:
     """An outline upon which kept ones are laid.
 
     Attributes:
@@ -119,18 +121,18 @@ class Target:
     boxes: Floats
 
     @classmethod
-    def of(cls, points: Floats) -> Target:
+    def of(cls, points: Floats) -> TargetOutline:
         """The target with these points."""
-        return cls(points, boxes_of(points))
+        return cls(points, run_boxes(points))
 
 
-def target_of(region: Region) -> Target:
+def target_of(region: Region) -> TargetOutline:
     """The outline of a region as a target; one region is the target of several pairs."""
-    made = ready(region)
-    return Target(made.even, made.even_boxes)
+    made = prepared_outline(region)
+    return TargetOutline(made.even, made.even_boxes)
 
 
-def laid_upon(kept: Kept, target: Target) -> Kept | None:
+def registered(kept: OutlineTemplate, target: TargetOutline) -> OutlineTemplate | None:
     """A kept outline moved onto a later one.
 
     Args:
@@ -141,20 +143,22 @@ def laid_upon(kept: Kept, target: Target) -> Kept | None:
         The same with the new shift; None when too little of it finds its place, or when it has but one
         direction.
     """
-    limits = REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _WILD
-    found, x, y = laid(kept.points, kept.normals, kept.shift, target.points, target.boxes, limits)
-    return Kept(kept.points, kept.normals, (x, y)) if found else None
+    limits = ICP_REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _OUTLIER
+    found, x, y = register(
+        kept.points, kept.normals, kept.shift, target.points, target.boxes, limits
+    )
+    return OutlineTemplate(kept.points, kept.normals, (x, y)) if found else None
 
 
-def follow(
-    joint: Joint | None,
+def update_relative_track(
+    joint: RelativeTrack | None,
     regions: tuple[Region, Region],
     now: float,
     size: tuple[int, int],
     *,
     lasts_s: float,
     anew_s: float,
-) -> Joint | None:
+) -> RelativeTrack | None:
     """What is known of two bodies after another sight of them.
 
     Args:
@@ -170,28 +174,30 @@ def follow(
     """
     apart = regions[0] is not regions[1]
     if joint is None:
-        return begun(regions, now, size) if apart else None
-    first = laid_upon(joint.first, target_of(regions[0]))
-    second = laid_upon(joint.second, target_of(regions[1]))
+        return begin_relative_track(regions, now, size) if apart else None
+    first = registered(joint.first, target_of(regions[0]))
+    second = registered(joint.second, target_of(regions[1]))
     if first is None or second is None:
-        return begun(regions, now, size) if apart else replace(joint, path=())
+        return begin_relative_track(regions, now, size) if apart else replace(joint, path=())
     x, y = (b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True))
     place = (now, x, y, *_image_motion(regions))
     path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
     if apart and now - joint.since > anew_s:
-        fresh = begun(regions, now, size)
+        fresh = begin_relative_track(regions, now, size)
         if fresh is not None:
             return replace(fresh, before=(x, y), path=path)
     return replace(joint, first=first, second=second, path=path)
 
 
-def begun(regions: tuple[Region, Region], now: float, size: tuple[int, int]) -> Joint | None:
+def begin_relative_track(
+    regions: tuple[Region, Region], now: float, size: tuple[int, int]
+) -> RelativeTrack | None:
     """Two bodies followed from now on; None when too little of them is in the clear."""
-    first = kept_outline(regions[0], regions[1:], size)
-    second = kept_outline(regions[1], regions[:1], size)
+    first = outline_template(regions[0], regions[1:], size)
+    second = outline_template(regions[1], regions[:1], size)
     if first is None or second is None:
         return None
-    return Joint(first, second, now, path=((now, 0.0, 0.0, *_image_motion(regions)),))
+    return RelativeTrack(first, second, now, path=((now, 0.0, 0.0, *_image_motion(regions)),))
 
 
 def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
@@ -204,7 +210,7 @@ def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class RelativeVelocity:
     """A relative velocity.
 
     Attributes:
@@ -241,7 +247,7 @@ class Motion:
         return 0.5 * (log(free / rest) - (rests - moves))
 
 
-def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
+def relative_velocity(joint: RelativeTrack, now: float, window_s: float) -> RelativeVelocity | None:
     """How two bodies move relative to each other.
 
     Args:
@@ -252,11 +258,11 @@ def motion(joint: Joint, now: float, window_s: float) -> Motion | None:
     Returns:
         The motion up to now; None while too little is known.
     """
-    if len(joint.path) <= LEAST_PLACES:
+    if len(joint.path) <= LEAST_SAMPLES:
         return None
     places = np.fromiter(chain.from_iterable(joint.path), float, 6 * len(joint.path)).reshape(-1, 6)
-    begin = recent_of(places, now, window_s, LEAST_PLACES)
+    begin = first_recent(places, now, window_s, LEAST_SAMPLES)
     span = float(places[-1, 0] - places[begin, 0])
     if span < 0.6 * window_s - 1e-6:
         return None
-    return Motion(*course(places, begin, LASTS_S), span)
+    return RelativeVelocity(*fused_velocity(places, begin, CORRELATION_S), span)

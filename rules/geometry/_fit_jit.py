@@ -60,7 +60,7 @@ def median(values: Floats, count: int) -> float:
 
 
 @compiled
-def line(times: Floats, values: Floats, count: int, rises: Floats) -> tuple[float, float]:
+def theil_sen(times: Floats, values: Floats, count: int, rises: Floats) -> tuple[float, float]:
     """Slope of a line through samples, by the median of the slopes of all pairs of samples.
 
     Up to 29 % of the samples may be wild without moving it far (Theil 1950, Sen 1968).
@@ -135,8 +135,8 @@ def binned(times: Floats, values: Floats, bins: int, moments: Floats, means: Flo
 
 
 @compiled
-def trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
-    """Lines through binned samples (T, N): their slopes and deviations, (N,) each; see `line`."""
+def binned_trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
+    """Lines through binned samples (T, N): their slopes and deviations, (N,) each; see `theil_sen`."""
     count = values.shape[1]
     slope, sigma, series = np.empty(count), np.empty(count), np.empty(len(times))
     moments, means, rises = np.empty(bins), np.empty(bins), np.empty(bins * bins)
@@ -144,7 +144,7 @@ def trends(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
         for t in range(len(times)):
             series[t] = values[t, k]
         found = binned(times, series, bins, moments, means)
-        slope[k], sigma[k] = line(moments, means, found, rises)
+        slope[k], sigma[k] = theil_sen(moments, means, found, rises)
     return slope, sigma
 
 
@@ -279,12 +279,12 @@ def quick_trend(
     noise, least, sigmas = limits
     bins = room.shape[1]
     moments, means, rises = room[0], room[1], room[2:].reshape(-1)
-    slope, sigma = line(moments, means, binned(times, values, bins, moments, means), rises)
+    slope, sigma = theil_sen(moments, means, binned(times, values, bins, moments, means), rises)
     floor = slope_noise(times, noise)
     if sigma < floor:
         sigma = floor
     found = binned(times[recent:], values[recent:], bins, moments, means)
-    quick, spread = line(moments, means, found, rises)
+    quick, spread = theil_sen(moments, means, found, rises)
     floor = slope_noise(times[recent:], noise)
     if spread < floor:
         spread = floor
@@ -295,7 +295,7 @@ def quick_trend(
 
 
 @compiled
-def fitted(
+def fit_motion(
     times: Floats,
     support: Floats,
     free: Flags,

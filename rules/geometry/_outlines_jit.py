@@ -20,7 +20,7 @@ RUN = 16
 
 
 @compiled
-def boxes_of(points: Floats) -> Floats:
+def run_boxes(points: Floats) -> Floats:
     """(R, 4) left, top, right, bottom of each run of an outline (N, 2), pixels."""
     count = len(points)
     runs = (count + RUN - 1) // RUN
@@ -38,7 +38,7 @@ def boxes_of(points: Floats) -> Floats:
 
 
 @compiled
-def reached(
+def outline_support(
     points: Floats,
     directions: Floats,
     width: float,
@@ -156,7 +156,7 @@ def signed_extent(
 
 
 @compiled
-def beside(points: Floats, other: Floats, boxes: Floats, bound: float) -> NDArray[np.bool_]:
+def near_outline(points: Floats, other: Floats, boxes: Floats, bound: float) -> NDArray[np.bool_]:
     """(N,) whether points are nearer to an outline than a bound, pixels."""
     near = np.empty(len(points), np.bool_)
     start = 0
@@ -168,7 +168,7 @@ def beside(points: Floats, other: Floats, boxes: Floats, bound: float) -> NDArra
 
 
 @compiled
-def evenly(points: Floats, count: int) -> Floats:
+def resampled(points: Floats, count: int) -> Floats:
     """A closed outline (N, 2) as `count` points evenly spaced along it."""
     size = len(points)
     along = np.empty(size + 1)
@@ -192,7 +192,7 @@ def evenly(points: Floats, count: int) -> Floats:
 
 
 @compiled
-def widest_step(points: Floats) -> float:
+def longest_edge(points: Floats) -> float:
     """Greatest distance of neighbouring points of a closed outline (N, 2), pixels."""
     widest = 0.0
     for n in range(len(points)):
@@ -202,7 +202,7 @@ def widest_step(points: Floats) -> float:
 
 
 @compiled
-def step_across(normals: Floats, off: Floats, count: int, wild: float) -> tuple[bool, float, float]:
+def icp_step(normals: Floats, off: Floats, count: int, wild: float) -> tuple[bool, float, float]:
     """The move that brings points onto an outline, by weighted least squares across it.
 
     Args:
@@ -231,7 +231,7 @@ def step_across(normals: Floats, off: Floats, count: int, wild: float) -> tuple[
 
 
 @compiled
-def laid(
+def register(
     points: Floats,
     normals: Floats,
     shift: tuple[float, float],
@@ -272,7 +272,7 @@ def laid(
                 found += 1
         if found < least:
             return False, x, y
-        known, dx, dy = step_across(across, off, found, wild)
+        known, dx, dy = icp_step(across, off, found, wild)
         if not known:
             return False, x, y
         x, y = x + dx, y + dy

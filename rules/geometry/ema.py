@@ -17,7 +17,7 @@ TAU_S = 0.15
 """Time constant, seconds; less than the least duration of the states that are judged."""
 
 
-def smoothed(before: Floats, now: Floats, seconds: float, jump: float) -> Floats:
+def exponential_mean(before: Floats, now: Floats, seconds: float, jump: float) -> Floats:
     """An exponential mean that follows at once what is no noise.
 
     Args:
@@ -29,17 +29,17 @@ def smoothed(before: Floats, now: Floats, seconds: float, jump: float) -> Floats
     Returns:
         The means now; NaN where unknown now.
     """
-    flat = _smoothed(before.reshape(-1), now.reshape(-1), share_of(seconds), jump)
+    flat = _exponential_mean(before.reshape(-1), now.reshape(-1), new_share(seconds), jump)
     return flat.reshape(now.shape)
 
 
-def share_of(seconds: float) -> float:
+def new_share(seconds: float) -> float:
     """Share of a new value in the mean, so many seconds after the value before."""
     return 1.0 - exp(-seconds / TAU_S)
 
 
 @compiled
-def _smoothed(before: Floats, now: Floats, share: float, jump: float) -> Floats:
+def _exponential_mean(before: Floats, now: Floats, share: float, jump: float) -> Floats:
     means = np.empty(len(now))
     for k in range(len(now)):
         step = now[k] - before[k]

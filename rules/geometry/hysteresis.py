@@ -24,7 +24,7 @@ BELOW, WITHIN, ABOVE = 0, 1, 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Latch:
+class HysteresisState:
     """Qualitative states with their age.
 
     Attributes:
@@ -39,7 +39,7 @@ class Latch:
     pending: Codes
     pending_since: Floats
 
-    def select(self, places: NDArray[np.intp], now: float) -> Latch:
+    def select(self, places: NDArray[np.intp], now: float) -> HysteresisState:
         """The latch of other pairs.
 
         Args:
@@ -50,11 +50,11 @@ class Latch:
         Returns:
             A latch whose last axis has length N; new pairs start unknown.
         """
-        blank = unknown_latch((*self.state.shape[:-1], len(places)), now)
+        blank = unknown_states((*self.state.shape[:-1], len(places)), now)
         known = places >= 0
         if not known.any():
             return blank
-        return Latch(
+        return HysteresisState(
             np.where(known, self.state.take(places, axis=-1), blank.state),
             np.where(known, self.since.take(places, axis=-1), blank.since),
             np.where(known, self.pending.take(places, axis=-1), blank.pending),
@@ -62,13 +62,15 @@ class Latch:
         )
 
 
-def unknown_latch(shape: tuple[int, ...], now: float) -> Latch:
+def unknown_states(shape: tuple[int, ...], now: float) -> HysteresisState:
     """A latch of which nothing is known yet."""
     codes = np.full(shape, UNKNOWN, dtype=np.int8)
-    return Latch(codes, np.full(shape, now), codes, np.full(shape, now))
+    return HysteresisState(codes, np.full(shape, now), codes, np.full(shape, now))
 
 
-def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> Latch:
+def advance(
+    latch: HysteresisState, wanted: Codes, now: float, minimum_s: float | Floats
+) -> HysteresisState:
     """Move every state towards what the latest measurement wants.
 
     A known state wants to be believed for `minimum_s` without a break before it is; to become
@@ -87,7 +89,7 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> 
         return latch  # Nothing wants to change, as nearly always.
     lasts = np.atleast_1d(np.asarray(minimum_s, dtype=float)).reshape(-1)
     rows, shape = (len(lasts), -1), wanted.shape
-    state, since, pending, waiting = _stepped(
+    state, since, pending, waiting = _advanced(
         latch.state.reshape(rows),
         latch.since.reshape(rows),
         latch.pending.reshape(rows),
@@ -96,13 +98,13 @@ def step(latch: Latch, wanted: Codes, now: float, minimum_s: float | Floats) -> 
         now,
         lasts,
     )
-    return Latch(
+    return HysteresisState(
         state.reshape(shape), since.reshape(shape), pending.reshape(shape), waiting.reshape(shape)
     )
 
 
 @compiled
-def _stepped(
+def _advanced(
     state: Codes,
     since: Floats,
     pending: Codes,

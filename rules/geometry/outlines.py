@@ -14,39 +14,39 @@ from numpy.typing import NDArray
 
 from visup.agent import Region
 from visup.rules.geometry._outlines_jit import (
-    boxes_of,
-    evenly,
     least_distance,
-    reached,
+    longest_edge,
+    outline_support,
+    resampled,
+    run_boxes,
     signed_extent,
-    widest_step,
 )
 from visup.rules.geometry.regions import (
     DIRECTIONS,
     Floats,
     box_gap,
-    dense,
+    densified,
     masks_overlap,
     outline,
 )
 
-NEAR = 0.05
+NEAR_SHARE = 0.05
 """How near outlines must be for anybody to care how near they are, image diagonals."""
 
-RECENT = 128
+CACHED_REGIONS = 128
 """Regions that are remembered: those of two steps with fifty objects."""
 
-EVEN_POINTS = 96
+TEMPLATE_POINTS = 96
 """Least points of an outline that another one is laid upon."""
 
-CLOSE = 2.0
+CLOSED_STEP = 2.0
 """Neighbouring points of an outline that are so near each other leave no gap, pixels."""
 
 MOST_POINTS = 200
 """Points of an outline that are measured against another one."""
 
 
-class Outline:
+class PreparedOutline:
     """An outline made ready for looking up what is nearest to a point.
 
     Args:
@@ -63,27 +63,31 @@ class Outline:
     @cached_property
     def boxes(self) -> Floats:
         """Of the runs of `points`; see `outline_loops.py`."""
-        return boxes_of(self.points)
+        return run_boxes(self.points)
 
     @cached_property
     def closed(self) -> Floats:
-        """(M, 2) points without wide gaps between neighbours; see `dense`."""
-        return self.points if widest_step(self.points) <= CLOSE else dense(self.points, CLOSE)
+        """(M, 2) points without wide gaps between neighbours; see `densified`."""
+        return (
+            self.points
+            if longest_edge(self.points) <= CLOSED_STEP
+            else densified(self.points, CLOSED_STEP)
+        )
 
     @cached_property
     def closed_boxes(self) -> Floats:
         """Of the runs of `closed`."""
-        return self.boxes if self.closed is self.points else boxes_of(self.closed)
+        return self.boxes if self.closed is self.points else run_boxes(self.closed)
 
     @cached_property
     def even(self) -> Floats:
-        """(M, 2) points evenly spaced, as many as it has, `EVEN_POINTS` at least."""
-        return evenly(self.points, max(EVEN_POINTS, len(self.points)))
+        """(M, 2) points evenly spaced, as many as it has, `TEMPLATE_POINTS` at least."""
+        return resampled(self.points, max(TEMPLATE_POINTS, len(self.points)))
 
     @cached_property
     def even_boxes(self) -> Floats:
         """Of the runs of `even`."""
-        return boxes_of(self.even)
+        return run_boxes(self.even)
 
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
@@ -93,13 +97,13 @@ class Outline:
         return mask if plain else np.array(mask, dtype=np.bool_, order="C")
 
 
-@lru_cache(maxsize=RECENT)
-def ready(region: Region) -> Outline:
+@lru_cache(maxsize=CACHED_REGIONS)
+def prepared_outline(region: Region) -> PreparedOutline:
     """The outline of a region, made ready."""
-    return Outline(region)
+    return PreparedOutline(region)
 
 
-def reach(
+def write_support(
     region: Region, frame_size: tuple[int, int], support: Floats, free: NDArray[np.bool_]
 ) -> None:
     """How far a region's outline reaches.
@@ -111,7 +115,7 @@ def reach(
         free: (16,) written: whether the furthest point is clear of the image border, so that it
             belongs to the body and not to where the image ends.
     """
-    reached(ready(region).points, DIRECTIONS, *frame_size, support, free)
+    outline_support(prepared_outline(region).points, DIRECTIONS, *frame_size, support, free)
 
 
 def outline_gap(a: Region, b: Region, near: float) -> float | None:
@@ -131,10 +135,10 @@ def outline_gap(a: Region, b: Region, near: float) -> float | None:
     return _gap(a, b, near) if a.id <= b.id else _gap(b, a, near)
 
 
-@lru_cache(maxsize=8 * RECENT)
+@lru_cache(maxsize=8 * CACHED_REGIONS)
 def _gap(a: Region, b: Region, near: float) -> float | None:
     # A pixel is as wide as 1: outlines of neighbours are so far apart.
-    one, two = ready(a), ready(b)
+    one, two = prepared_outline(a), prepared_outline(b)
     distance = least_distance(one.points, one.boxes, two.points, two.boxes, near + 1.0)
     # One may also lie deep within the other.
     if distance > 1.5 and masks_overlap(a, b):
@@ -153,7 +157,7 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
     Returns:
         The least and the greatest distance of a's points to b's outline, pixels, negative within b.
     """
-    points, body = ready(a).closed, ready(b)
+    points, body = prepared_outline(a).closed, prepared_outline(b)
     step = -(-len(points) // MOST_POINTS)
     x, y, _, _ = b.bbox
     return signed_extent(points, step, body.closed, body.closed_boxes, body.mask, x, y)

@@ -23,7 +23,7 @@ def pairs(m: int) -> tuple[Indices, Indices]:
 
 
 @lru_cache(maxsize=32)
-def carried(old: tuple[int, ...], new: tuple[int, ...]) -> tuple[Indices, Indices]:
+def reindexing(old: tuple[int, ...], new: tuple[int, ...]) -> tuple[Indices, Indices]:
     """Where objects, and pairs of them, stood among others.
 
     Args:

@@ -120,7 +120,7 @@ def box_gap(a: Box, b: Box) -> float:
     return hypot(dx, dy)
 
 
-def box_overlap(a: Box, b: Box) -> float:
+def box_intersection(a: Box, b: Box) -> float:
     """Area of the intersection of two boxes, square pixels."""
     w = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
     h = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
@@ -129,22 +129,22 @@ def box_overlap(a: Box, b: Box) -> float:
 
 def box_iou(a: Box, b: Box) -> float:
     """Intersection over union of two boxes, 0 to 1."""
-    shared = box_overlap(a, b)
+    shared = box_intersection(a, b)
     union = a[2] * a[3] + b[2] * b[3] - shared
     return shared / union if union > 0 else 0.0
 
 
-def grow(box: Box, margin: int) -> Box:
+def expanded(box: Box, margin: int) -> Box:
     """A box made larger by `margin` pixels on each side."""
     return (box[0] - margin, box[1] - margin, box[2] + 2 * margin, box[3] + 2 * margin)
 
 
-def shift(box: Box, dx: float, dy: float) -> Box:
+def shifted(box: Box, dx: float, dy: float) -> Box:
     """A box moved by (dx, dy) pixels, rounded."""
     return (round(box[0] + dx), round(box[1] + dy), box[2], box[3])
 
 
-def moved(region: Region, dx: float, dy: float) -> Region:
+def shifted_region(region: Region, dx: float, dy: float) -> Region:
     """The same region at another place, in whole pixels.
 
     Args:
@@ -158,7 +158,7 @@ def moved(region: Region, dx: float, dy: float) -> Region:
     step = np.array([round(dx), round(dy)], dtype=np.float32)
     return Region(
         id=region.id,
-        bbox=shift(region.bbox, float(step[0]), float(step[1])),
+        bbox=shifted(region.bbox, float(step[0]), float(step[1])),
         mask=region.mask,
         contour=region.contour + step,
         centroid=(region.centroid[0] + float(step[0]), region.centroid[1] + float(step[1])),
@@ -171,7 +171,7 @@ def moved(region: Region, dx: float, dy: float) -> Region:
     )
 
 
-def dense(points: Floats, step: float = 2.0) -> Floats:
+def densified(points: Floats, step: float = 2.0) -> Floats:
     """A closed outline with points at most `step` pixels apart; unchanged where it has them."""
     to = np.roll(points, -1, axis=0)
     length = np.hypot(*(to - points).T)
@@ -183,6 +183,6 @@ def dense(points: Floats, step: float = 2.0) -> Floats:
     return np.asarray(points[start] + share[:, None] * (to - points)[start])
 
 
-def scale(frame_size: tuple[int, int]) -> float:
+def image_diagonal(frame_size: tuple[int, int]) -> float:
     """Image diagonal, pixels; what thresholds are relative to."""
     return hypot(*frame_size)

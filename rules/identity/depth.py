@@ -9,8 +9,8 @@ from types import MappingProxyType
 
 from visup.agent import Depth, Mind, ObjectBelief, Observation, Outcome
 from visup.agent.model.fast_replace import replace
-from visup.rules.presence.association import owners
-from visup.rules.presence.sightings import visible_share
+from visup.rules.presence.association import region_owners
+from visup.rules.presence.object_tracks import visible_share
 
 DEPTHS = "rules.depth"
 
@@ -34,7 +34,7 @@ class DepthSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class DepthEstimate:
     """A smoothed depth: model name, value, deviation, and seconds when it was last renewed."""
 
     name: str
@@ -44,7 +44,7 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class BelieveDepth:
+class DepthReasoner:
     """Reasoner of the cogitate phase, after the votes: the depth of each object.
 
     Depths under another identity are left out, as are those of objects hidden in part. While other
@@ -55,10 +55,10 @@ class BelieveDepth:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Take in one observation; see `Reasoner`."""
-        old: Mapping[int, Kept] = mind.memory.get(DEPTHS, MappingProxyType({}))
-        owner = owners(mind)
+        old: Mapping[int, DepthEstimate] = mind.memory.get(DEPTHS, MappingProxyType({}))
+        owner = region_owners(mind)
         told = {(owner.get(d.region_id), d.name): d for d in observation.of("depth")}
-        kept: dict[int, Kept] = {}
+        kept: dict[int, DepthEstimate] = {}
         beliefs: list[ObjectBelief] = []
         for i, belief in mind.objects.items():
             new = told.get((i, belief.name))
@@ -82,14 +82,16 @@ class BelieveDepth:
         weights = [c.share**2 for c in belief.candidates]
         return bool(weights) and weights[0] >= self.settings.clear * sum(weights)
 
-    def _smooth(self, old: Kept | None, new: Depth | None, name: str, now: float) -> Kept | None:
+    def _smooth(
+        self, old: DepthEstimate | None, new: Depth | None, name: str, now: float
+    ) -> DepthEstimate | None:
         if old is not None and (old.name != name or now - old.time > self.settings.fade_s):
             old = None
         if new is None:
             return old
         if old is None:
-            return Kept(name, new.depth, new.sigma, now)
+            return DepthEstimate(name, new.depth, new.sigma, now)
         share = 1.0 - exp(-(now - old.time) / self.settings.tau_s)
         depth = old.depth + share * (new.depth - old.depth)
         sigma = old.sigma + share * (new.sigma - old.sigma)
-        return Kept(name, depth, sigma, now)
+        return DepthEstimate(name, depth, sigma, now)

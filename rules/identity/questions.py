@@ -47,7 +47,7 @@ class QuestionSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Doubtful:
+class Ambiguity:
     """Since when an object's names are close, and when it was last asked about; seconds or None."""
 
     since: float | None = None
@@ -55,20 +55,20 @@ class Doubtful:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class QuestionReasoner:
     """Reasoner of the cogitate phase, after the votes: keeps the questions that wait."""
 
     settings: QuestionSettings = field(default_factory=QuestionSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[int, Doubtful] = mind.memory.get(QUESTIONS, MappingProxyType({}))
+        old: Mapping[int, Ambiguity] = mind.memory.get(QUESTIONS, MappingProxyType({}))
         open_now = {q.object_id: q for q in mind.questions}
-        doubts: dict[int, Doubtful] = {}
+        doubts: dict[int, Ambiguity] = {}
         waiting: list[Question] = []
         asked: list[Question] = []
         for belief in mind.present():
-            doubt = self._doubt(belief, old.get(belief.id, Doubtful()), mind)
+            doubt = self._doubt(belief, old.get(belief.id, Ambiguity()), mind)
             question = open_now.get(belief.id)
             if doubt.since is None:
                 question = None
@@ -77,13 +77,13 @@ class Ask:
                 doubt = replace(doubt, asked=mind.time)
                 asked.append(question)
             waiting += [question] if question else []
-            if doubt != Doubtful():
+            if doubt != Ambiguity():
                 doubts[belief.id] = doubt
         mind = mind.remember(QUESTIONS, MappingProxyType(doubts), questions=tuple(waiting))
         events = tuple(_event(q, observation) for q in asked)
         return Outcome(mind, events, directives=tuple(_directives(waiting)))
 
-    def _doubt(self, belief: ObjectBelief, before: Doubtful, mind: Mind) -> Doubtful:
+    def _doubt(self, belief: ObjectBelief, before: Ambiguity, mind: Mind) -> Ambiguity:
         if belief.presence is not Presence.SEEN:
             return before
         close = belief.id not in mind.answers and len(self._names(belief)) > 1
@@ -91,7 +91,7 @@ class Ask:
             return replace(before, since=None)
         return before if before.since is not None else replace(before, since=mind.time)
 
-    def _ripe(self, doubt: Doubtful, now: float) -> bool:
+    def _ripe(self, doubt: Ambiguity, now: float) -> bool:
         s = self.settings
         again = doubt.asked is None or now - doubt.asked >= s.again_s
         return again and doubt.since is not None and now - doubt.since >= s.patience_s - 1e-6
@@ -108,10 +108,10 @@ class Ask:
 
     def _question(self, mind: Mind, belief: ObjectBelief) -> Question:
         names = self._names(belief)
-        return Question(belief.id, names, mind.time, wording(mind, belief.id, names))
+        return Question(belief.id, names, mind.time, question_text(mind, belief.id, names))
 
 
-def wording(mind: Mind, object_id: int, names: tuple[str, ...]) -> str:
+def question_text(mind: Mind, object_id: int, names: tuple[str, ...]) -> str:
     """The question in words: 'Is object 2 the arm or the guitar?'."""
     spoken = [f"the {spaced(called(mind, name))}" for name in names]
     return f"Is object {object_id} {', '.join(spoken[:-1])} or {spoken[-1]}?"

@@ -48,11 +48,11 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.mind import UNKNOWN_OBJECT
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
-from visup.rules.presence.lifecycle import visible_share
+from visup.rules.presence.reasoner import visible_share
 from visup.rules.wording.sentences import called, seems, spaced
 
 VOTES = "rules.votes"
-Tally = tuple[tuple[str, float], ...]
+VoteCounts = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class VoteSettings:
 
 
 @dataclass(frozen=True)
-class Ballot:
+class ObjectVotes:
     """What is remembered of one object's votes.
 
     Attributes:
@@ -106,7 +106,7 @@ class Ballot:
         told: The name that was told last, or None.
     """
 
-    tally: Tally = ()
+    tally: VoteCounts = ()
     stranger: float = 0.0
     heard: float | None = None
     leader: str | None = None
@@ -115,7 +115,7 @@ class Ballot:
 
 
 @dataclass(frozen=True, slots=True)
-class Ballots:
+class VoteMemory:
     """All votes.
 
     Attributes:
@@ -124,7 +124,7 @@ class Ballots:
     """
 
     time: float
-    of: Mapping[int, Ballot] = field(default_factory=lambda: MappingProxyType({}))
+    of: Mapping[int, ObjectVotes] = field(default_factory=lambda: MappingProxyType({}))
 
 
 def weights(
@@ -168,9 +168,14 @@ def _worth(similarity: float, settings: VoteSettings) -> float:
     return max(0.0, similarity - settings.least_similarity) / room
 
 
-def count(
-    tally: Tally, new: Mapping[str, float], dt: float, tau: float, most: int, visible: float = 1.0
-) -> Tally:
+def updated_votes(
+    tally: VoteCounts,
+    new: Mapping[str, float],
+    dt: float,
+    tau: float,
+    most: int,
+    visible: float = 1.0,
+) -> VoteCounts:
     """One step of the vote for one object.
 
     Args:
@@ -193,7 +198,7 @@ def count(
 
 
 def candidates(
-    tally: Tally, settings: VoteSettings, stranger: float = 0.0
+    tally: VoteCounts, settings: VoteSettings, stranger: float = 0.0
 ) -> tuple[Candidate, ...]:
     """Candidates that votes allow, each with its likelihood.
 
@@ -217,33 +222,33 @@ def candidates(
     return tuple(c for c in found if c.share >= settings.least_share)
 
 
-def unknown(tally: Tally, settings: VoteSettings, stranger: float) -> float:
+def unknown_probability(tally: VoteCounts, settings: VoteSettings, stranger: float) -> float:
     """How likely an object is none of the models, 0 to 1; 1 while nothing was said of it."""
     odds = sum(exp(settings.evidence * (v - stranger)) for _, v in tally)
     return 1.0 / (1.0 + odds)
 
 
-def settled(name: str, tally: Tally) -> Candidate:
+def confirmed_candidate(name: str, tally: VoteCounts) -> Candidate:
     """The only candidate, once the operator has said what an object is."""
     return Candidate(name, dict(tally).get(name, 0.0), 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Votes:
+class IdentityReasoner:
     """Reasoner of the cogitate phase: counts votes and tells who is who."""
 
     settings: VoteSettings = VoteSettings()
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Count one step; see `Reasoner`."""
-        old: Ballots = mind.memory.get(VOTES, Ballots(observation.time))
+        old: VoteMemory = mind.memory.get(VOTES, VoteMemory(observation.time))
         dt = max(0.0, observation.time - old.time)
         said = hypotheses_by_object(mind, observation)
-        ballots: dict[int, Ballot] = {}
+        ballots: dict[int, ObjectVotes] = {}
         events: list[Event] = []
         beliefs: list[ObjectBelief] = []
         for object_id, belief in sorted(mind.objects.items()):
-            before = old.of.get(object_id, Ballot())
+            before = old.of.get(object_id, ObjectVotes())
             ballot = self._count(mind, belief, before, said.get(object_id, ()), dt)
             believed = self._believe(mind, belief, ballot)
             beliefs.append(believed)
@@ -254,17 +259,17 @@ class Votes:
                 events += [event] if belief.confirmed else []
             ballots[object_id] = after
         mind = mind.with_objects(*beliefs)
-        mind = mind.remember(VOTES, Ballots(observation.time, MappingProxyType(ballots)))
+        mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(ballots)))
         return Outcome(mind, tuple(events))
 
     def _count(
         self,
         mind: Mind,
         belief: ObjectBelief,
-        ballot: Ballot,
+        ballot: ObjectVotes,
         said: tuple[Hypothesis, ...],
         dt: float,
-    ) -> Ballot:
+    ) -> ObjectVotes:
         s = self.settings
         visible = visible_share(mind, belief.id)
         hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
@@ -272,30 +277,32 @@ class Votes:
         tau = s.tau_hidden_s if hidden or blind else s.tau_s
         stranger = ballot.stranger * exp(-dt / tau)
         if hidden or blind or not said:
-            tally = count(ballot.tally, {}, dt, tau, s.most_candidates)
+            tally = updated_votes(ballot.tally, {}, dt, tau, s.most_candidates)
             return replace(ballot, tally=tally, stranger=stranger)
         new = 1.0 if ballot.heard is None else min(1.0, (mind.time - ballot.heard) / s.apart_s)
         heard = weights(said, s, awaited(mind, belief.id))
         # Views that do not hang together over time speak against a name (paper, figure 5).
         likely = {n: w * pose_support(mind, belief.id, n) for n, w in heard.items()}
-        tally = count(ballot.tally, likely, dt, tau, s.most_candidates, new * visible)
+        tally = updated_votes(ballot.tally, likely, dt, tau, s.most_candidates, new * visible)
         stranger += new * visible * _worth(s.stranger, s)
         return replace(ballot, tally=tally, stranger=stranger, heard=mind.time)
 
-    def _believe(self, mind: Mind, belief: ObjectBelief, ballot: Ballot) -> ObjectBelief:
+    def _believe(self, mind: Mind, belief: ObjectBelief, ballot: ObjectVotes) -> ObjectBelief:
         s = self.settings
         answer = mind.answers.get(belief.id)
         if answer == UNKNOWN_OBJECT:
             return replace(belief, candidates=(), unknown=1.0)
         if answer is not None:
-            return replace(belief, candidates=(settled(answer, ballot.tally),), unknown=0.0)
+            return replace(
+                belief, candidates=(confirmed_candidate(answer, ballot.tally),), unknown=0.0
+            )
         return replace(
             belief,
             candidates=candidates(ballot.tally, s, ballot.stranger),
-            unknown=unknown(ballot.tally, s, ballot.stranger),
+            unknown=unknown_probability(ballot.tally, s, ballot.stranger),
         )
 
-    def _lead(self, ballot: Ballot, named: tuple[Candidate, ...], now: float) -> Ballot:
+    def _lead(self, ballot: ObjectVotes, named: tuple[Candidate, ...], now: float) -> ObjectVotes:
         s = self.settings
         leader = named[0].name if named and named[0].confidence >= s.settle else None
         since = ballot.leads_since if leader == ballot.leader else now

@@ -18,7 +18,7 @@ _SMALL = 1e-12
 
 
 @compiled
-def turn(rate: Floats, seconds: float, matrix: Floats, out: Floats) -> None:
+def rotate(rate: Floats, seconds: float, matrix: Floats, out: Floats) -> None:
     """What a (3, 3) matrix becomes after a turn at a rate (3,), radians per second (Rodrigues)."""
     x, y, z = rate[0] * seconds, rate[1] * seconds, rate[2] * seconds
     angle = sqrt(x * x + y * y + z * z)
@@ -35,7 +35,7 @@ def turn(rate: Floats, seconds: float, matrix: Floats, out: Floats) -> None:
 
 
 @compiled
-def between(
+def rotation_cost(
     one: Floats, other: Floats, roll_counts: bool, swing_is: float, roll_is: float
 ) -> float:
     """Half the squares of swing and roll between two orientations; NaN where one is not known.
@@ -76,7 +76,7 @@ def turn_costs(
     """Costs (S, H) of choosing each hypothesis of a level after what each path chose last.
 
     Args:
-        numbers: As of `grow`.
+        numbers: As of `extend_paths`.
         chosen: (S,) of the tree, as are the following up to `rolled`.
         view: (S,).
         orientation: (S, 3, 3).
@@ -95,10 +95,10 @@ def turn_costs(
         seconds = time - chosen[i]
         swing_is = hypot(numbers[5], numbers[7] * seconds)
         roll_is = hypot(numbers[6], numbers[7] * seconds)
-        turn(rate, seconds, orientation[i], before)
+        rotate(rate, seconds, orientation[i], before)
         for k in range(len(level_view)):
             both = rolled[i] and level_rolled[k]
-            apart = between(before, level_orientation[k], both, swing_is, roll_is)
+            apart = rotation_cost(before, level_orientation[k], both, swing_is, roll_is)
             if isnan(apart):
                 cost[i, k] = 0.0 if view[i] == level_view[k] else other_view
             else:
@@ -107,7 +107,7 @@ def turn_costs(
 
 
 @compiled
-def grow(
+def extend_paths(
     numbers: Floats,
     cost: Floats,
     view: Ints,

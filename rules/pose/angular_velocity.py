@@ -18,8 +18,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from visup.agent import Spin
+from visup.rules.pose.angular_velocity_fit import (
+    FitSettings,
+    OrientationSeries,
+    SpinFit,
+    first_rate,
+    long_pieces,
+    thinned,
+)
 from visup.rules.pose.rotations import Floats
-from visup.rules.pose.spin_fit import Fit, FitSettings, Turns, first_rate, long_pieces, thinned
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +61,7 @@ class SpinSettings(FitSettings):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rate:
+class AngularVelocity:
     """A fitted rate.
 
     Attributes:
@@ -77,9 +84,9 @@ class Rate:
         return float(np.sqrt(np.trace(self.covariance) / 3))
 
 
-def measured_rate(
-    turns: Turns, now: float, before: Rate | None, settings: SpinSettings
-) -> Rate | None:
+def estimate_angular_velocity(
+    turns: OrientationSeries, now: float, before: AngularVelocity | None, settings: SpinSettings
+) -> AngularVelocity | None:
     """The rate at which an object turns now.
 
     Args:
@@ -95,22 +102,22 @@ def measured_rate(
     if before is not None:
         begin = max(begin, before.since - settings.kept_s)
     turns = turns.since(begin - 1e-6)
-    recent = _fitted(turns.since(now - settings.recent_s), None, settings)
-    recent = recent or _fitted(turns, None, settings)
+    recent = _steady_fit(turns.since(now - settings.recent_s), None, settings)
+    recent = recent or _steady_fit(turns, None, settings)
     if recent is None:
         return None
-    known = _known(turns, before, settings) if before is not None else None
+    known = _refitted_change(turns, before, settings) if before is not None else None
     even = turns if known is None else turns.since(known.since)
-    steady = _fitted(even, recent.rates[0] if before is None else before.vector, settings)
+    steady = _steady_fit(even, recent.rates[0] if before is None else before.vector, settings)
     if steady is None:
-        return _rate_of(known or recent, settings)
-    changed = _changed(steady, even, now, recent.rates[0], settings)
-    return _doubted(_rate_of(changed or known or steady, settings), recent, settings)
+        return _angular_velocity_of(known or recent, settings)
+    changed = _change_fit(steady, even, now, recent.rates[0], settings)
+    return _inflated(_angular_velocity_of(changed or known or steady, settings), recent, settings)
 
 
-def _doubted(rate: Rate, recent: Fit, settings: SpinSettings) -> Rate:
+def _inflated(rate: AngularVelocity, recent: SpinFit, settings: SpinSettings) -> AngularVelocity:
     """The same rate, less certain when the last seconds alone tell another: it may just be changing."""
-    lately = _rate_of(recent, settings)
+    lately = _angular_velocity_of(recent, settings)
     apart = lately.vector - rate.vector
     both = lately.covariance + rate.covariance
     if apart @ np.linalg.solve(both, apart) < settings.doubt:
@@ -118,7 +125,9 @@ def _doubted(rate: Rate, recent: Fit, settings: SpinSettings) -> Rate:
     return replace(rate, covariance=rate.covariance + np.outer(apart, apart) / 4)
 
 
-def _known(turns: Turns, before: Rate, settings: SpinSettings) -> Fit | None:
+def _refitted_change(
+    turns: OrientationSeries, before: AngularVelocity, settings: SpinSettings
+) -> SpinFit | None:
     """The fit with the change that was found before, or None when there is none (any more)."""
     if before.before is None or len(turns.times) < 2 * settings.least:
         return None
@@ -128,11 +137,11 @@ def _known(turns: Turns, before: Rate, settings: SpinSettings) -> Fit | None:
     if (pieces >= 0).sum() < 2 * settings.least:
         return None
     rates = np.stack([before.before, before.vector])
-    fit = Fit(*thinned(turns, pieces, settings), rates, before.since, settings)
+    fit = SpinFit(*thinned(turns, pieces, settings), rates, before.since, settings)
     return fit if fit.run(settings.steps) and fit.contrast() > settings.unchanged else None
 
 
-def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
+def spin_of(rate: AngularVelocity, settings: SpinSettings) -> Spin | None:
     """A rate in the words of the mind, or None when it is too uncertain to be told."""
     length = float(np.linalg.norm(rate.vector))
     axis = rate.vector / length if length > 1e-12 else np.array([0.0, 0.0, 1.0])
@@ -147,7 +156,9 @@ def spin_of(rate: Rate, settings: SpinSettings) -> Spin | None:
     return Spin(degrees, sigma, (x, y, z))
 
 
-def _fitted(turns: Turns, start: Floats | None, settings: SpinSettings) -> Fit | None:
+def _steady_fit(
+    turns: OrientationSeries, start: Floats | None, settings: SpinSettings
+) -> SpinFit | None:
     """One rate for all of the time, or None when too few orientations hang together."""
     if len(turns.times) < settings.least:
         return None
@@ -155,14 +166,14 @@ def _fitted(turns: Turns, start: Floats | None, settings: SpinSettings) -> Fit |
     pieces = long_pieces(turns, guess, settings)
     if (pieces >= 0).sum() < settings.least:
         return None
-    fit = Fit(*thinned(turns, pieces, settings), np.stack([guess]), None, settings)
+    fit = SpinFit(*thinned(turns, pieces, settings), np.stack([guess]), None, settings)
     steps = settings.steps if start is not None else 2 * settings.steps + 1
     return fit if fit.run(steps) else None
 
 
-def _changed(
-    steady: Fit, turns: Turns, now: float, after: Floats, settings: SpinSettings
-) -> Fit | None:
+def _change_fit(
+    steady: SpinFit, turns: OrientationSeries, now: float, after: Floats, settings: SpinSettings
+) -> SpinFit | None:
     """The best fit of two rates with a change between them, or None when there is none to be believed."""
     before = steady.rates[0]
     pieces = long_pieces(turns, before, settings)
@@ -172,22 +183,22 @@ def _changed(
     times = [now - ago for ago in settings.changes_s]
     inside = [t for t in times if turns.times[0] + 1.0 < t < turns.times[-1] - 1.0]
     # What one step saves tells where to look: the promise of a step alone is often an empty one.
-    tried = [Fit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
+    tried = [SpinFit(turns, pieces, np.stack([before, before]), t, settings) for t in inside]
     tried = [fit for fit in tried if fit.run(1)]
     if not tried or min(fit.cost for fit in tried) > steady.cost:
         return None
     change = min(tried, key=lambda fit: fit.cost).since
-    fit = Fit(turns, pieces, np.stack([before, after]), change, settings)
+    fit = SpinFit(turns, pieces, np.stack([before, after]), change, settings)
     believed = fit.run(2 * settings.steps) and fit.contrast() > settings.change
     return fit if believed and _gain(steady, fit) > settings.gain else None
 
 
-def _gain(steady: Fit, changed: Fit) -> float:
+def _gain(steady: SpinFit, changed: SpinFit) -> float:
     """How much better two rates fit: cost saved by each further parameter, in costs of a residual."""
     return (steady.cost - changed.cost) / 4 / max(changed.cost / changed.residuals, 1e-12)
 
 
-def _rate_of(fit: Fit, settings: SpinSettings) -> Rate:
+def _angular_velocity_of(fit: SpinFit, settings: SpinSettings) -> AngularVelocity:
     covariance, span = fit.covariance(-1), max(fit.span, 1e-6)
     # However still the views stand, the object may have turned a part of the way to the next.
     unseen = (np.radians(settings.view_deg) / span) ** 2
@@ -196,4 +207,4 @@ def _rate_of(fit: Fit, settings: SpinSettings) -> Rate:
     scatter = float(np.trace(covariance))
     share = scatter / (scatter + 3 * unseen)
     before = fit.rates[0] if fit.change is not None else None
-    return Rate(fit.rates[-1], covariance + np.eye(3) * unseen, share, fit.since, before)
+    return AngularVelocity(fit.rates[-1], covariance + np.eye(3) * unseen, share, fit.since, before)

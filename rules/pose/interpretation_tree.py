@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Hypothesis
 from visup.agent.model.orientation import orientations, swing_and_roll
-from visup.rules.pose._interpretation_tree_jit import NONE, grow
+from visup.rules.pose._interpretation_tree_jit import NONE, extend_paths
 from visup.rules.pose.rotations import Floats, nearest_rotations
 
 
@@ -72,7 +72,7 @@ class TreeSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Turning:
+class SpinPrior:
     """How an object is believed to turn, as far as the tree is concerned.
 
     Attributes:
@@ -85,7 +85,7 @@ class Turning:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Level:
+class TreeLevel:
     """The hypotheses of one model at one look.
 
     Attributes:
@@ -105,7 +105,7 @@ class Level:
     between: Floats
 
 
-_NO_LEVEL = Level(
+_NO_LEVEL = TreeLevel(
     0.0,
     np.zeros(0, np.int64),
     np.zeros((0, 3, 3)),
@@ -116,7 +116,7 @@ _NO_LEVEL = Level(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tree:
+class InterpretationTree:
     """The paths of one model that may still turn out cheapest, each by where it stands now.
 
     Attributes:
@@ -152,9 +152,9 @@ class Tree:
         return bool(self.view[self.best] != NONE)
 
 
-def planted(settings: TreeSettings) -> Tree:
+def empty_tree(settings: TreeSettings) -> InterpretationTree:
     """A tree without any level."""
-    return Tree(
+    return InterpretationTree(
         -np.inf,
         np.zeros(1),
         np.full(1, NONE, np.int64),
@@ -168,7 +168,7 @@ def planted(settings: TreeSettings) -> Tree:
 
 def levels_of(
     hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings
-) -> dict[str, Level]:
+) -> dict[str, TreeLevel]:
     """The levels that the hypotheses of one look make, by model.
 
     Args:
@@ -186,7 +186,7 @@ def levels_of(
     return {name: _part(whole, at, settings) for name, at in zip(kept, places, strict=True)}
 
 
-def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings) -> Level:
+def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings) -> TreeLevel:
     """One level of hypotheses of all models, which do not tell anything together yet."""
     lost = (np.nan, np.nan, np.nan)
     similarity = np.array([h.similarity for h in hypotheses])
@@ -194,7 +194,7 @@ def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings
         np.array([h.direction or lost for h in hypotheses]),
         np.array([h.rotation or 0.0 for h in hypotheses]),
     )
-    return Level(
+    return TreeLevel(
         time,
         np.array([h.view for h in hypotheses]),
         orientation,
@@ -204,11 +204,11 @@ def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings
     )
 
 
-def _part(whole: Level, at: slice, settings: TreeSettings) -> Level:
+def _part(whole: TreeLevel, at: slice, settings: TreeSettings) -> TreeLevel:
     """The hypotheses of one model."""
     orientation, cost = whole.orientation[at], whole.cost[at]
     between = _between(orientation, -cost * settings.similarity_sigma, settings)
-    return Level(whole.time, whole.views[at], orientation, whole.rolled[at], cost, between)
+    return TreeLevel(whole.time, whole.views[at], orientation, whole.rolled[at], cost, between)
 
 
 def _between(orientation: Floats, similarity: Floats, settings: TreeSettings) -> Floats:
@@ -226,9 +226,13 @@ def _between(orientation: Floats, similarity: Floats, settings: TreeSettings) ->
     return nearest_rotations(np.tensordot(weight, orientation, axes=1))
 
 
-def grown(
-    tree: Tree, level: Level | None, time: float, turning: Turning, settings: TreeSettings
-) -> Tree:
+def extended_tree(
+    tree: InterpretationTree,
+    level: TreeLevel | None,
+    time: float,
+    turning: SpinPrior,
+    settings: TreeSettings,
+) -> InterpretationTree:
     """The tree after one more look.
 
     Args:
@@ -240,7 +244,7 @@ def grown(
     """
     weight = look_weight(time - tree.time, settings)
     level = level or _NO_LEVEL
-    found = grow(
+    found = extend_paths(
         np.array((time, weight, *_costs(settings), turning.sigma, settings.most_paths)),
         tree.cost,
         tree.view,
@@ -255,7 +259,7 @@ def grown(
         level.cost,
         np.array(turning.rate),
     )
-    return Tree(time, *found[:7], tree.total + found[7])
+    return InterpretationTree(time, *found[:7], tree.total + found[7])
 
 
 def _costs(settings: TreeSettings) -> tuple[float, float, float, float, float]:
@@ -268,7 +272,7 @@ def look_weight(waited: float, settings: TreeSettings) -> float:
     return min(1.0, max(waited, 0.0) / settings.independent_s)
 
 
-def rival_gap(tree: Tree, settings: TreeSettings) -> float:
+def rival_gap(tree: InterpretationTree, settings: TreeSettings) -> float:
     """How much dearer the cheapest path is that ends in quite another orientation than the best.
 
     Returns:
@@ -281,7 +285,7 @@ def rival_gap(tree: Tree, settings: TreeSettings) -> float:
     return float(tree.cost[other].min()) if other.any() else settings.jump
 
 
-def lead(level: Level, chosen: int, settings: TreeSettings) -> float:
+def similarity_lead(level: TreeLevel, chosen: int, settings: TreeSettings) -> float:
     """By how much less a level's chosen hypothesis costs than the best of quite another orientation.
 
     Args:

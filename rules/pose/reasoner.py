@@ -19,26 +19,31 @@ from visup.agent import Hypothesis, Mind, ObjectBelief, Observation, Outcome, Po
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.orientation import views
 from visup.rules.pose._interpretation_tree_jit import NONE
-from visup.rules.pose.angular_velocity import Rate, SpinSettings, measured_rate, spin_of
+from visup.rules.pose.angular_velocity import (
+    AngularVelocity,
+    SpinSettings,
+    estimate_angular_velocity,
+    spin_of,
+)
+from visup.rules.pose.angular_velocity_fit import OrientationSeries
 from visup.rules.pose.interpretation_tree import (
-    Level,
-    Tree,
+    InterpretationTree,
+    SpinPrior,
+    TreeLevel,
     TreeSettings,
-    Turning,
-    grown,
-    lead,
+    empty_tree,
+    extended_tree,
     levels_of,
     look_weight,
-    planted,
     rival_gap,
+    similarity_lead,
 )
 from visup.rules.pose.rotations import Floats
-from visup.rules.pose.spin_fit import Turns
 from visup.rules.presence.association import hypotheses_by_object
-from visup.rules.presence.lifecycle import visible_share
+from visup.rules.presence.reasoner import visible_share
 
 POSES = "rules.pose"
-Look = tuple[tuple[str, int, float, float | None], ...]
+LookSignature = tuple[tuple[str, int, float, float | None], ...]
 """What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
 
 
@@ -88,7 +93,7 @@ class PoseSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class PoseTrack:
     """What is remembered of one object's views.
 
     Attributes:
@@ -109,9 +114,9 @@ class Track:
     """
 
     time: float = -np.inf
-    said: Look = ()
-    trees: Mapping[str, Tree] = field(default_factory=lambda: MappingProxyType({}))
-    levels: tuple[Mapping[str, Level], ...] = ()
+    said: LookSignature = ()
+    trees: Mapping[str, InterpretationTree] = field(default_factory=lambda: MappingProxyType({}))
+    levels: tuple[Mapping[str, TreeLevel], ...] = ()
     strain: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     untold: float = 0.0
     support: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
@@ -119,18 +124,18 @@ class Track:
     name: str = ""
     lead: float = 0.0
     settled: tuple[tuple[float, Floats], ...] = ()
-    rate: Rate | None = None
+    rate: AngularVelocity | None = None
     rated: float = -np.inf
     pose: Pose | None = None
 
 
-NO_TRACK = Track()
-NO_TRACKS: Mapping[int, Track] = MappingProxyType({})
+NO_TRACK = PoseTrack()
+NO_TRACKS: Mapping[int, PoseTrack] = MappingProxyType({})
 
 
-def tracks(mind: Mind) -> Mapping[int, Track]:
+def pose_tracks(mind: Mind) -> Mapping[int, PoseTrack]:
     """Object id -> what is remembered of its views."""
-    found: Mapping[int, Track] = mind.memory.get(POSES, NO_TRACKS)
+    found: Mapping[int, PoseTrack] = mind.memory.get(POSES, NO_TRACKS)
     return found
 
 
@@ -146,12 +151,12 @@ def pose_support(mind: Mind, object_id: int, name: str) -> float:
         0 to 1: 1 for the model whose cheapest path costs least and for those that cost little more;
         1 as well when nothing is known of the object's views.
     """
-    track = tracks(mind).get(object_id)
+    track = pose_tracks(mind).get(object_id)
     return 1.0 if track is None else track.support.get(name, track.unsaid)
 
 
 @dataclass(frozen=True, slots=True)
-class BelievePose:
+class PoseReasoner:
     """Reasoner of the cogitate phase: which way each object faces and how it turns. Runs after the votes."""
 
     settings: PoseSettings = PoseSettings()
@@ -159,7 +164,7 @@ class BelievePose:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Take in one step's view hypotheses; see `Reasoner`."""
         said = hypotheses_by_object(mind, observation)
-        known, kept, beliefs = tracks(mind), {}, []
+        known, kept, beliefs = pose_tracks(mind), {}, []
         due = self._due(mind, said, known)
         for object_id, belief in mind.objects.items():
             track = known.get(object_id, NO_TRACK)
@@ -177,14 +182,14 @@ class BelievePose:
         self,
         mind: Mind,
         said: Mapping[int, tuple[Hypothesis, ...]],
-        known: Mapping[int, Track],
+        known: Mapping[int, PoseTrack],
     ) -> frozenset[int]:
         """Objects whose trees grow now: looked at anew, not too soon, and within the budget."""
         s = self.settings
         waiting = [
             (track.time, object_id)
             for object_id, hypotheses in said.items()
-            if (track := known.get(object_id, NO_TRACK)).said != _look(hypotheses)
+            if (track := known.get(object_id, NO_TRACK)).said != _look_signature(hypotheses)
             and mind.time - track.time >= s.every_s - 1e-9
             and (belief := mind.objects.get(object_id)) is not None
             and self._in_sight(mind, belief)
@@ -196,10 +201,10 @@ class BelievePose:
         return seen and visible_share(mind, belief.id) >= self.settings.least_visible
 
     def _looked(
-        self, track: Track, hypotheses: Sequence[Hypothesis], name: str, now: float
-    ) -> Track:
+        self, track: PoseTrack, hypotheses: Sequence[Hypothesis], name: str, now: float
+    ) -> PoseTrack:
         """The track after a look."""
-        said = _look(hypotheses)
+        said = _look_signature(hypotheses)
         levels = levels_of(hypotheses, now, self.settings.tree)
         track = self._settled(track, name)
         waited = now - track.time
@@ -207,19 +212,19 @@ class BelievePose:
         track = self._led(track, name, waited)
         return replace(track, pose=self._pose(track, name))
 
-    def _grown(self, track: Track, levels: dict[str, Level], now: float) -> Track:
+    def _grown(self, track: PoseTrack, levels: dict[str, TreeLevel], now: float) -> PoseTrack:
         """The trees with one more level, and what their models have cost."""
         s = self.settings
-        turning = _turning(track.rate, s)
+        turning = _spin_prior(track.rate, s)
         fade = exp(-min(now - track.time, 1e6) / s.memory_s)
         untold = track.untold * fade + look_weight(now - track.time, s.tree) * s.tree.wrong
         trees, strain = {}, {}
         for name in track.trees.keys() | levels.keys():
-            before = track.trees.get(name) or planted(s.tree)
+            before = track.trees.get(name) or empty_tree(s.tree)
             new = name not in track.trees
             # A model that is hypothesised for the first time was wrong at all looks before.
             before = replace(before, time=track.time) if new else before
-            tree = grown(before, levels.get(name), now, turning, s.tree)
+            tree = extended_tree(before, levels.get(name), now, turning, s.tree)
             past = track.untold if new else track.strain[name]
             trees[name], strain[name] = tree, past * fade + tree.total - before.total
         least = min(strain.values())
@@ -238,7 +243,7 @@ class BelievePose:
     def _support(self, dearer: float) -> float:
         return exp(-max(0.0, dearer - self.settings.free_cost) / self.settings.support_cost)
 
-    def _settled(self, track: Track, name: str) -> Track:
+    def _settled(self, track: PoseTrack, name: str) -> PoseTrack:
         """The track with the look that the trees are about to forget; another name begins anew."""
         s = self.settings
         if name != track.name:
@@ -257,30 +262,32 @@ class BelievePose:
         forgotten = settled[0][0] < oldest
         return replace(track, settled=settled[1:] if forgotten else settled)
 
-    def _rated(self, track: Track, name: str, now: float) -> Track:
+    def _rated(self, track: PoseTrack, name: str, now: float) -> PoseTrack:
         if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
             return track
-        turns = _turns(track, name, self.settings.tree.lag)
+        turns = _orientation_series(track, name, self.settings.tree.lag)
         return replace(
-            track, rate=measured_rate(turns, now, track.rate, self.settings.spin), rated=now
+            track,
+            rate=estimate_angular_velocity(turns, now, track.rate, self.settings.spin),
+            rated=now,
         )
 
-    def _led(self, track: Track, name: str, waited: float) -> Track:
+    def _led(self, track: PoseTrack, name: str, waited: float) -> PoseTrack:
         """The track with the lead of the chosen hypotheses renewed."""
         level, tree = track.levels[-1].get(name), track.trees.get(name)
         if level is None or tree is None:
             return track
         fade = exp(-min(waited, 1e6) / self.settings.memory_s)
-        now = lead(level, int(tree.path[tree.best, -1]), self.settings.tree)
+        now = similarity_lead(level, int(tree.path[tree.best, -1]), self.settings.tree)
         return replace(track, lead=track.lead * fade + now * (1.0 - fade))
 
-    def _pose(self, track: Track, name: str) -> Pose | None:
+    def _pose(self, track: PoseTrack, name: str) -> Pose | None:
         """What the cheapest path of a model tells."""
         tree = track.trees.get(name)
         if tree is None or not tree.begun:
             return None
         k = tree.best
-        orientation = _last(track, name, tree)
+        orientation = _last_orientation(track, name, tree)
         if np.isnan(orientation).any():
             return None
         direction, rotation = views(orientation)
@@ -295,7 +302,7 @@ class BelievePose:
             spin=spin_of(track.rate, self.settings.spin) if track.rate else None,
         )
 
-    def _now(self, track: Track, name: str, now: float) -> Pose | None:
+    def _now(self, track: PoseTrack, name: str, now: float) -> Pose | None:
         """The pose believed at the last look, as far as it still holds."""
         pose, age = track.pose, now - track.time
         if pose is None or pose.name != name or age <= 0.0:
@@ -303,7 +310,7 @@ class BelievePose:
         spin = pose.spin if age < self.settings.spin_stale_s else None
         return replace(pose, confidence=pose.confidence * self._fading(age), spin=spin)
 
-    def _confidence(self, track: Track, tree: Tree) -> float:
+    def _confidence(self, track: PoseTrack, tree: InterpretationTree) -> float:
         """Against the next best orientation: by paths' costs, which are log-likelihoods, and the lead."""
         age = track.time - float(tree.chosen[tree.best])
         odds = min(rival_gap(tree, self.settings.tree), self.settings.lead * track.lead)
@@ -313,18 +320,18 @@ class BelievePose:
         return exp(-max(0.0, age) / self.settings.stale_s)
 
 
-def _look(hypotheses: Sequence[Hypothesis]) -> Look:
+def _look_signature(hypotheses: Sequence[Hypothesis]) -> LookSignature:
     return tuple((h.name, h.view, h.similarity, h.rotation) for h in hypotheses)
 
 
-def _turning(rate: Rate | None, settings: PoseSettings) -> Turning:
+def _spin_prior(rate: AngularVelocity | None, settings: PoseSettings) -> SpinPrior:
     if rate is None or rate.sigma > settings.loosest:
-        return Turning(sigma=settings.loosest)
+        return SpinPrior(sigma=settings.loosest)
     x, y, z = rate.vector.tolist()
-    return Turning((x, y, z), max(rate.sigma, settings.surest))
+    return SpinPrior((x, y, z), max(rate.sigma, settings.surest))
 
 
-def _orientation(level: Level | None, number: int) -> Floats | None:
+def _orientation(level: TreeLevel | None, number: int) -> Floats | None:
     """What a level tells if a path chose this hypothesis of it."""
     if level is None or number == NONE or not level.rolled[number]:
         return None
@@ -332,7 +339,7 @@ def _orientation(level: Level | None, number: int) -> Floats | None:
     return None if np.isnan(seen[0, 0]) else seen
 
 
-def _turns(track: Track, name: str, lag: int) -> Turns:
+def _orientation_series(track: PoseTrack, name: str, lag: int) -> OrientationSeries:
     """Orientations along the cheapest path of a model."""
     tree = track.trees[name]
     path = tree.path[tree.best, lag - len(track.levels) :]
@@ -343,10 +350,10 @@ def _turns(track: Track, name: str, lag: int) -> Turns:
     ]
     every = [*track.settled, *recent]
     times = np.array([t for t, _ in every])
-    return Turns(times, np.array([r for _, r in every]).reshape(-1, 3, 3))
+    return OrientationSeries(times, np.array([r for _, r in every]).reshape(-1, 3, 3))
 
 
-def _last(track: Track, name: str, tree: Tree) -> Floats:
+def _last_orientation(track: PoseTrack, name: str, tree: InterpretationTree) -> Floats:
     """The orientation that the cheapest path tells of last."""
     path = tree.path[tree.best].tolist()
     for levels, number in zip(reversed(track.levels), reversed(path), strict=False):

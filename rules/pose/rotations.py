@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 _SMALL = 1e-9
 
 
-def turned(vectors: Floats) -> Floats:
+def rotation_matrices(vectors: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), radians (Rodrigues).
 
     Example:

@@ -48,7 +48,7 @@ class ObjectSettings:
     percept_age_s: float = 2.0
 
 
-def owners(mind: Mind) -> Mapping[int, int]:
+def region_owners(mind: Mind) -> Mapping[int, int]:
     """Region id -> object id, for all regions that are remembered."""
     found: Mapping[int, int] = mind.memory.get(OWNERS, MappingProxyType({}))
     return found
@@ -58,7 +58,7 @@ def hypotheses_by_object(
     mind: Mind, observation: Observation
 ) -> Mapping[int, tuple[Hypothesis, ...]]:
     """Object id -> what was hypothesised of its region in this step; only objects of which something was."""
-    owner = owners(mind)
+    owner = region_owners(mind)
     said: dict[int, tuple[Hypothesis, ...]] = {}
     for h in observation.of("hypothesis"):
         object_id = owner.get(h.region_id)
@@ -67,25 +67,25 @@ def hypotheses_by_object(
     return said
 
 
-def give_region(mind: Mind, region_id: int, object_id: int) -> Mind:
+def reassign_region(mind: Mind, region_id: int, object_id: int) -> Mind:
     """The same mind with a region owned by another object from now on."""
-    changed = {**owners(mind), region_id: object_id}
+    changed = {**region_owners(mind), region_id: object_id}
     return mind.remember(OWNERS, MappingProxyType(changed))
 
 
-def drop_objects(mind: Mind, ids: frozenset[int]) -> Mind:
+def delete_objects(mind: Mind, ids: frozenset[int]) -> Mind:
     """The same mind without some objects; regions that they owned are owned by none."""
     if not ids:
         return mind
     kept = {i: b for i, b in mind.objects.items() if i not in ids}
-    left = {r: o for r, o in owners(mind).items() if o not in ids}
+    left = {r: o for r, o in region_owners(mind).items() if o not in ids}
     answers = {i: name for i, name in mind.answers.items() if i not in ids}
     mind = replace(mind, objects=MappingProxyType(kept), answers=MappingProxyType(answers))
     return mind.remember(OWNERS, MappingProxyType(left))
 
 
 @dataclass(frozen=True, slots=True)
-class UpdateObjects:
+class ObjectReasoner:
     """Reasoner of the update phase: percepts enter the mind.
 
     When no behaviour looked for regions in this step, nothing is concluded about any object.
@@ -110,17 +110,19 @@ class UpdateObjects:
         return Outcome(self._forget(mind))
 
     def _see(self, mind: Mind, observation: Observation) -> Mind:
-        owner = dict(owners(mind))
+        owner = dict(region_owners(mind))
         beliefs: dict[int, ObjectBelief] = {}
         # A region that an object held last comes first, so that it cannot lose it to an older one.
-        regions = sorted(observation.of("region"), key=lambda r: not _held(mind, owner, r))
+        regions = sorted(
+            observation.of("region"), key=lambda r: not _is_current_region(mind, owner, r)
+        )
         for region in regions:
             object_id = owner.get(region.id)
             if object_id is None or object_id in beliefs:
-                object_id = _new_id(region.id, mind.objects.keys() | beliefs.keys())
+                object_id = _free_id(region.id, mind.objects.keys() | beliefs.keys())
             owner.pop(region.id, None)
             owner[region.id] = object_id
-            beliefs[object_id] = _renewed(mind.objects.get(object_id), object_id, region, mind.time)
+            beliefs[object_id] = _sighted(mind.objects.get(object_id), object_id, region, mind.time)
         newest = list(owner.items())[-self.settings.most_owners :]
         mind = mind.with_objects(*beliefs.values())
         return mind.remember(OWNERS, MappingProxyType(dict(newest)))
@@ -144,7 +146,7 @@ class UpdateObjects:
         left = [b for i, b in mind.objects.items() if i not in gone]
         left.sort(key=lambda b: (b.confirmed, b.last_seen, b.id))
         gone |= {b.id for b in left[: max(0, len(left) - self.settings.most_objects)]}
-        return drop_objects(mind, frozenset(gone))
+        return delete_objects(mind, frozenset(gone))
 
     def _stale(self, belief: ObjectBelief, now: float) -> bool:
         unseen = now - belief.last_seen
@@ -155,18 +157,18 @@ class UpdateObjects:
         return belief.presence is Presence.HIDDEN and unseen > self.settings.forget_hidden_s
 
 
-def _held(mind: Mind, owner: Mapping[int, int], region: Region) -> bool:
+def _is_current_region(mind: Mind, owner: Mapping[int, int], region: Region) -> bool:
     belief = mind.objects.get(owner.get(region.id, -1))
     return belief is not None and belief.region.id == region.id
 
 
-def _new_id(wanted: int, taken: set[int]) -> int:
+def _free_id(wanted: int, taken: set[int]) -> int:
     while wanted in taken:
         wanted += 1000
     return wanted
 
 
-def _renewed(old: ObjectBelief | None, id_: int, region: Region, now: float) -> ObjectBelief:
+def _sighted(old: ObjectBelief | None, id_: int, region: Region, now: float) -> ObjectBelief:
     if old is None:
         return ObjectBelief(id_, region, Presence.SEEN, first_seen=now, last_seen=now)
     return replace(old, region=region, last_seen=now)

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 from visup.agent import Mind, ObjectBelief, Presence, Region
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.outlines import outline_gap, ready
-from visup.rules.geometry.regions import DIRECTIONS, box_overlap, grow, scale
-from visup.rules.presence.sightings import Track, border_sides, expected_box
+from visup.rules.geometry.outlines import outline_gap, prepared_outline
+from visup.rules.geometry.regions import DIRECTIONS, box_intersection, expanded, image_diagonal
+from visup.rules.presence.object_tracks import ObjectTrack, border_sides, predicted_box
 
 FRAGMENTS = "rules.fragments"
 
@@ -50,7 +50,7 @@ class FragmentSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class FragmentHypothesis:
     """Whether a region that is not confirmed yet may be a part of a body.
 
     Attributes:
@@ -70,19 +70,19 @@ class Doubt:
 
 
 @dataclass(frozen=True, slots=True)
-class Doubting:
+class FragmentTest:
     """Keeps the doubts about regions from step to step."""
 
     settings: FragmentSettings = FragmentSettings()
 
     def __call__(
         self,
-        before: Mapping[int, Doubt],
+        before: Mapping[int, FragmentHypothesis],
         mind: Mind,
-        of: Mapping[int, Track],
+        of: Mapping[int, ObjectTrack],
         *,
         starting: bool,
-    ) -> dict[int, Doubt]:
+    ) -> dict[int, FragmentHypothesis]:
         """Judge one step.
 
         Args:
@@ -111,28 +111,28 @@ class Doubting:
 
     def _first(
         self, new: ObjectBelief, bodies: Iterable[ObjectBelief], mind: Mind, *, starting: bool
-    ) -> Doubt:
+    ) -> FragmentHypothesis:
         """What came over the border is not doubted, unless a body at that side reaches to it."""
         sides = border_sides(new.region, mind.frame_size)
         if starting or not sides:
-            return Doubt()
+            return FragmentHypothesis()
         there = [b for b in bodies if sides & border_sides(b.region, mind.frame_size)]
-        return Doubt(over=self._body_of(new.region, there, mind) is None)
+        return FragmentHypothesis(over=self._body_of(new.region, there, mind) is None)
 
     def _again(
         self,
-        doubt: Doubt,
+        doubt: FragmentHypothesis,
         new: ObjectBelief,
         bodies: Iterable[ObjectBelief],
         mind: Mind,
-        of: Mapping[int, Track],
-    ) -> Doubt:
+        of: Mapping[int, ObjectTrack],
+    ) -> FragmentHypothesis:
         body = self._body_of(new.region, bodies, mind)
         body = body or mind.objects.get(-1 if doubt.body is None else doubt.body)
         if body is None or body.presence is Presence.LEFT:
-            return Doubt()
+            return FragmentHypothesis()
         if body.id != doubt.body:
-            doubt = Doubt(body.id)
+            doubt = FragmentHypothesis(body.id)
         apart = self._gap(new.region, body.region, mind) is None and not self._in_place(
             new.region, of.get(body.id), mind
         )
@@ -140,15 +140,17 @@ class Doubting:
         parted = since is not None and mind.time - since >= self.settings.apart_s - 1e-6
         return replace(doubt, apart_since=since, over=parted)
 
-    def _in_place(self, region: Region, body: Track | None, mind: Mind) -> bool:
+    def _in_place(self, region: Region, body: ObjectTrack | None, mind: Mind) -> bool:
         """Whether a region is mostly where a body should be, of which little is seen for now."""
         if body is None:
             return False
         x, y, w, h = region.bbox
-        inside = box_overlap(expected_box(body, mind.time), (x, y, w, h))
+        inside = box_intersection(predicted_box(body, mind.time), (x, y, w, h))
         return inside >= self.settings.within * w * h
 
-    def _may_contain(self, body: ObjectBelief, new: ObjectBelief, of: Mapping[int, Track]) -> bool:
+    def _may_contain(
+        self, body: ObjectBelief, new: ObjectBelief, of: Mapping[int, ObjectTrack]
+    ) -> bool:
         """Whether a belief may be the body of a new one: another one in sight, and larger."""
         if body.id == new.id or body.id not in of or body.last_seen < new.first_seen:
             return False
@@ -159,7 +161,7 @@ class Doubting:
     def _gap(self, region: Region, body: Region, mind: Mind) -> float | None:
         """Outline gap, pixels, or None when the two are clearly apart."""
         s = self.settings
-        far = max(s.apart * scale(mind.frame_size), s.apart_size * region.area**0.5)
+        far = max(s.apart * image_diagonal(mind.frame_size), s.apart_size * region.area**0.5)
         return outline_gap(region, body, far)
 
     def _body_of(
@@ -171,7 +173,7 @@ class Doubting:
             gap = self._gap(region, body.region, mind)
             if gap is None:
                 continue
-            touches = gap <= self.settings.touch * scale(mind.frame_size)
+            touches = gap <= self.settings.touch * image_diagonal(mind.frame_size)
             if touches or share_within(region, body.region) >= self.settings.within:
                 near.append((gap, body.id, body))
         return min(near)[2] if near else None
@@ -182,12 +184,12 @@ def share_within(region: Region, body: Region) -> float:
 
     The hull is taken as the polygon of its tangents in `DIRECTIONS`, at most 2 % too wide.
     """
-    points = ready(region).points @ DIRECTIONS.T
-    limit = (ready(body).points @ DIRECTIONS.T).max(axis=0)
+    points = prepared_outline(region).points @ DIRECTIONS.T
+    limit = (prepared_outline(body).points @ DIRECTIONS.T).max(axis=0)
     return float((points <= limit + 1.0).all(axis=1).mean())
 
 
-def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, Track]) -> bool:
+def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, ObjectTrack]) -> bool:
     """Whether a region stands where a known object should be that is hidden, in part at least."""
     for old in mind.objects.values():
         track = of.get(old.id)
@@ -195,8 +197,8 @@ def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, Track]) -
             continue
         if old.presence is Presence.SEEN and track.visible > 0.7:
             continue
-        place = grow(expected_box(track, mind.time), 6)
+        place = expanded(predicted_box(track, mind.time), 6)
         x, y, w, h = new.region.bbox
-        if box_overlap(place, (x, y, w, h)) > 0.6 * max(1, w * h):
+        if box_intersection(place, (x, y, w, h)) > 0.6 * max(1, w * h):
             return True
     return False

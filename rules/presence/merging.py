@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from visup.agent import ObjectBelief, Presence
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.regions import moved, shared_pixels
-from visup.rules.presence.sightings import Track
-from visup.rules.presence.step_context import Work
+from visup.rules.geometry.regions import shared_pixels, shifted_region
+from visup.rules.presence.object_tracks import ObjectTrack
+from visup.rules.presence.step_context import StepContext
 
 
-def merge(work: Work) -> None:
+def merge(work: StepContext) -> None:
     """Find objects that went up in a region grown into the union of two."""
     for gone in work.missing():
         track = work.of.get(gone.id)
@@ -18,14 +18,14 @@ def merge(work: Work) -> None:
         if track.merged_with is not None:
             _stay_merged(work, gone, track)
             continue
-        host = next((b for b in work.seen() if _grew_by(work, b, track)), None)
+        host = next((b for b in work.seen() if _has_absorbed(work, b, track)), None)
         if host is not None:
             again = track.parted_at is not None and work.now - track.parted_at < 0.5
             since = track.merged_since if again else work.now
             work.put(gone, merged_with=host.id, merged_since=since)
 
 
-def _stay_merged(work: Work, gone: ObjectBelief, track: Track) -> None:
+def _stay_merged(work: StepContext, gone: ObjectBelief, track: ObjectTrack) -> None:
     host = work.mind.objects.get(track.merged_with or -1)
     if host is None or host.presence is not Presence.SEEN:
         work.put(gone, merged_with=None, parted_at=work.now)
@@ -37,10 +37,10 @@ def _stay_merged(work: Work, gone: ObjectBelief, track: Track) -> None:
         return
     dx = host.region.centroid[0] - before.centroid[0]
     dy = host.region.centroid[1] - before.centroid[1]
-    work.put(replace(gone, region=moved(gone.region, dx, dy)), seen_at=work.now)
+    work.put(replace(gone, region=shifted_region(gone.region, dx, dy)), seen_at=work.now)
 
 
-def _grew_by(work: Work, host: ObjectBelief, gone: Track) -> bool:
+def _has_absorbed(work: StepContext, host: ObjectBelief, gone: ObjectTrack) -> bool:
     before = work.of.get(host.id)
     if before is None or not host.confirmed or gone.visible < work.settings.whole_share:
         return False

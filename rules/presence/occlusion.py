@@ -4,37 +4,37 @@ from __future__ import annotations
 
 from visup.agent import ObjectBelief, Presence
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.regions import grow, pixels_in, shared_pixels
-from visup.rules.presence.sightings import (
-    Track,
+from visup.rules.geometry.regions import expanded, pixels_in, shared_pixels
+from visup.rules.presence.object_tracks import (
+    ObjectTrack,
     at_border,
-    expected_box,
-    expected_outside,
     heading_out,
+    predicted_box,
+    predicted_share_outside,
 )
-from visup.rules.presence.step_context import Work
+from visup.rules.presence.step_context import StepContext
 
 
-def show(work: Work) -> None:
+def update_visible(work: StepContext) -> None:
     """Confirmed objects that are seen now: do they hide, leave, come back?"""
     for belief in work.seen():
         track = work.of[belief.id]
         if not belief.confirmed:
             continue
         if belief.presence is Presence.SEEN:
-            _little_shows(work, belief, track)
+            _check_hiding(work, belief, track)
         else:
-            _much_shows(work, belief, track)
+            _check_reappearance(work, belief, track)
 
 
-def _little_shows(work: Work, belief: ObjectBelief, track: Track) -> None:
+def _check_hiding(work: StepContext, belief: ObjectBelief, track: ObjectTrack) -> None:
     s = work.settings
     leaving = (
         track.visible < s.leaving_share
         and at_border(track.region, work.mind.frame_size)
         and heading_out(track, work.mind.frame_size)
     )
-    hiding = track.visible < s.hidden_share and _cover(work, belief) is not None
+    hiding = track.visible < s.hidden_share and _occluder(work, belief) is not None
     if not (leaving or hiding):
         work.put(belief, partial_since=None)
         return
@@ -48,9 +48,9 @@ def _little_shows(work: Work, belief: ObjectBelief, track: Track) -> None:
         _leave(work, belief, 0.9)
 
 
-def _much_shows(work: Work, belief: ObjectBelief, track: Track) -> None:
+def _check_reappearance(work: StepContext, belief: ObjectBelief, track: ObjectTrack) -> None:
     s = work.settings
-    crowded = _cover(work, belief) is not None
+    crowded = _occluder(work, belief) is not None
     shows = track.visible > s.shown_share and (
         belief.presence is Presence.HIDDEN or track.visible > 2 * s.leaving_share
     )
@@ -73,7 +73,7 @@ def _much_shows(work: Work, belief: ObjectBelief, track: Track) -> None:
         work.tell("reappearance", "{0} {reappears}.", belief.id)
 
 
-def miss(work: Work) -> None:
+def update_missing(work: StepContext) -> None:
     """Confirmed objects without a region: hidden, gone, or lost?"""
     s = work.settings
     for belief in work.missing():
@@ -82,13 +82,14 @@ def miss(work: Work) -> None:
             continue
         if track.merged_with is not None or work.now - track.seen_at < s.settle_s - 1e-6:
             continue
-        cover = _cover(work, belief)
+        cover = _occluder(work, belief)
         out = heading_out(track, work.mind.frame_size) and (
-            track.visible < 0.35 or expected_outside(track, work.now, work.mind.frame_size) > 0.5
+            track.visible < 0.35
+            or predicted_share_outside(track, work.now, work.mind.frame_size) > 0.5
         )
         if out and (cover is None or track.visible > s.hidden_share):
             _leave(work, belief, 0.9)
-        elif cover is not None and _hidden_now(work, track, cover):
+        elif cover is not None and _is_hidden_by(work, track, cover):
             _hide(work, belief, cover)
         elif work.now - track.seen_at >= s.lost_s - 1e-6:
             work.put(replace(belief, presence=Presence.HIDDEN), told="lost", clear_since=None)
@@ -97,7 +98,7 @@ def miss(work: Work) -> None:
             )
 
 
-def _hidden_now(work: Work, track: Track, cover: ObjectBelief) -> bool:
+def _is_hidden_by(work: StepContext, track: ObjectTrack, cover: ObjectBelief) -> bool:
     """Whether so little of a missing object would show beside its cover that it is not just missed."""
     s = work.settings
     covered = shared_pixels(cover.region, track.region) / max(1.0, track.region.area)
@@ -105,10 +106,10 @@ def _hidden_now(work: Work, track: Track, cover: ObjectBelief) -> bool:
     return showing < s.hidden_share or work.now - track.seen_at >= s.missed_s - 1e-6
 
 
-def _cover(work: Work, belief: ObjectBelief) -> ObjectBelief | None:
+def _occluder(work: StepContext, belief: ObjectBelief) -> ObjectBelief | None:
     """The object whose region stands where this one should be, or beside what is left of it."""
     track, s = work.of[belief.id], work.settings
-    place = expected_box(track, work.now)
+    place = predicted_box(track, work.now)
     best: tuple[float, ObjectBelief] | None = None
     for other in work.seen():
         if other.id == belief.id or work.doubted(other, belief):
@@ -119,7 +120,7 @@ def _cover(work: Work, belief: ObjectBelief) -> ObjectBelief | None:
         share = shared_pixels(other.region, track.region) / max(1.0, track.region.area)
         if track.visible < s.whole_share:
             # Of one that was going out of sight already, the rest may be anywhere in its place.
-            spot = grow(track.region.bbox, 6)
+            spot = expanded(track.region.bbox, 6)
             share = max(
                 share,
                 pixels_in(other.region, place) / max(1, place[2] * place[3]),
@@ -130,8 +131,8 @@ def _cover(work: Work, belief: ObjectBelief) -> ObjectBelief | None:
     return best[1] if best else None
 
 
-def _hide(work: Work, belief: ObjectBelief, cover: ObjectBelief | None = None) -> None:
-    cover = cover or _cover(work, belief)
+def _hide(work: StepContext, belief: ObjectBelief, cover: ObjectBelief | None = None) -> None:
+    cover = cover or _occluder(work, belief)
     hidden = replace(belief, presence=Presence.HIDDEN)
     work.put(hidden, told="occluded", partial_since=None, clear_since=None)
     if cover is not None and cover.confirmed:
@@ -140,7 +141,7 @@ def _hide(work: Work, belief: ObjectBelief, cover: ObjectBelief | None = None) -
         work.tell("occlusion", "{0} {is} hidden.", belief.id)
 
 
-def _leave(work: Work, belief: ObjectBelief, confidence: float) -> None:
+def _leave(work: StepContext, belief: ObjectBelief, confidence: float) -> None:
     gone = replace(belief, presence=Presence.LEFT)
     work.put(gone, told="left", partial_since=None, clear_since=None)
     work.tell("exit", "{0} {leaves} the field of view.", belief.id, confidence=confidence)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Region
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.outlines import NEAR, outline_gap
-from visup.rules.geometry.regions import box_gap, scale
-from visup.rules.presence.fragments import Doubt
-from visup.rules.presence.sightings import Track
+from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
+from visup.rules.geometry.regions import box_gap, image_diagonal
+from visup.rules.presence.fragments import FragmentHypothesis
+from visup.rules.presence.object_tracks import ObjectTrack
 from visup.rules.wording.sentences import sentence
 
 
@@ -58,13 +58,13 @@ class PresenceSettings:
 
 
 @dataclass(slots=True)
-class Work:
+class StepContext:
     """One step in the making; lives only while the reasoner runs."""
 
     mind: Mind
     observation: Observation
-    of: dict[int, Track]
-    doubts: Mapping[int, Doubt]
+    of: dict[int, ObjectTrack]
+    doubts: Mapping[int, FragmentHypothesis]
     settings: PresenceSettings
     events: list[Event] = field(default_factory=list)
     _sorted: tuple[Mapping[int, ObjectBelief], list[ObjectBelief]] | None = None
@@ -123,5 +123,5 @@ class Work:
         if not (-h - contact <= top - y <= height + contact) or box_gap(a.bbox, b.bbox) > contact:
             return False
         # As far as relations look in the same step, so that the gap is worked out once.
-        gap = outline_gap(a, b, max(contact, NEAR * scale(self.mind.frame_size)))
+        gap = outline_gap(a, b, max(contact, NEAR_SHARE * image_diagonal(self.mind.frame_size)))
         return gap is not None and gap <= contact

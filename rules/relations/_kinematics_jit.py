@@ -14,7 +14,7 @@ GAP, RATE, SIGMA, RELATIVE, CONTACT = range(5)
 
 
 @compiled
-def near_pairs(
+def hull_gaps(
     seen: Floats, separation: Floats, before: Floats, near: float, hold: float
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Gaps of all pairs as far as boxes and hulls tell them, and the pairs whose outlines must be asked.
@@ -57,7 +57,7 @@ def near_pairs(
 
 
 @compiled
-def _parting(support: Floats, seen: Floats, i: int, j: int, directions: Floats) -> float:
+def _separation_speed(support: Floats, seen: Floats, i: int, j: int, directions: Floats) -> float:
     """How fast body j goes away from body i by their image motion, pixels per second.
 
     That is along the direction, from i to j, in which the hulls overlap least.
@@ -72,19 +72,19 @@ def _parting(support: Floats, seen: Floats, i: int, j: int, directions: Floats) 
 
 
 @compiled
-def parting(support: Floats, seen: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    """(M, M) speeds at which pairs part by their image motion, and their deviations; see `tables`."""
+def separation_speeds(support: Floats, seen: Floats, directions: Floats) -> tuple[Floats, Floats]:
+    """(M, M) speeds at which pairs part by their image motion, and their deviations; see `pair_tables`."""
     count = len(seen)
     speed, spread = np.empty((count, count)), np.empty((count, count))
     for i in range(count):
         for j in range(count):
-            speed[i, j] = _parting(support, seen, i, j, directions)
+            speed[i, j] = _separation_speed(support, seen, i, j, directions)
             spread[i, j] = np.hypot(seen[i, 3], seen[j, 3])
     return speed, spread
 
 
 @compiled
-def contact_time(gap: float, rate: float) -> float:
+def time_to_contact(gap: float, rate: float) -> float:
     """Seconds until a gap is closed at a rate; see `Measured.time_to_contact`."""
     if np.isnan(gap) or np.isnan(rate):
         return np.nan
@@ -94,7 +94,7 @@ def contact_time(gap: float, rate: float) -> float:
 
 
 @compiled
-def tables(
+def pair_tables(
     gaps: Floats,
     slope: Floats,
     sigma: Floats,
@@ -117,7 +117,7 @@ def tables(
         sigma: (P,) their deviations.
         velocity: (M, 2) pixels per second.
         support: (M, K) reach of the outlines at the last sample, pixels; no rows when there is none.
-        seen: (M, 8) of each body; see `near_pairs`.
+        seen: (M, 8) of each body; see `hull_gaps`.
         directions: (K, 2) unit vectors.
         limits: Gap up to which the motion of two bodies tells that they part, pixels; the least speed
             that is strong, pixels per second, and in deviations; for how long a trend outlasts the
@@ -136,7 +136,7 @@ def tables(
             for a, b in ((i, j), (j, i)):
                 rate, wide = slope[number], sigma[number]
                 if gaps[number] <= contact and len(support):
-                    speed = _parting(support, seen, a, b, directions)
+                    speed = _separation_speed(support, seen, a, b, directions)
                     known = np.hypot(seen[a, 3], seen[b, 3])
                     if speed > strong and speed > sigmas * known and rate < speed:
                         rate, wide = speed, known
@@ -148,5 +148,5 @@ def tables(
         for j in range(count):
             x, y = velocity[i, 0] - velocity[j, 0], velocity[i, 1] - velocity[j, 1]
             found[RELATIVE, i, j] = np.sqrt(x * x + y * y)
-            found[CONTACT, i, j] = contact_time(found[GAP, i, j], found[RATE, i, j])
+            found[CONTACT, i, j] = time_to_contact(found[GAP, i, j], found[RATE, i, j])
     return found, speeds

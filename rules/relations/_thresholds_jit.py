@@ -16,8 +16,8 @@ from visup.rules.relations.distance import LIMITS
 
 
 @compiled
-def sign(value: float, before: int, enter: float, leave: float) -> int:
-    """The sign of one quantity, with hysteresis; see `hold_sign`."""
+def sign_with_hysteresis(value: float, before: int, enter: float, leave: float) -> int:
+    """The sign of one quantity, with hysteresis; see `signs_with_hysteresis`."""
     if np.isnan(value):
         return UNKNOWN
     code, size = ABOVE if value > 0.0 else BELOW, abs(value)
@@ -26,7 +26,7 @@ def sign(value: float, before: int, enter: float, leave: float) -> int:
 
 
 @compiled
-def hold_sign(values: Floats, before: Codes, enter: float, leave: float) -> Codes:
+def signs_with_hysteresis(values: Floats, before: Codes, enter: float, leave: float) -> Codes:
     """The signs of quantities, with hysteresis (a Schmitt trigger on either side of zero).
 
     A sign begins beyond `enter` and ends within `leave`. One that is not known yet is judged by the
@@ -45,14 +45,14 @@ def hold_sign(values: Floats, before: Codes, enter: float, leave: float) -> Code
     codes = np.empty(values.shape, np.int8)
     for row in range(len(values)):
         for k in range(values.shape[1]):
-            codes[row, k] = sign(values[row, k], before[row, k], enter, leave)
+            codes[row, k] = sign_with_hysteresis(values[row, k], before[row, k], enter, leave)
     return codes
 
 
 @compiled
 def moving_sign(speed: float, before: int, enter: float, leave: float) -> int:
     """The same of a speed: what is not known yet is at rest until the speed exceeds `enter`."""
-    return sign(speed, WITHIN if before == UNKNOWN else before, enter, leave)
+    return sign_with_hysteresis(speed, WITHIN if before == UNKNOWN else before, enter, leave)
 
 
 @compiled
@@ -238,7 +238,7 @@ def components(
 
 
 @compiled
-def judged(
+def classify_boxes(
     before: Codes,
     boxes: Floats,
     velocities: Floats,
@@ -264,7 +264,9 @@ def judged(
             number += 1
             for row in range(8):
                 apart = difference(boxes, i, j, row)
-                codes[row, number] = sign(apart, before[row, number], level, level_out)
+                codes[row, number] = sign_with_hysteresis(
+                    apart, before[row, number], level, level_out
+                )
             dx, dy = places[i, 0] - places[j, 0], places[i, 1] - places[j, 1]
             codes[8, number] = direction(dx, dy, before[8, number], (near, far), cone, noise)
             gap, size = box_gap(boxes, i, j), size_of(boxes, i, j)

@@ -8,22 +8,22 @@ from math import sqrt
 import numpy as np
 
 from visup.agent import Mind, ObjectBelief
-from visup.rules.geometry._fit_jit import fitted
-from visup.rules.geometry.outlines import NEAR, outline_gap
-from visup.rules.geometry.pairs import carried, pairs
-from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, scale
+from visup.rules.geometry._fit_jit import fit_motion
+from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
+from visup.rules.geometry.pairs import pairs, reindexing
+from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, image_diagonal
 from visup.rules.relations._kinematics_jit import (
     CONTACT,
     GAP,
     RATE,
     RELATIVE,
     SIGMA,
-    contact_time,
-    near_pairs,
-    tables,
+    hull_gaps,
+    pair_tables,
+    time_to_contact,
 )
-from visup.rules.relations.samples import History
-from visup.rules.relations.thresholds import JudgeSettings
+from visup.rules.relations.samples import SampleWindow
+from visup.rules.relations.thresholds import ThresholdSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +87,13 @@ class RelationSettings:
     apart_exit: float = 0.2
     together_exit: float = 1.5
     moving_exit: float = 0.7
-    judge: JudgeSettings = field(
-        default_factory=lambda: JudgeSettings(speed_enter=0.002, speed_exit=0.001)
+    judge: ThresholdSettings = field(
+        default_factory=lambda: ThresholdSettings(speed_enter=0.002, speed_exit=0.001)
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measured:
+class Kinematics:
     """Quantities of the last step; what rules compare. NaN is unknown.
 
     Attributes:
@@ -189,7 +189,7 @@ class Measured:
             gap, rate = self.interval("gap", a, b, sigmas), self.interval("rate", a, b, sigmas)
             if value == 0.0 or np.isnan(value):
                 return value, value
-            soon, late = sorted(map(contact_time, gap, rate))
+            soon, late = sorted(map(time_to_contact, gap, rate))
             return soon, late
         wide = sigmas * self._sigma(quantity, a, b)
         low = value - wide
@@ -205,19 +205,19 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
-class Measuring:
+class KinematicsEstimator:
     """Turns samples into quantities."""
 
     settings: RelationSettings
 
     def __call__(
         self,
-        h: History,
+        h: SampleWindow,
         objects: tuple[ObjectBelief, ...],
         seen: Floats,
         mind: Mind,
-        before: Measured,
-    ) -> Measured:
+        before: Kinematics,
+    ) -> Kinematics:
         """Measure one step.
 
         Args:
@@ -230,11 +230,11 @@ class Measuring:
         Returns:
             All quantities; NaN where unknown.
         """
-        s, diagonal = self.settings, scale(mind.frame_size)
+        s, diagonal = self.settings, image_diagonal(mind.frame_size)
         noise, strong = s.judge.noise_px, 2.0 * s.rate_enter * diagonal
         gaps = self._gaps(objects, seen, h, mind, before)
         windows = s.window_s, s.quick_window_s, s.motion_window_s
-        slope, sigma, motion, spread = fitted(
+        slope, sigma, motion, spread = fit_motion(
             h.times,
             h.support,
             h.free,
@@ -244,7 +244,7 @@ class Measuring:
             s.bins,
             mind.time,
         )
-        found, speed = tables(
+        found, speed = pair_tables(
             gaps,
             slope,
             sigma,
@@ -255,21 +255,21 @@ class Measuring:
             (s.parting_gap * diagonal, strong, s.quick_sigmas, 0.5 * s.window_s),
         )
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
-        return Measured(h.ids, found, motion, speed, depth, spread, noise)
+        return Kinematics(h.ids, found, motion, speed, depth, spread, noise)
 
     def _gaps(
         self,
         objects: tuple[ObjectBelief, ...],
         seen: Floats,
-        h: History,
+        h: SampleWindow,
         mind: Mind,
-        before: Measured,
+        before: Kinematics,
     ) -> Floats:
         """Outline gaps: exact where near, the hulls' distance elsewhere; NaN when out of sight."""
-        m, near = len(objects), NEAR * scale(mind.frame_size)
+        m, near = len(objects), NEAR_SHARE * image_diagonal(mind.frame_size)
         apart = h.separation[-1] if len(h.times) else np.full((m, m), np.nan)
         last = before.gap if before.ids == h.ids else _moved(before.gap, before.ids, h.ids)
-        found, asked = near_pairs(seen, apart, last, near, self.settings.hold_s)
+        found, asked = hull_gaps(seen, apart, last, near, self.settings.hold_s)
         i, j = pairs(m)
         for k in asked.tolist():
             gap = outline_gap(objects[i[k]].region, objects[j[k]].region, near)
@@ -282,7 +282,7 @@ NOWHERE = np.empty((0, FAN))
 
 def _moved(table: Floats, old: tuple[int, ...], new: tuple[int, ...]) -> Floats:
     """A table of all pairs of other objects; NaN for pairs with a new one."""
-    rows, _ = carried(old, new)
+    rows, _ = reindexing(old, new)
     wide = np.pad(table, (0, 1), constant_values=np.nan)
     return np.ascontiguousarray(wide[np.ix_(rows, rows)])
 

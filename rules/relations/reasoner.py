@@ -41,19 +41,31 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.relation_columns import Cells, Columns
-from visup.rules.geometry._fit_jit import trends
-from visup.rules.geometry.ema import share_of
-from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Latch, step, unknown_latch
-from visup.rules.geometry.pairs import carried, pairs
-from visup.rules.geometry.regions import RCC8, Floats, scale
-from visup.rules.presence.sightings import merged_pairs
-from visup.rules.relations._reasoner_jit import COUPLED, MERGED, outlines, places, told, wanted
-from visup.rules.relations._thresholds_jit import hold_sign, judged
+from visup.agent.model.relation_columns import ColumnLayout, RelationBlock
+from visup.rules.geometry._fit_jit import binned_trends
+from visup.rules.geometry.ema import new_share
+from visup.rules.geometry.hysteresis import UNKNOWN, Codes, HysteresisState, advance, unknown_states
+from visup.rules.geometry.pairs import pairs, reindexing
+from visup.rules.geometry.regions import RCC8, Floats, image_diagonal
+from visup.rules.presence.object_tracks import merged_pairs
+from visup.rules.relations._pair_states_jit import (
+    COUPLED,
+    MERGED,
+    classify_motion,
+    relation_rows,
+    smoothed_boxes,
+    smoothed_outlines,
+)
+from visup.rules.relations._thresholds_jit import classify_boxes, signs_with_hysteresis
 from visup.rules.relations.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.relations.direction import DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
-from visup.rules.relations.kinematics import Measured, Measuring, RelationSettings, sightings
+from visup.rules.relations.kinematics import (
+    Kinematics,
+    KinematicsEstimator,
+    RelationSettings,
+    sightings,
+)
 from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import (
     CONVERSE,
@@ -61,8 +73,8 @@ from visup.rules.relations.rcc8 import (
     from_signs,
     outline_differences,
 )
-from visup.rules.relations.samples import History, covered, sample
-from visup.rules.relations.thresholds import AWAY, JUDGED, ORDER, SIDE, least_durations, limits
+from visup.rules.relations.samples import SampleWindow, covers_window, sampled
+from visup.rules.relations.thresholds import AWAY, BOX_ROWS, ORDER, SIDE, least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 
 RELATIONS = "rules.relations"
@@ -88,13 +100,13 @@ NAMES = tuple(
 )
 """Every relation of two objects that is judged here; `coupled` is judged by `coupling.py`."""
 
-TREND, TOUCH, TOGETHER, DEPTH = range(JUDGED, JUDGED + 4)
-OUTLINE = slice(JUDGED + 4, JUDGED + 7)
-ROWS = JUDGED + 7
+TREND, TOUCH, TOGETHER, DEPTH = range(BOX_ROWS, BOX_ROWS + 4)
+OUTLINE = slice(BOX_ROWS + 4, BOX_ROWS + 7)
+ROWS = BOX_ROWS + 7
 """Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
 
 _SURE, _MOSTLY, _TREND, _GAP, _RATE, _SIGMA, _RELATIVE = range(7)
-COLUMNS = Columns(
+COLUMNS = ColumnLayout(
     (
         Column(TREND_NAMES, (0, 0), _TREND, _RATE, _SIGMA),
         Column(("", "touching"), (1, 1), _MOSTLY, _GAP),
@@ -113,7 +125,7 @@ COLUMNS = Columns(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Smooth:
+class SmoothedGeometry:
     """Places of objects, smoothed a little; see `smooth.py`.
 
     Attributes:
@@ -129,12 +141,12 @@ class Smooth:
     outlines: Floats
 
 
-def _no_smooth() -> Smooth:
-    return Smooth(0.0, np.zeros((0, 4)), np.zeros(0), np.zeros((3, 0)))
+def _no_smooth() -> SmoothedGeometry:
+    return SmoothedGeometry(0.0, np.zeros((0, 4)), np.zeros(0), np.zeros((3, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Kept:
+class RelationMemory:
     """What the relations remember from step to step.
 
     Attributes:
@@ -145,19 +157,19 @@ class Kept:
         smooth: What states of place are judged by.
     """
 
-    history: History = field(default_factory=History)
-    measured: Measured = field(default_factory=Measured)
-    latch: Latch = field(default_factory=lambda: unknown_latch((ROWS, 0), 0.0))
-    rcc8: Latch = field(default_factory=lambda: unknown_latch((2, 0), 0.0))
-    smooth: Smooth = field(default_factory=lambda: _no_smooth())
+    history: SampleWindow = field(default_factory=SampleWindow)
+    measured: Kinematics = field(default_factory=Kinematics)
+    latch: HysteresisState = field(default_factory=lambda: unknown_states((ROWS, 0), 0.0))
+    rcc8: HysteresisState = field(default_factory=lambda: unknown_states((2, 0), 0.0))
+    smooth: SmoothedGeometry = field(default_factory=lambda: _no_smooth())
 
 
-NOTHING_KEPT = Kept()
+EMPTY_MEMORY = RelationMemory()
 
 
-def measured(mind: Mind) -> Measured:
-    """The quantities of the last step, as `Relations` left them in the mind."""
-    kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
+def kinematics(mind: Mind) -> Kinematics:
+    """The quantities of the last step, as `RelationReasoner` left them in the mind."""
+    kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
     return kept.measured
 
 
@@ -181,7 +193,7 @@ def related(mind: Mind, name: str, a: int, b: int) -> Truth:
 
 def qtc(mind: Mind, a: int, b: int) -> str | None:
     """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
-    kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
+    kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
     k, turned = RelationTable(kept.history.ids).pair(a, b)
     if k < 0:
         return None
@@ -191,7 +203,7 @@ def qtc(mind: Mind, a: int, b: int) -> str | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Relations:
+class RelationReasoner:
     """Reasoner of the cogitate phase: judges all relations of all pairs of present objects."""
 
     settings: RelationSettings = field(default_factory=RelationSettings)
@@ -203,45 +215,45 @@ class Relations:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         s = self.settings
-        kept: Kept = mind.memory.get(RELATIONS, NOTHING_KEPT)
+        kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
         objects = mind.present()
-        before = _of_these(kept, tuple(b.id for b in objects), mind.time)
-        history = sample(kept.history, objects, mind, observation, s.window_s, s.samples)
+        before = _reindexed_memory(kept, tuple(b.id for b in objects), mind.time)
+        history = sampled(kept.history, objects, mind, observation, s.window_s, s.samples)
         seen = sightings(objects, mind.time)
-        now = Measuring(s)(history, objects, seen, mind, kept.measured)
+        now = KinematicsEstimator(s)(history, objects, seen, mind, kept.measured)
         smooth = self._smooth(before.smooth, now, objects, seen, mind)
         wants = self._wanted(before.latch, history, now, smooth, mind)
-        latch = step(before.latch, wants, mind.time, self._lasts)
+        latch = advance(before.latch, wants, mind.time, self._lasts)
         rcc8 = before.rcc8
         if latch is not before.latch:  # else these follow from what is as it was
             state = latch.state
             held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
-            rcc8 = step(rcc8, held, mind.time, 0.0)
-        kept = Kept(history, now, latch, rcc8, smooth)
+            rcc8 = advance(rcc8, held, mind.time, 0.0)
+        kept = RelationMemory(history, now, latch, rcc8, smooth)
         table = RelationTable(now.ids, (self._cells(kept, mind),))
         return Outcome(mind.remember(RELATIONS, kept, relations=table))
 
     def _durations(self) -> Floats:
         s = self.settings
         lasts = np.full((ROWS, 1), s.touch_minimum_s)
-        lasts[:JUDGED] = least_durations(s.judge)
+        lasts[:BOX_ROWS] = least_durations(s.judge)
         lasts[[TREND, TOGETHER, DEPTH]] = s.trend_minimum_s
         return lasts
 
     def _wanted(
         self,
-        before: Latch,
-        h: History,
-        now: Measured,
-        smooth: Smooth,
+        before: HysteresisState,
+        h: SampleWindow,
+        now: Kinematics,
+        smooth: SmoothedGeometry,
         mind: Mind,
     ) -> Codes:
-        s, diagonal = self.settings, scale(mind.frame_size)
+        s, diagonal = self.settings, image_diagonal(mind.frame_size)
         codes = np.empty(before.state.shape, dtype=np.int8)
         bounds = limits(s.judge, diagonal)
-        judged(before.state, smooth.boxes, now.velocity, now.velocity_sigma, bounds, codes)
+        classify_boxes(before.state, smooth.boxes, now.velocity, now.velocity_sigma, bounds, codes)
         codes[DEPTH] = self._depth_trend(h)
-        wanted(
+        classify_motion(
             before.state[TREND:DEPTH],
             before.pending[TREND:DEPTH],
             now.tables,
@@ -254,10 +266,10 @@ class Relations:
             codes[TREND : DEPTH + 1],
         )
         level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
-        codes[OUTLINE] = hold_sign(smooth.outlines, before.state[OUTLINE], *level)
+        codes[OUTLINE] = signs_with_hysteresis(smooth.outlines, before.state[OUTLINE], *level)
         return codes
 
-    def _limits(self, diagonal: float) -> Limits:
+    def _limits(self, diagonal: float) -> PairLimits:
         """Thresholds as `relation_loops.wanted` takes them."""
         s = self.settings
         return (
@@ -274,36 +286,38 @@ class Relations:
 
     def _smooth(
         self,
-        before: Smooth,
-        now: Measured,
+        before: SmoothedGeometry,
+        now: Kinematics,
         objects: tuple[ObjectBelief, ...],
         seen: Floats,
         mind: Mind,
-    ) -> Smooth:
+    ) -> SmoothedGeometry:
         """Boxes as they are, or were until a moment ago; gaps; outlines that may meet."""
-        s, diagonal = self.settings, scale(mind.frame_size)
-        share, jump = share_of(mind.time - before.time), 6.0 * s.judge.noise_px
+        s, diagonal = self.settings, image_diagonal(mind.frame_size)
+        share, jump = new_share(mind.time - before.time), 6.0 * s.judge.noise_px
         wide, near = jump * sqrt(2.0), 2.0 * s.judge.level_enter * diagonal
-        boxes, gap, asked = places(
+        boxes, gap, asked = smoothed_boxes(
             before.boxes, before.gap, seen, now.tables, (share, jump, wide, s.hold_s, near)
         )
         apart = outline_differences([b.region for b in objects], asked.tolist())
-        level = outlines(before.outlines, gap, asked, apart, (share, wide, 0.05 * diagonal))
-        return Smooth(mind.time, boxes, gap, level)
+        level = smoothed_outlines(
+            before.outlines, gap, asked, apart, (share, wide, 0.05 * diagonal)
+        )
+        return SmoothedGeometry(mind.time, boxes, gap, level)
 
-    def _depth_trend(self, h: History) -> Codes:
+    def _depth_trend(self, h: SampleWindow) -> Codes:
         """Trend of the difference in depth: a code of each pair, UNKNOWN where it is not known."""
         i, j = pairs(len(h.ids))
         codes = np.full(len(i), UNKNOWN, dtype=np.int8)
         found_at = h.depth == h.depth  # NaN is not equal to itself
-        if not found_at.any() or not covered(h, self.settings.window_s):
+        if not found_at.any() or not covers_window(h, self.settings.window_s):
             return codes
         known = found_at.mean(axis=0) >= 0.6
         at = np.flatnonzero(known[i] & known[j])
         if len(at) == 0:
             return codes
         first, second = h.depth[:, i[at]], h.depth[:, j[at]]
-        slope, sigma = trends(h.times, np.abs(first - second), self.settings.bins)
+        slope, sigma = binned_trends(h.times, np.abs(first - second), self.settings.bins)
         typical = 0.5 * np.nanmean(first + second, axis=0)
         least = np.maximum(self.settings.depth_rate * typical, 3.0 * sigma)
         found = np.full(len(at), KEEPING, dtype=np.int8)
@@ -312,10 +326,10 @@ class Relations:
         codes[at] = found
         return codes
 
-    def _cells(self, kept: Kept, mind: Mind) -> Cells:
+    def _cells(self, kept: RelationMemory, mind: Mind) -> RelationBlock:
         s, now = self.settings, kept.measured
-        floor = s.rate_enter * scale(mind.frame_size) / 3.0
-        found = told(
+        floor = s.rate_enter * image_diagonal(mind.frame_size) / 3.0
+        found = relation_rows(
             kept.latch.state,
             kept.latch.since,
             kept.rcc8.state,
@@ -326,10 +340,10 @@ class Relations:
             DIRECTION_CONVERSE,
             (mind.time, s.image_only_confidence, floor),
         )
-        return Cells(COLUMNS, *found)
+        return RelationBlock(COLUMNS, *found)
 
 
-Limits = tuple[
+PairLimits = tuple[
     tuple[float, float],
     tuple[float, float],
     tuple[float, float, float, float],
@@ -337,12 +351,12 @@ Limits = tuple[
 ]
 
 
-def _of_these(kept: Kept, ids: tuple[int, ...], now: float) -> Kept:
+def _reindexed_memory(kept: RelationMemory, ids: tuple[int, ...], now: float) -> RelationMemory:
     """What was kept, of other objects."""
     if kept.history.ids == ids:
         return kept
-    rows, numbers = carried(kept.history.ids, ids)
-    smooth = Smooth(
+    rows, numbers = reindexing(kept.history.ids, ids)
+    smooth = SmoothedGeometry(
         kept.smooth.time,
         np.append(kept.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
         np.append(kept.smooth.gap, np.nan)[numbers],

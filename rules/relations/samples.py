@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Presence
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.outlines import reach
+from visup.rules.geometry.outlines import write_support
 from visup.rules.geometry.regions import FAN, Floats, hull_separation
-from visup.rules.presence.sightings import merged_pairs, tracks
+from visup.rules.presence.object_tracks import merged_pairs, presence_memory
 
 ROOM = 64
 """For how many further samples memory is made ready."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class History:
+class SampleWindow:
     """The last samples of all objects that relations are judged of.
 
     Those of one moment are rows of the same memory as those of the moments before and after, which
@@ -49,14 +49,14 @@ class History:
         return self.times, self.support, self.free, self.separation, self.depth
 
 
-def sample(
-    history: History,
+def sampled(
+    history: SampleWindow,
     objects: tuple[ObjectBelief, ...],
     mind: Mind,
     observation: Observation,
     window_s: float,
     most: int,
-) -> History:
+) -> SampleWindow:
     """A history with this step's sample, and without those that are too old.
 
     Args:
@@ -76,26 +76,26 @@ def sample(
     least = window_s / most
     due = len(history.times) == 0 or mind.time - history.times[-1] >= least - 1e-6
     if not (due and observation.observed("region")):
-        return without(history, old)
+        return without_oldest(history, old)
     joint = {i for pair in merged_pairs(mind) for i in pair}
     support = np.full((len(ids), FAN), np.nan)
     free = np.zeros((len(ids), FAN), dtype=bool)
     depth = np.full(len(ids), np.nan)
     for i, b in enumerate(objects):
         if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
-            reach(b.region, mind.frame_size, support[i], free[i])
+            write_support(b.region, mind.frame_size, support[i], free[i])
             depth[i] = np.nan if b.depth is None else b.depth
     row = (mind.time, support, free, hull_separation(support), depth)
-    return extended(comparable(history, mind), row, old)
+    return extended(without_reassigned(history, mind), row, old)
 
 
-def covered(history: History, window_s: float) -> bool:
+def covers_window(history: SampleWindow, window_s: float) -> bool:
     """Whether enough of the window is filled for a fit: six samples over three fifths of it."""
     times = history.times
     return len(times) >= 6 and bool(times[-1] - times[0] >= 0.6 * window_s)
 
 
-def reindexed(history: History, ids: tuple[int, ...]) -> History:
+def reindexed(history: SampleWindow, ids: tuple[int, ...]) -> SampleWindow:
     """A history of other objects: those that are new have no samples, others keep theirs."""
     if ids == history.ids:
         return history
@@ -107,12 +107,12 @@ def reindexed(history: History, ids: tuple[int, ...]) -> History:
     support[:, new], free[:, new] = history.support[:, old], history.free[:, old]
     depth[:, new] = history.depth[:, old]
     separation[np.ix_(range(t), new, new)] = history.separation[np.ix_(range(t), old, old)]
-    return History(ids, history.times, support, free, separation, depth)
+    return SampleWindow(ids, history.times, support, free, separation, depth)
 
 
-def comparable(history: History, mind: Mind) -> History:
+def without_reassigned(history: SampleWindow, mind: Mind) -> SampleWindow:
     """A history without the samples of objects whose regions have changed their nature since."""
-    of = tracks(mind).of
+    of = presence_memory(mind).of
     changed = np.array([of[i].changed_at if i in of else -1.0 for i in history.ids])
     if not len(history.times) or not (changed > history.times[0] + 1e-9).any():
         return history
@@ -128,22 +128,22 @@ def comparable(history: History, mind: Mind) -> History:
     )
 
 
-def without(history: History, old: int) -> History:
+def without_oldest(history: SampleWindow, old: int) -> SampleWindow:
     """A history without its `old` oldest samples."""
     if not old:
         return history
     times, support, free, separation, depth = (a[old:] for a in history.arrays)
-    return History(history.ids, times, support, free, separation, depth, history.start + old)
+    return SampleWindow(history.ids, times, support, free, separation, depth, history.start + old)
 
 
-def extended(history: History, row: tuple[Any, ...], old: int = 0) -> History:
+def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> SampleWindow:
     """A history with one more sample (time, support, free, separation, depth) and without old ones."""
     count = len(history.times)
     end = history.start + count
     memory: list[Any] = [a.base for a in history.arrays]
     # A row without a time belongs to nobody yet; arrays from elsewhere have no room at all.
     if any(m is None or len(m) <= end for m in memory) or memory[0][end] == memory[0][end]:
-        history = _with_room(without(history, old), max(ROOM, count))
+        history = _with_room(without_oldest(history, old), max(ROOM, count))
         count, old = count - old, 0
         end = count
         memory = [a.base for a in history.arrays]
@@ -151,10 +151,10 @@ def extended(history: History, row: tuple[Any, ...], old: int = 0) -> History:
         values[end] = new
     start = history.start + old
     times, support, free, separation, depth = [m[start : end + 1] for m in memory]
-    return History(history.ids, times, support, free, separation, depth, start)
+    return SampleWindow(history.ids, times, support, free, separation, depth, start)
 
 
-def _with_room(history: History, more: int) -> History:
+def _with_room(history: SampleWindow, more: int) -> SampleWindow:
     """The same history in memory of its own, with room for more samples."""
     count = len(history.times)
 
@@ -165,4 +165,4 @@ def _with_room(history: History, more: int) -> History:
         return wide[:count]
 
     times, support, free, separation, depth = map(roomy, history.arrays)
-    return History(history.ids, times, support, free, separation, depth)
+    return SampleWindow(history.ids, times, support, free, separation, depth)

@@ -17,12 +17,12 @@ from visup.rules.geometry.hysteresis import Floats
 ORDER, DIRECTION, DISTANCE = slice(0, 8), 8, 9
 AWAY, SIDE = slice(10, 12), slice(12, 14)
 MOVEMENT = slice(10, 14)
-JUDGED = 14
+BOX_ROWS = 14
 """Rows of codes: order of edges (8), direction, distance class, QTC-B (2) and its sides (2)."""
 
 
 @dataclass(frozen=True, slots=True)
-class JudgeSettings:
+class ThresholdSettings:
     """Thresholds of what is judged here. Lengths are shares of the image diagonal but for the noise.
 
     Attributes:
@@ -59,7 +59,7 @@ class JudgeSettings:
 Limits = tuple[float, float, float, float, float, float, float, float, float, float, float]
 
 
-def limits(s: JudgeSettings, diagonal: float) -> Limits:
+def limits(s: ThresholdSettings, diagonal: float) -> Limits:
     """Thresholds as `judge_loops.judged` takes them.
 
     Args:
@@ -85,8 +85,8 @@ def limits(s: JudgeSettings, diagonal: float) -> Limits:
     )
 
 
-def least_durations(s: JudgeSettings) -> Floats:
+def least_durations(s: ThresholdSettings) -> Floats:
     """(JUDGED, 1) seconds that each row must last before it is believed."""
-    lasts = np.full((JUDGED, 1), s.state_minimum_s)
+    lasts = np.full((BOX_ROWS, 1), s.state_minimum_s)
     lasts[MOVEMENT] = s.motion_minimum_s
     return lasts

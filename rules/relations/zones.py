@@ -25,17 +25,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome, Relation, Truth, Zone
-from visup.rules.geometry.ema import smoothed
+from visup.rules.geometry.ema import exponential_mean
 from visup.rules.geometry.hysteresis import (
     ABOVE,
     BELOW,
     UNKNOWN,
     Codes,
-    Latch,
-    step,
-    unknown_latch,
+    HysteresisState,
+    advance,
+    unknown_states,
 )
-from visup.rules.geometry.regions import Floats, dense, outline, scale
+from visup.rules.geometry.regions import Floats, densified, image_diagonal, outline
 
 ZONES = "rules.zones"
 QUESTIONS = ("inside", "reaching", "wholly_inside")
@@ -61,7 +61,7 @@ class ZoneSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Kept:
+class ZoneMemory:
     """What is remembered.
 
     Attributes:
@@ -76,14 +76,14 @@ class Kept:
 
     ids: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
-    latch: Latch = field(default_factory=lambda: unknown_latch((4, 0), 0.0))
+    latch: HysteresisState = field(default_factory=lambda: unknown_states((4, 0), 0.0))
     outside: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     smooth: Floats = field(default_factory=lambda: np.zeros((4, 0)))
     time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class SeeZones:
+class ZoneReasoner:
     """Reasoner of the cogitate phase: which objects are inside which zones of the mind."""
 
     settings: ZoneSettings = field(default_factory=ZoneSettings)
@@ -93,23 +93,23 @@ class SeeZones:
         if not mind.zones:
             return Outcome(mind)
         s, objects = self.settings, mind.present()
-        old: Kept = mind.memory.get(ZONES, Kept())
+        old: ZoneMemory = mind.memory.get(ZONES, ZoneMemory())
         ids, names = tuple(b.id for b in objects), tuple(z.name for z in mind.zones)
         latch, smooth = self._before(old, ids, names, mind.time)
         apart = np.array([[self._apart(z, b, mind) for b in objects] for z in mind.zones])
         apart = apart.reshape(len(names), len(ids), 4)
         flat = apart.reshape(-1, 4).T
-        band = np.full(flat.shape, s.enter * scale(mind.frame_size))
+        band = np.full(flat.shape, s.enter * image_diagonal(mind.frame_size))
         spread = [s.depth_sigmas * (b.depth_sigma or 0.0) for b in objects]
         band[3] = np.tile(spread, len(names))
-        jump = 2.0 * s.enter * scale(mind.frame_size)
+        jump = 2.0 * s.enter * image_diagonal(mind.frame_size)
         # Depth was smoothed before, and is -inf where a zone has no range.
         flat = np.append(
-            smoothed(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
+            exponential_mean(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
         )
         wanted = edge_sign(flat, latch.state, band)
-        latch = step(latch, wanted, mind.time, s.minimum_s)
-        kept = Kept(ids, names, latch, apart[:, :, 0], flat, mind.time)
+        latch = advance(latch, wanted, mind.time, s.minimum_s)
+        kept = ZoneMemory(ids, names, latch, apart[:, :, 0], flat, mind.time)
         told = tuple(
             _relation(kept, question, i, name)
             for name in names
@@ -119,8 +119,8 @@ class SeeZones:
         return Outcome(mind.remember(ZONES, kept, relations=mind.relations + told))
 
     def _before(
-        self, old: Kept, ids: tuple[int, ...], names: tuple[str, ...], now: float
-    ) -> tuple[Latch, Floats]:
+        self, old: ZoneMemory, ids: tuple[int, ...], names: tuple[str, ...], now: float
+    ) -> tuple[HysteresisState, Floats]:
         if old.ids == ids and old.names == names:
             return old.latch, old.smooth
         known = ((z, i) for z in old.names for i in old.ids)
@@ -134,7 +134,7 @@ class SeeZones:
         if mind.time - belief.last_seen > self.settings.hold_s:
             return (np.nan,) * 4
         region, polygon = belief.region, np.asarray(zone.polygon, dtype=float)
-        points = dense(outline(region), 8.0)
+        points = densified(outline(region), 8.0)
         points = points[:: -(-len(points) // self.settings.points)]
         distance = outside(np.vstack([[region.centroid], points]), polygon)
         least = float(distance[1:].min())
@@ -190,36 +190,36 @@ def contains(points: Floats, polygon: Floats) -> NDArray[np.bool_]:
 
 def inside(mind: Mind, object_id: int, zone: str) -> Truth:
     """Whether an object's centre is inside a zone; unknown for what is not judged."""
-    return asked(mind, "inside", object_id, zone)
+    return zone_truth(mind, "inside", object_id, zone)
 
 
 def reaching(mind: Mind, object_id: int, zone: str) -> Truth:
     """Whether some part of an object is inside a zone."""
-    return asked(mind, "reaching", object_id, zone)
+    return zone_truth(mind, "reaching", object_id, zone)
 
 
 def wholly_inside(mind: Mind, object_id: int, zone: str) -> Truth:
     """Whether all of an object is inside a zone."""
-    return asked(mind, "wholly_inside", object_id, zone)
+    return zone_truth(mind, "wholly_inside", object_id, zone)
 
 
 def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
     """Pixels from an object's centre to the edge of a zone's polygon, negative inside; NaN unknown."""
-    kept: Kept = mind.memory.get(ZONES, Kept())
+    kept: ZoneMemory = mind.memory.get(ZONES, ZoneMemory())
     if zone not in kept.names or object_id not in kept.ids:
         return float("nan")
     return float(kept.outside[kept.names.index(zone), kept.ids.index(object_id)])
 
 
-def asked(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
+def zone_truth(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
     """One of `QUESTIONS` about an object and a zone; unknown for what is not judged."""
-    kept: Kept = mind.memory.get(ZONES, Kept())
+    kept: ZoneMemory = mind.memory.get(ZONES, ZoneMemory())
     if zone not in kept.names or object_id not in kept.ids:
         return Truth.UNKNOWN
     return _relation(kept, question, object_id, zone).truth
 
 
-def _relation(kept: Kept, question: str, object_id: int, zone: str) -> Relation:
+def _relation(kept: ZoneMemory, question: str, object_id: int, zone: str) -> Relation:
     """In the image and in depth: what is outside in either is outside, whatever is unknown."""
     k = kept.names.index(zone) * len(kept.ids) + kept.ids.index(object_id)
     rows = [QUESTIONS.index(question), 3]

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from visup.agent import Event, Mind, Observation, Outcome, Relation
 from visup.rules.wording.sentences import sentence
 
-NARRATIVE = "rules.narrative"
+RELATION_EVENTS = "rules.narrative"
 TEMPLATES = {
     "converging": "{0} and {1} {are} converging.",
     "diverging": "{0} and {1} {are} moving apart.",
@@ -19,7 +19,7 @@ Told = tuple[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class NarrativeSettings:
+class RelationEventSettings:
     """How sparingly relations are told.
 
     Attributes:
@@ -34,20 +34,20 @@ class NarrativeSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class TellRelations:
+class RelationEventReasoner:
     """Reasoner of the cogitate phase: 'relation' events for trends that are new and last.
 
     A pair that keeps its distance is told of only when it converged or diverged before; coupled
     pairs are left alone.
     """
 
-    settings: NarrativeSettings = field(default_factory=NarrativeSettings)
+    settings: RelationEventSettings = field(default_factory=RelationEventSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
         events = []
-        for objects, name in mind.held(*TEMPLATES):
+        for objects, name in mind.holding_objects(*TEMPLATES):
             if not self._new(name, told.get(objects), mind):
                 continue
             relation = mind.relation(name, *objects)
@@ -55,10 +55,10 @@ class TellRelations:
                 continue
             told[relation.objects] = (relation.name, mind.time)
             events.append(_event(relation, mind, observation))
-        return Outcome(mind.remember(NARRATIVE, MappingProxyType(told)), tuple(events))
+        return Outcome(mind.remember(RELATION_EVENTS, MappingProxyType(told)), tuple(events))
 
     def _memory(self, mind: Mind) -> Mapping[tuple[int, ...], Told]:
-        old: Mapping[tuple[int, ...], Told] = mind.memory.get(NARRATIVE, MappingProxyType({}))
+        old: Mapping[tuple[int, ...], Told] = mind.memory.get(RELATION_EVENTS, MappingProxyType({}))
         return {pair: t for pair, t in old.items() if all(i in mind.objects for i in pair)}
 
     def _new(self, name: str, last: Told | None, mind: Mind) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.derivatives import Leaf
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
 from visup.tasks.verification.observe import ActionObservation
@@ -26,7 +26,7 @@ class StepModel:
         hmm: The probabilities of the model.
     """
 
-    actions: Mapping[str, Meaning]
+    actions: Mapping[str, ActionDefinition]
     settings: TaskSettings
     hmm: StageHmm
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from visup.agent import (
+    AlertCondition,
     Binding,
-    Concern,
     Event,
     Mind,
     Observation,
@@ -23,8 +23,8 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning, known_actions
-from visup.tasks.actions.vocabulary import vocabulary
+from visup.tasks.actions.actions import ActionDefinition, known_actions
+from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
@@ -60,7 +60,7 @@ UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often t
 def task_reasoner(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
-    actions: Mapping[str, Meaning] | None = None,
+    actions: Mapping[str, ActionDefinition] | None = None,
 ) -> Reasoner:
     """The reasoner that supervises some tasks.
 
@@ -107,8 +107,10 @@ def finish(belief: TaskBelief) -> Verdict:
     return belief.verdict
 
 
-def _model(task: Task, actions: Mapping[str, Meaning], settings: TaskSettings) -> MonitoredPhases:
-    words = vocabulary(task, actions)
+def _model(
+    task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
+) -> MonitoredPhases:
+    words = task_vocabulary(task, actions)
     model = MonitoredPhases(task, words.meanings, settings, words.looks)
     model.filter.success(model.filter.start())  # so that no step has to work out the whole course
     return model
@@ -232,7 +234,7 @@ def _events(
     yield from invariant_events(model, memory, new, mind)
 
 
-def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[Concern]:
+def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondition]:
     yield from stage_concerns(memory.belief)
     yield from invariant_concerns(model, memory)
 

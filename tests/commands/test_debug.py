@@ -16,7 +16,7 @@ from visup.agent import Frame, Region
 from visup.cli import main
 from visup.commands.debug import video_of
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.tracks.trace import Looked
+from visup.percepts.motion.tracks.trace import SegmentationTrace
 from visup.report.motion_debug.marks import flow_colours
 from visup.report.motion_debug.panels import (
     draw_motion,
@@ -27,7 +27,7 @@ from visup.report.motion_debug.panels import (
 )
 
 SIZE = (192, 144)
-Seen = tuple[Frame, Looked, tuple[Region, ...]]
+Seen = tuple[Frame, SegmentationTrace, tuple[Region, ...]]
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +42,8 @@ def seen() -> Seen:
     for n, image in enumerate(moving_disc(30, SIZE)):
         frame = Frame(n, n / 25, image)
         regions = segmenter.step(frame)
-    assert segmenter.looked is not None
-    return frame, segmenter.looked, regions
+    assert segmenter.trace is not None
+    return frame, segmenter.trace, regions
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
@@ -82,43 +82,43 @@ def test_the_video_has_every_frame_that_was_asked_for(
 
 
 def test_panels_tell_the_disc_from_the_ground(seen: Seen) -> None:
-    _, looked, regions = seen
+    _, trace, regions = seen
     assert len(regions) == 1
-    speed, layer = velocities(looked)
-    (key,) = (k for k, t in enumerate(looked.tracks, 1) if t.id == regions[0].id)
+    speed, layer = velocities(trace)
+    (key,) = (k for k, t in enumerate(trace.tracks, 1) if t.id == regions[0].id)
     assert np.allclose(np.median(speed[layer == key], axis=0), (25, 0), atol=2)
     assert np.allclose(np.median(speed[layer == 0], axis=0), 0, atol=2)
-    for m in looked.scene.measured:
-        by = explained_by(looked, m)
+    for m in trace.scene.measured:
+        by = explained_by(trace, m)
         x, y = m.constraints.xy.T
         inside = np.hypot(x - regions[0].centroid[0], y - regions[0].centroid[1]) < 9
         assert (by[inside] == key).mean() > 0.8
         assert (
             by[np.hypot(x - regions[0].centroid[0], y - regions[0].centroid[1]) > 40] <= 0
         ).all()
-    words = [text for text, _ in layer_rows(looked)]
+    words = [text for text, _ in layer_rows(trace)]
     assert words[0].startswith("background")
     assert any(text.startswith(f"{regions[0].id} (layer ") and "+25." in text for text in words)
 
 
 def test_a_picture_is_a_pure_function_and_keeps_its_size(seen: Seen) -> None:
-    frame, looked, regions = seen
+    frame, trace, regions = seen
     before = frame.image.copy()
-    picture = draw_motion(frame, looked, regions)
-    assert np.array_equal(picture, draw_motion(frame, looked, regions))
+    picture = draw_motion(frame, trace, regions)
+    assert np.array_equal(picture, draw_motion(frame, trace, regions))
     assert np.array_equal(frame.image, before)
     # The first frame of a video, which has nothing to be compared with, must fit as well.
     assert draw_motion(frame, None, ()).shape == picture.shape
 
 
 def test_mixed_superpixels_are_uncertain(seen: Seen) -> None:
-    _, looked, _ = seen
-    count, labels = looked.posterior.shape
+    _, trace, _ = seen
+    count, labels = trace.posterior.shape
     sure = np.zeros((count, labels), np.float32)
     sure[:, 0] = 1
     even = np.full((count, labels), 1 / labels, np.float32)
     for posterior, unsure in ((sure, False), (even, True)):
-        known = Looked(looked.scene, looked.tracks, looked.keys, posterior)
+        known = SegmentationTrace(trace.scene, trace.tracks, trace.keys, posterior)
         colours, uncertain = label_colours(known)
         assert (uncertain == unsure).all()
         assert (colours.max() > 0) == unsure

@@ -14,8 +14,8 @@ from tests.paths import SHARED
 from tests.percepts.shape.shapes import ZOO, flower, limbs, small_database
 from visup.agent.model.errors import DatabaseError, SettingsError, VisupError
 from visup.commands.models import app
-from visup.evaluation.shape.shapes import evaluate_shapes
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.evaluation.shape.retrieval import evaluate_shapes
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.drawing.sheet import COLOURS
 
 

@@ -10,8 +10,15 @@ import pytest
 from rich.console import Console
 
 from visup.agent.model.errors import SettingsError
-from visup.commands.eval.clips import clips_table
-from visup.evaluation.motion.clips import MARK, Bar, bar_of, evaluate_clips, judged, rendered
+from visup.commands.eval.tables import clips_table
+from visup.evaluation.motion.rendered_clips import (
+    MARK,
+    Bar,
+    bar_of,
+    evaluate_clips,
+    judged,
+    rendered,
+)
 from visup.render.imaging.renderer import Renderer
 from visup.render.scenario.library import (
     bench_names,
@@ -88,7 +95,7 @@ def test_a_clip_is_rendered_once_and_again_when_it_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tiny = small("slow").model_copy(update={"duration_s": 0.08})
-    monkeypatch.setattr("visup.evaluation.motion.clips.shipped_scenario", lambda _: tiny)
+    monkeypatch.setattr("visup.evaluation.motion.rendered_clips.shipped_scenario", lambda _: tiny)
     folder = rendered("slow", tmp_path)
     assert len(list((folder / "masks").iterdir())) == 2
     made = (folder / "truth.json").stat().st_mtime_ns
@@ -104,7 +111,7 @@ def test_a_clip_is_scored_from_its_scenario(
 ) -> None:
     camel = shipped_scenario("bench/exposure").resized((160, 120))
     short = camel.model_copy(update={"duration_s": 2.8})
-    monkeypatch.setattr("visup.evaluation.motion.clips.shipped_scenario", lambda _: short)
+    monkeypatch.setattr("visup.evaluation.motion.rendered_clips.shipped_scenario", lambda _: short)
     told: list[str] = []
     figures = evaluate_clips(tmp_path, ["exposure"], workers=1, progress=told.append)
     assert told == ["1 of 1 clips"]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from visup.percepts.shape.building.views import half_sphere_directions, render_views
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.building.mesh_views import half_sphere_directions, render_views
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.render.imaging.renderer import Renderer
 from visup.render.meshes.spacecraft import mesh
 from visup.render.output.demo_clip import CLIP, RECORD

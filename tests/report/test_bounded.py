@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from visup.report.bounded import Heaviest, SpanRecorder, Thinned
-from visup.report.records import Span
+from visup.report.records import StateSpan
 
 
 @given(most=st.integers(2, 40), count=st.integers(0, 500))
@@ -74,9 +74,9 @@ def test_spans_that_do_not_fit_are_dropped() -> None:
     for t in range(6):
         recorder.note(t, {("x",): str(t)})
     assert recorder.spans(6.0) == (
-        Span(("x",), "0", 0, 1),
-        Span(("x",), "1", 1, 2),
-        Span(("x",), "5", 5, 6.0),
+        StateSpan(("x",), "0", 0, 1),
+        StateSpan(("x",), "1", 1, 2),
+        StateSpan(("x",), "5", 5, 6.0),
     )
 
 

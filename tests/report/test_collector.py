@@ -12,11 +12,11 @@ import pytest
 from tests.report.scene import END_S, FPS, TOLD, TOUCH_S, mind_at, run, step_at
 from visup.agent import Event, Relation, Severity, Truth, Verdict
 from visup.agent.model.errors import SettingsError
-from visup.report.collector import Collector, Limits, cut_out, sample_of, shrunk, weight_of
+from visup.report.collector import Collector, ReportLimits, cut_out, sample_of, shrunk, weight_of
 
 
-def collected(limits: Limits | None = None) -> Collector:
-    collector = Collector(limits or Limits())
+def collected(limits: ReportLimits | None = None) -> Collector:
+    collector = Collector(limits or ReportLimits())
     for step, frame in run((160, 120)):
         collector.add(step, frame)
     return collector
@@ -79,7 +79,7 @@ def test_spans_follow_stages_moves_and_presence() -> None:
 
 
 def test_memory_is_bounded_whatever_the_length() -> None:
-    limits = Limits(samples=8, key_frames=3, events=2, spans=4, alerts=1)
+    limits = ReportLimits(samples=8, key_frames=3, events=2, spans=4, alerts=1)
     data = collected(limits).finish()
     assert len(data.samples) <= 8
     assert len(data.key_frames) <= 4
@@ -95,7 +95,7 @@ def test_memory_is_bounded_whatever_the_length() -> None:
 
 
 def test_the_picture_of_a_grave_event_survives_many_light_ones() -> None:
-    collector = Collector(Limits(key_frames=3))
+    collector = Collector(ReportLimits(key_frames=3))
     for step, frame in run((64, 48)):
         entry = Event("entry", step.time, step.frame_index, "An object is in view.")
         collector.add(replace(step, events=(*step.events, entry)), frame)
@@ -109,7 +109,7 @@ def test_an_empty_run_is_a_run() -> None:
 
 def test_limits_that_keep_nothing_are_refused() -> None:
     with pytest.raises(SettingsError):
-        Collector(Limits(samples=1))
+        Collector(ReportLimits(samples=1))
 
 
 def test_distance_is_the_gap_between_outlines_unless_rules_tell_it() -> None:

@@ -22,7 +22,7 @@ from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report.collector import Collector
 from visup.report.figures import distance_figures, fitted_lines, vote_figures
 from visup.report.html import embedded, plotly_source, report_page, write_report
-from visup.report.records import RunData, Span
+from visup.report.records import RunData, StateSpan
 from visup.report.sections import flat, narrative, nearest
 from visup.report.summary import summary, title_of, verdict_words
 
@@ -268,7 +268,7 @@ def test_json_in_the_page_never_ends_its_script() -> None:
 def test_fitted_lines_find_the_speed(slope: float, start: float, count: int, noise: float) -> None:
     times = np.arange(count) / 5.0
     gaps = start + slope * times + noise * np.random.default_rng(count).standard_normal(count)
-    span = Span(("relation", "1", "2"), "converging", 0.0, float(times[-1]))
+    span = StateSpan(("relation", "1", "2"), "converging", 0.0, float(times[-1]))
     (line,) = fitted_lines(times.tolist(), gaps.tolist(), [span])
     spread = np.sqrt(((times - times.mean()) ** 2).sum())
     assert abs(line.slope - slope) <= 6 * noise / spread + 1e-6
@@ -278,7 +278,7 @@ def test_fitted_lines_find_the_speed(slope: float, start: float, count: int, noi
 def test_moments_of_touch_do_not_bend_the_line() -> None:
     times = [float(t) for t in range(20)]
     gaps = [max(0.0, 50.0 - 10.0 * t) for t in times]
-    span = Span(("relation", "1", "2"), "converging", 0.0, 19.0)
+    span = StateSpan(("relation", "1", "2"), "converging", 0.0, 19.0)
     (line,) = fitted_lines(times, gaps, [span])
     assert line.slope == pytest.approx(-10.0)
     assert line.times == (0.0, 4.0)
@@ -295,7 +295,7 @@ def test_votes_that_were_not_kept_are_unknown() -> None:
 
 
 def test_spans_with_too_few_points_have_no_line() -> None:
-    span = Span(("relation", "1", "2"), "diverging", 1.0, 1.3)
+    span = StateSpan(("relation", "1", "2"), "diverging", 1.0, 1.3)
     assert fitted_lines([0.0, 1.0, 1.2, 2.0], [1.0, 2.0, 3.0, 4.0], [span]) == ()
 
 
@@ -317,7 +317,7 @@ def test_events_lead_to_the_nearest_key_frame() -> None:
 
 
 def test_a_coupling_is_a_band_and_has_no_line() -> None:
-    coupled = Span(("relation", "1", "2"), "coupled", 8.0, 9.5)
+    coupled = StateSpan(("relation", "1", "2"), "coupled", 8.0, 9.5)
     (figure,) = distance_figures(replace(data(), spans=(*data().spans, coupled)))
     bands = [s for s in figure.layout["shapes"] if s["type"] == "rect"]
     assert [(b["x0"], b["x1"]) for b in bands] == [(8.0, 9.5)]

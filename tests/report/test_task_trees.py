@@ -16,7 +16,7 @@ from tests.report.scene import run
 from visup.agent import Status
 from visup.report.collector import Collector
 from visup.report.html import report_page
-from visup.report.records import RunData, Span
+from visup.report.records import RunData, StateSpan
 from visup.report.task_trees import changes, courses
 from visup.tasks.checks.load import parse_task
 from visup.tasks.tools.outline import Branch, outline
@@ -59,8 +59,8 @@ def test_the_slider_has_every_change_of_the_run() -> None:
 
 @given(st.lists(st.tuples(st.floats(0, 99), st.sampled_from(list(Status))), max_size=8))
 def test_changes_come_in_order_and_of_one_stage_only(moments: list[tuple[float, Status]]) -> None:
-    spans = [Span(("stage", "t", "a"), s.value, at, at + 1) for at, s in moments]
-    other = Span(("stage", "t", "b"), "done", 0, 1)
+    spans = [StateSpan(("stage", "t", "a"), s.value, at, at + 1) for at, s in moments]
+    other = StateSpan(("stage", "t", "b"), "done", 0, 1)
     found = changes(RunData("x", spans=(*spans, other)), "t", "a")
     assert [t for t, _ in found] == sorted(t for t, _ in found)
     assert sorted(v for _, v in found) == sorted(s.value for s in spans)
@@ -69,7 +69,7 @@ def test_changes_come_in_order_and_of_one_stage_only(moments: list[tuple[float, 
 def test_what_a_file_says_is_never_read_as_markup() -> None:
     evil = "<script>alert(1)</script>\"'"
     tree = Branch(evil, "task", "", (Branch(evil, "stage", evil), Branch(evil, "words", evil)))
-    data = RunData("x", spans=(Span(("stage", evil, evil), "done", 0, 1),), courses=(tree,))
+    data = RunData("x", spans=(StateSpan(("stage", evil, evil), "done", 0, 1),), courses=(tree,))
     page = report_page(data)
     assert "<script>alert" not in page
     assert told(courses(data)) == [("done", unescape(_escaped(evil)), [[0, "done"]])]

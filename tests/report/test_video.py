@@ -13,7 +13,7 @@ from tests.report.scene import FPS, run
 from visup.agent.model.errors import OutputError
 from visup.percepts.video import open_source
 from visup.report.annotate import annotate
-from visup.report.video import AnnotatedVideo, VideoWriter, playable_size
+from visup.report.video import AnnotatedVideo, WebmWriter, playable_size
 
 
 @pytest.mark.parametrize("size", [(160, 120), (161, 91), (1400, 100)])
@@ -46,12 +46,12 @@ def test_the_video_shows_the_annotation(tmp_path: Path) -> None:
 
 
 def test_without_a_frame_there_is_no_file(tmp_path: Path) -> None:
-    VideoWriter(tmp_path / "a.webm", 25.0).close()
+    WebmWriter(tmp_path / "a.webm", 25.0).close()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unwritable_place_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    writer = VideoWriter(tmp_path / "missing" / "a.webm", 25.0)
+    writer = WebmWriter(tmp_path / "missing" / "a.webm", 25.0)
     with pytest.raises(OutputError, match="cannot be written"):
         writer.write(np.zeros((48, 64, 3), np.uint8))
     assert capfd.readouterr().err == ""

@@ -9,9 +9,9 @@ from typing import Any
 
 from tests.paths import SHARED
 from visup.agent import Observation
-from visup.evaluation.missions.mission_files import read_json
+from visup.evaluation.missions.files import read_json
+from visup.evaluation.simulation.percepts import PerceptNoise, observations_of
 from visup.evaluation.simulation.truth_masks import Mission, load_mission
-from visup.evaluation.simulation.truth_percepts import PerceptNoise, observations_of
 
 MISSIONS = SHARED / "missions"
 

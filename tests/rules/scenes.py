@@ -17,7 +17,7 @@ from visup.agent import (
     Report,
     ReportState,
 )
-from visup.rules.geometry.outlines import reach
+from visup.rules.geometry.outlines import write_support
 
 SIZE = (640, 480)
 Rect = tuple[float, float, float, float]
@@ -84,5 +84,5 @@ def seen(
 def reach_of(region: Region) -> tuple[np.ndarray, np.ndarray]:
     """How far a region's outline reaches in each direction, and whether it is clear of the border there."""
     support, free = np.empty(16), np.empty(16, dtype=bool)
-    reach(region, SIZE, support, free)
+    write_support(region, SIZE, support, free)
     return support, free

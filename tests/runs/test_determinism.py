@@ -17,7 +17,8 @@ from pathlib import Path
 cores = [int(c) for c in sys.argv[2].split(",")]
 os.sched_setaffinity(0, cores)
 from visup.runs.demo import demo_settings
-from visup.runs.runner import RunOptions, supervise
+from visup.runs.runner import supervise
+from visup.runs.settings import RunOptions
 folder = Path(sys.argv[1])
 folder.mkdir()
 supervise(demo_settings(int(sys.argv[3])), folder, options=RunOptions(video=False, report=False))

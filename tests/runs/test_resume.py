@@ -14,22 +14,22 @@ import pytest
 
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
-from tests.percepts.video.test_live import FakeCapture
+from tests.percepts.video.test_live_source import FakeCapture
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
-from visup.agent.storage.codec import packed
+from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.percepts.video.live import LiveSource
+from visup.percepts.video.live_source import LiveSource
 from visup.runs.checkpoints import CHECKPOINT
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.operator import HumanOperator
 from visup.runs.replay import recorded_transcript, replay, settings_for, transcript_diff
 from visup.runs.resume import interrupted_run
-from visup.runs.runner import RunOptions, fresh_folder, supervise
-from visup.runs.settings import WatchSettings
+from visup.runs.runner import Audience, fresh_folder, supervise
+from visup.runs.settings import RunOptions, WatchSettings
 
 BARE = RunOptions(video=False, report=False, state_every_s=0.2)
 
@@ -51,14 +51,14 @@ def broken_run(settings: WatchSettings, folder: Path, at: int, options: RunOptio
 
     folder.mkdir()
     with pytest.raises(Pulled):
-        supervise(settings, folder, observers=[pull], options=options)
+        supervise(settings, folder, audience=Audience([pull]), options=options)
 
 
 def outcome(folder: Path) -> object:
     run = Recording.open(folder)
     facts = run.facts()
     told = (folder / "events.jsonl").read_bytes(), facts["verdict"], facts["steps"]
-    return told, list(run.summaries()), [packed(o) for o in run.observations()]
+    return told, list(run.summaries()), [pack_observation(o) for o in run.observations()]
 
 
 def test_killed_runs_that_are_resumed_equal_an_unbroken_one() -> None:
@@ -115,7 +115,7 @@ def test_what_the_operator_said_is_remembered(clip: WatchSettings, tmp_path: Pat
     settings = WatchSettings(clip.source, models=demo)
     folder = tmp_path / "whole"
     told = HumanOperator({1: "spartan"})
-    supervise(settings, fresh_folder(folder, ""), operator=told, options=BARE)
+    supervise(settings, fresh_folder(folder, ""), audience=Audience(operator=told), options=BARE)
     run = Recording.open(folder)
     (frame,) = run.answers()
     assert run.answers()[frame] == {1: "spartan"}
@@ -128,9 +128,11 @@ def test_what_the_operator_said_is_remembered(clip: WatchSettings, tmp_path: Pat
 
     parts.mkdir()
     with pytest.raises(Pulled):
-        supervise(settings, parts, operator=told, observers=[pull], options=BARE)
+        supervise(settings, parts, audience=Audience([pull], operator=told), options=BARE)
     past = interrupted_run(parts)
-    supervise(past.settings, parts, operator=HumanOperator(), options=BARE, past=past)
+    supervise(
+        past.settings, parts, audience=Audience(operator=HumanOperator()), options=BARE, past=past
+    )
     assert outcome(parts) == outcome(folder)
 
 
@@ -220,7 +222,9 @@ def test_a_disk_that_stays_full_does_not_hide_the_verdict(
             db.commit()
             db.close()
 
-    result = supervise(clip, fresh_folder(tmp_path / "run", ""), observers=[fill], options=BARE)
+    result = supervise(
+        clip, fresh_folder(tmp_path / "run", ""), audience=Audience([fill]), options=BARE
+    )
     assert result.steps == 40
     assert result.verdict is not None
     assert any("could not be recorded" in n for n in result.notes)

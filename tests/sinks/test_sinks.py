@@ -23,8 +23,8 @@ from visup.agent import Alert, Frame, Mind, Observation, Report, ReportState, Se
 from visup.agent.model.errors import ExtraMissingError, OutputError, SettingsError
 from visup.agent.model.step import Step
 from visup.evaluation.runtime.soak import evaluate_soak, sinks_ratio
-from visup.runs.runner import RunOptions, fresh_folder, supervise
-from visup.runs.settings import WatchSettings
+from visup.runs.runner import fresh_folder, supervise
+from visup.runs.settings import RunOptions, WatchSettings
 from visup.sinks import Outbox, Sinks, open_sink
 from visup.sinks.builtin import JsonLines, Webhook
 

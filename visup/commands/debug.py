@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from visup.percepts.video import Source
+    from visup.percepts.video import VideoSource
     from visup.runs.runner import Progress
 
 app = typer.Typer(no_args_is_help=True)
@@ -53,26 +53,26 @@ def motion(
     console.print(f"{written} frames in {target}", markup=False)
 
 
-def _write(video: Source, target: Path, limit: int | None, advance: Progress) -> int:
+def _write(video: VideoSource, target: Path, limit: int | None, advance: Progress) -> int:
     """Segment, draw and write; the number of frames written."""
     from itertools import islice
 
     from visup.percepts.motion.segmenter import MotionSegmenter
     from visup.report.motion_debug.panels import draw_motion
-    from visup.report.video import VideoWriter
+    from visup.report.video import WebmWriter
 
     segmenter, written = MotionSegmenter(), 0
     known = [n for n in (_given(video), limit) if n is not None]
-    with VideoWriter(target, video.fps / video.every, MOST_WIDTH) as writer:
+    with WebmWriter(target, video.fps / video.every, MOST_WIDTH) as writer:
         for frame in islice(video, limit):
             regions = segmenter.step(frame)
-            writer.write(draw_motion(frame, segmenter.looked, regions))
+            writer.write(draw_motion(frame, segmenter.trace, regions))
             written += 1
             advance(written, min(known, default=None))
     return written
 
 
-def _given(video: Source) -> int | None:
+def _given(video: VideoSource) -> int | None:
     """How many frames a source gives, where it is known."""
     return None if video.frame_count is None else -(-video.frame_count // video.every)
 

@@ -61,9 +61,9 @@ def examine() -> Iterator[CheckedPart]:
     """Look at Python, the libraries, the extras, the codecs and the shipped files."""
     import platform
 
-    import visup
+    from visup.version import __version__
 
-    yield CheckedPart("visup", "ok", visup.__version__)
+    yield CheckedPart("visup", "ok", __version__)
     yield CheckedPart("Python", "ok", platform.python_version())
     for name in CORE:
         yield _library(name, None)
@@ -102,11 +102,11 @@ def _codecs() -> str:
 
     import numpy as np
 
-    from visup.report.video import VideoWriter
+    from visup.report.video import WebmWriter
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "probe.webm"
-        writer = VideoWriter(path, 25.0)
+        writer = WebmWriter(path, 25.0)
         for _ in range(3):
             writer.write(np.zeros((48, 64, 3), np.uint8))
         writer.close()
@@ -114,9 +114,9 @@ def _codecs() -> str:
 
 
 def _behaviours() -> str:
-    from visup.agent.plugins.registry import discover
+    from visup.agent.plugins.registry import discover_behaviours
 
-    registry = discover()
+    registry = discover_behaviours()
     for name in registry.names():
         registry.make(name)
     return ", ".join(registry.names())
@@ -132,7 +132,7 @@ def _tasks() -> str:
 
 
 def _demo() -> str:
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.runs.demo import demo_settings
     from visup.runs.wiring import open_video
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from visup.percepts.shape.database.database import ModelDatabase, Ranking
+    from visup.percepts.shape.database.model_database import ModelDatabase, Ranking
 
 app = typer.Typer(
     no_args_is_help=True, help="Model databases: the shapes that objects are known by."
@@ -75,7 +75,7 @@ def add(
     """
     from visup.agent.model.errors import SettingsError
     from visup.percepts.shape.building.build import read_masks, read_silhouettes, silhouette_views
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.database.model_database import ModelDatabase
 
     if clusters < 1 or not name.strip():
         raise SettingsError(
@@ -103,7 +103,7 @@ def list_models(db: Db) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.database.model_database import ModelDatabase
 
     database = ModelDatabase.open(db)
     table = Table("object", "views", "directions", "cut by a border", title=str(db))
@@ -128,7 +128,7 @@ def match_picture(
     """Rank the views that a silhouette looks like; with --out, draw why."""
     from visup.agent.model.errors import DatabaseError, SettingsError
     from visup.percepts.shape.building.build import read_silhouette
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.percepts.shape.silhouette.silhouette import looks_cut, normalise
 
     if top < 1:
@@ -161,7 +161,7 @@ def show(
     ] = None,
 ) -> None:
     """Draw a contact sheet: a row for each model, its views with their shock graphs."""
-    from visup.percepts.shape.database.database import ModelDatabase
+    from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.percepts.shape.drawing.pictures import contact_sheet
 
     sheet = contact_sheet(ModelDatabase.open(db))

@@ -2,35 +2,49 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from visup.commands.watch import Actors, Rules, Tasks, Zones
+from visup.commands.options import REPLAYED, Given, takes
+from visup.runs.settings import Option, WatchSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from rich.console import Console
+
+    from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import Transcript, TranscriptDiff
 
 
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What the replay is compared with, and what is shown of it."""
+
+    diff: Annotated[bool, Option("Show what changes against the recorded run.", "--diff")] = False
+    against: Annotated[
+        Path | None, Option("Show what changes against this other run.", metavar="RUN")
+    ] = None
+    quiet: Annotated[bool, Option("Only the last lines.", "--quiet")] = False
+
+    def other(self, recording: Recording) -> Recording | None:
+        """The run that the replay of a recording is compared with, or None."""
+        from visup.agent.storage.journal_reader import Recording
+
+        return Recording.open(self.against) if self.against else recording if self.diff else None
+
+
+@takes(WatchSettings, Comparison, only=(*REPLAYED, "diff", "against", "quiet"))
 def replay(
+    setting: Given,
+    compared: Given,
     run: Annotated[Path, typer.Argument(help="Run folder of `visup watch`, or its journal.")],
-    task: Tasks = None,
-    rules: Rules = None,
-    actor: Actors = None,
-    zones: Zones = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the new run to this folder.")
     ] = None,
-    diff: Annotated[
-        bool, typer.Option("--diff", help="Show what changes against the recorded run.")
-    ] = False,
-    against: Annotated[
-        Path | None, typer.Option(metavar="RUN", help="Show what changes against this other run.")
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Only the last lines.")] = False,
 ) -> None:
     """Reason again about what a run perceived, with other tasks, rules or actors.
 
@@ -40,40 +54,47 @@ def replay(
     from rich.console import Console
 
     from visup.agent.storage.journal_reader import Recording
-    from visup.runs.replay import recorded_transcript, settings_for, transcript_diff
     from visup.runs.replay import replay as reason_again
+    from visup.runs.replay import settings_for
     from visup.runs.runner import fresh_folder
-    from visup.runs.settings import parse_actors
-    from visup.terminal.narrator import Narrator, verdict_line
+    from visup.terminal.narrator import Narrator
 
-    console = Console(highlight=False)
+    console, comparison = Console(highlight=False), Comparison(**compared)
     recording = Recording.open(run)
-    other = Recording.open(against) if against else recording if diff else None
-    settings = settings_for(
-        recording,
-        tasks=tuple(task or ()),
-        rules=tuple(rules or ()),
-        actors=parse_actors(actor or ()),
-        zones=zones,
-    )
+    other = comparison.other(recording)
+    settings = settings_for(recording, **setting)
     folder = fresh_folder(out, settings.source) if out else None
+    silent = comparison.quiet or other
     narrator = Narrator(console)
     told = reason_again(
         recording,
         settings,
         folder,
-        None if quiet or other else lambda step: narrator.print_events(step.events),
+        None if silent else lambda step: narrator.print_events(step.events),
     )
     console.print(_speed(told), style="dim")
     if other is None:
-        from visup.agent import Verdict
+        raise typer.Exit(_print_verdict(console, told))
+    raise typer.Exit(_print_changes(console, other, told, comparison.quiet))
 
-        console.print(verdict_line(Verdict(told.verdict) if told.verdict else None))
-        raise typer.Exit(int(told.failed))
+
+def _print_verdict(console: Console, told: Transcript) -> int:
+    """Print how the replay ended; the exit code."""
+    from visup.agent import Verdict
+    from visup.terminal.narrator import verdict_line
+
+    console.print(verdict_line(Verdict(told.verdict) if told.verdict else None))
+    return int(told.failed)
+
+
+def _print_changes(console: Console, other: Recording, told: Transcript, quiet: bool) -> int:
+    """Print what the replay changes against another run; the exit code."""
+    from visup.runs.replay import recorded_transcript, transcript_diff
+
     changed = transcript_diff(recorded_transcript(other), told)
     for text in _lines(changed, quiet):
         console.print(text, soft_wrap=True, markup=False)
-    raise typer.Exit(int(bool(changed)))
+    return int(bool(changed))
 
 
 def _speed(told: Transcript) -> str:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.watch import Actors, Every, Fov, Fps, Models, Rules, Source, Tasks, settings_of
+from visup.commands.options import Given, takes
+from visup.runs.settings import WatchSettings
 
 if TYPE_CHECKING:
     from visup.agent import Mind
@@ -18,19 +19,21 @@ app = typer.Typer(no_args_is_help=True)
 
 Files = Annotated[list[Path] | None, typer.Argument(help="Rule files; the shipped rules if none.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
+EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical_deg")
+"""Settings of a run that bear on what rules say."""
 
 
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
     """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
-    from visup.agent.model.errors import ManyErrors, VisupError
+    from visup.agent.model.errors import ErrorGroup, VisupError
     from visup.rules.language.parser import load_rules, raise_all
 
     faults: list[VisupError] = []
     for file in files:
         try:
             found = load_rules(file)
-        except ManyErrors as errors:
+        except ErrorGroup as errors:
             faults += errors.errors
         except VisupError as error:
             faults.append(error)
@@ -44,14 +47,14 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
 @app.command("list")
 def list_rules(files: Files = None, as_json: AsJson = False) -> None:
     """List rules: severity, memory bound and delay of each."""
-    from visup.rules.language.cost import bounds_of
+    from visup.rules.language.cost import cost_of
     from visup.rules.language.parser import load_rules, shipped_rules
 
     found = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
     if as_json:
         rows: list[dict[str, Any]] = []
         for rule in found:
-            cost = bounds_of(rule)
+            cost = cost_of(rule)
             rows.append(
                 {
                     "name": rule.name,
@@ -70,23 +73,20 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
 
 
 @app.command()
+@takes(WatchSettings, only=EXPLAINED)
 def explain(
-    source: Source,
+    setting: Given,
+    source: Annotated[
+        str, typer.Argument(help="Video file, folder of images, camera index or URL.")
+    ],
     at: Annotated[float, typer.Option("--at", min=0.0, help="Seconds of the video.")],
     rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
-    task: Tasks = None,
-    models: Models = None,
-    rules: Rules = None,
-    actor: Actors = None,
-    every: Every = 1,
-    fps: Fps = None,
-    fov: Fov = None,
 ) -> None:
     """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
     from visup.agent.model.errors import SettingsError
     from visup.runs.wiring import build_agent, open_video
 
-    settings = settings_of(source, task, models, rules, actor, every, None, None, fps, fov)
+    settings = WatchSettings(source, **setting)
     agent, mind = build_agent(settings), None
     with open_video(settings) as video:
         for frame in video:
@@ -110,16 +110,20 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
     Raises:
         RuleError: There is no rule of that name.
     """
-    from visup.rules.safety.queries import choices, explain, rule_named, values_of
+    from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
 
-    values = values_of(mind)
+    values = evaluation_of(mind)
     wanted = [rule_named(values, only)] if only else list(values.prepared.rules)
-    return [str(explain(mind, rule.name, *ids)) for rule in wanted for ids in choices(values, rule)]
+    return [
+        str(explain(mind, rule.name, *ids))
+        for rule in wanted
+        for ids in object_choices(values, rule)
+    ]
 
 
 def _cost(rule: Rule) -> str:
-    from visup.rules.language.cost import bounds_of
+    from visup.rules.language.cost import cost_of
 
-    cost = bounds_of(rule)
+    cost = cost_of(rule)
     late = f"told {cost.delay_s:g} s late" if cost.delay_s else "told at once"
     return f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"

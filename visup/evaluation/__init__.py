@@ -1,1 +1,21 @@
-"""Placeholder."""
+"""Evaluation: figures of `visup eval`, each against a ground truth, an oracle or a bar.
+
+Rooms, by what is evaluated:
+
+- `motion`: segmentation and tracking (J, F, ghosts, id switches, MOTA, IDF1).
+- `shape`: shape retrieval, view recognition, size and robustness of model databases.
+- `health`: camera faults injected into sound video.
+- `missions`: the whole supervisor on missions with ground truth.
+- `simulation`: percepts simulated from a mission's ground truth, with the errors of real ones.
+- `reasoning`: rules, relations, tasks and their inference, without perception.
+- `runtime`: faults of behaviours, resume, speed, memory, stepping.
+
+An evaluation is a function `evaluate_NAME(...)` that returns `{"total": {...}, "items": {name: {...}}}`;
+`record` writes that as JSON. Start with `motion/runner.py`; `bench` (`make bench`) runs them all, `oracles`
+finds the slow reference implementations of a source checkout.
+"""
+
+from visup.evaluation.oracles import oracle
+from visup.evaluation.record import write_record
+
+__all__ = ["oracle", "write_record"]

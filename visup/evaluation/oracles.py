@@ -11,10 +11,10 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-import visup
+import visup.version
 from visup.agent.model.errors import SettingsError
 
-CHECKOUT = Path(visup.__file__).resolve().parents[1]
+CHECKOUT = Path(visup.version.__file__).resolve().parents[1]
 
 
 def oracle(name: str) -> ModuleType:

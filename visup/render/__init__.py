@@ -1,9 +1,11 @@
-"""Scenario rendering: from a scenario file to a video with masks and truth.
+"""Scenario rendering: from a scenario file to a video with masks and ground truth.
 
-A scenario (`scenario.py`) names objects (`meshes.py`, `things.py`, built from `shapes.py`), how they
-move (`tracks.py`, `arm.py`) and the light. `renderer.py` casts rays (`raycast.py`) frame by frame over
-a background (`background.py`) through a sensor (`sensor.py`); `truth.py` says what is true of it and
-`writer.py` writes it down. `demo_models.py` makes the model database of the demo.
+Rooms, in reading order:
+
+- `scenario`: the format of scenario files, trajectories, camera and light, the shipped scenarios.
+- `meshes`: solids that stand in scenes: spacecraft, an arm, animals, distractors.
+- `imaging`: the renderer: ray casting over a background through a sensor.
+- `output`: ground truth, mission folders, the demo clip and its model database.
 
 Needs the extra ``visup[render]``; nothing here is imported by ``import visup``.
 """

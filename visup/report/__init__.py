@@ -1,6 +1,9 @@
-"""The report of a run: what was kept of it, annotated pictures and video, and one page to read.
+"""The report of a run: data collected while it goes on, annotated pictures and video, one page to read.
 
-Read in this order: `records.py` (what a report is made of), `data.py` (kept during a run),
-`annotate.py` and `video.py` (pictures), `story.py`, `figures.py`, `html.py` (the page).
-Import from those modules; this one stays empty, so that the command starts quickly.
+Read in this order: `records` (what a report is made of), `bounded` and `collector` (collected during a run),
+`annotate` and `video` (pictures), `summary`, `figures`, `sections`, `html` (the page). The folder
+`motion_debug` draws the internals of the segmenter.
+
+Public names: `collector.Collector`, `records.RunData`, `html.write_report`, `annotate.annotate`,
+`video.AnnotatedVideo`. Import from those modules; this one stays empty, so that the command starts quickly.
 """

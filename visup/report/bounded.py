@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from visup.report.records import Span
+from visup.report.records import StateSpan
 
 T = TypeVar("T")
 
@@ -52,7 +52,7 @@ class SpanRecorder:
 
     most: int
     _open: dict[tuple[str, ...], tuple[str, float]] = field(default_factory=dict, init=False)
-    _closed: list[Span] = field(default_factory=list, init=False)
+    _closed: list[StateSpan] = field(default_factory=list, init=False)
 
     def note(self, time: float, values: Mapping[tuple[str, ...], str]) -> None:
         """Tell how everything is now; a subject that is not told has no value.
@@ -68,14 +68,14 @@ class SpanRecorder:
         for subject, value in values.items():
             self._open.setdefault(subject, (value, time))
 
-    def spans(self, end: float) -> tuple[Span, ...]:
+    def spans(self, end: float) -> tuple[StateSpan, ...]:
         """All spans by subject and time; those still open end at `end`."""
-        still = [Span(s, v, start, end) for s, (v, start) in self._open.items()]
+        still = [StateSpan(s, v, start, end) for s, (v, start) in self._open.items()]
         return tuple(sorted([*self._closed, *still], key=lambda s: (s.subject, s.start)))
 
     def _close(self, subject: tuple[str, ...], value: str, start: float, end: float) -> None:
         if len(self._closed) < self.most:
-            self._closed.append(Span(subject, value, start, end))
+            self._closed.append(StateSpan(subject, value, start, end))
 
 
 @dataclass(slots=True)

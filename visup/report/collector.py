@@ -28,20 +28,20 @@ from visup.agent.model.step import Step
 from visup.report.annotate import annotate
 from visup.report.bounded import Heaviest, SpanRecorder, Thinned
 from visup.report.records import (
+    BehaviourCost,
     Distance,
-    Effort,
     KeyFrame,
-    Look,
-    Match,
+    MatchRow,
+    RegionCloseup,
+    ReportedObject,
     RunData,
     Sample,
-    Subject,
 )
 from visup.rules.geometry.outlines import outline_gap
 from visup.tasks.tools.outline import Branch
 from visup.wording import worded_once
 
-__all__ = ["Collector", "Limits", "RunData"]
+__all__ = ["Collector", "ReportLimits", "RunData"]
 
 PICTURE_WIDTH = 720
 LOOK_SIZE = 112
@@ -70,7 +70,7 @@ ENDS_WEIGHT = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ReportLimits:
     """How much of a run is kept, whatever its length.
 
     Attributes:
@@ -89,7 +89,7 @@ class Limits:
 
 
 @dataclass(slots=True)
-class _Toll:
+class _CostTally:
     """What a behaviour took so far."""
 
     runs: int = 0
@@ -107,18 +107,18 @@ class Collector:
         limits: How much is kept.
     """
 
-    limits: Limits = field(default_factory=Limits)
+    limits: ReportLimits = field(default_factory=ReportLimits)
     _samples: Thinned[Sample] = field(init=False, repr=False)
     _spans: SpanRecorder = field(init=False, repr=False)
     _pictures: Heaviest[KeyFrame] = field(init=False, repr=False)
     _events: list[Event] = field(default_factory=list, init=False, repr=False)
     _left_out: int = field(default=0, init=False, repr=False)
     _alerts: dict[int, Alert] = field(default_factory=dict, init=False, repr=False)
-    _subjects: dict[int, Subject] = field(default_factory=dict, init=False, repr=False)
-    _matches: dict[int, tuple[float, tuple[Match, ...]]] = field(
+    _subjects: dict[int, ReportedObject] = field(default_factory=dict, init=False, repr=False)
+    _matches: dict[int, tuple[float, tuple[MatchRow, ...]]] = field(
         default_factory=dict, init=False, repr=False
     )
-    _tolls: dict[str, _Toll] = field(default_factory=dict, init=False, repr=False)
+    _tolls: dict[str, _CostTally] = field(default_factory=dict, init=False, repr=False)
     _frames: int = field(default=0, init=False, repr=False)
     _last: tuple[Mind, Frame] | None = field(default=None, init=False, repr=False)
     _last_pictured: int = field(default=-1, init=False, repr=False)
@@ -211,7 +211,7 @@ class Collector:
             spans=self._spans.spans(mind.time),
             key_frames=tuple(sorted(pictures, key=lambda k: k.time)),
             efforts=tuple(
-                Effort(name, t.runs, t.failures, t.total_ms / max(1, t.runs))
+                BehaviourCost(name, t.runs, t.failures, t.total_ms / max(1, t.runs))
                 for name, t in self._tolls.items()
             ),
             facts=dict(facts or {}),
@@ -223,7 +223,9 @@ class Collector:
     def _remember_subjects(self, mind: Mind) -> None:
         for b in mind.objects.values():
             if b.confirmed and (b.id in self._subjects or len(self._subjects) < self.limits.spans):
-                self._subjects[b.id] = Subject(b.id, b.name, b.strength, b.first_seen, b.last_seen)
+                self._subjects[b.id] = ReportedObject(
+                    b.id, b.name, b.strength, b.first_seen, b.last_seen
+                )
 
     def _remember_alerts(self, alerts: Sequence[Alert]) -> None:
         for a in alerts:
@@ -239,7 +241,7 @@ class Collector:
 
     def _remember_tolls(self, step: Step) -> None:
         for r in step.reports:
-            toll = self._tolls.setdefault(r.behaviour, _Toll())
+            toll = self._tolls.setdefault(r.behaviour, _CostTally())
             toll.runs += r.state is ReportState.RAN
             toll.failures += r.state is ReportState.FAILED
             toll.total_ms += r.elapsed_ms if r.state is ReportState.RAN else 0.0
@@ -256,7 +258,7 @@ class Collector:
             looks=tuple(self._looks(mind, frame)),
         )
 
-    def _looks(self, mind: Mind, frame: Frame) -> list[Look]:
+    def _looks(self, mind: Mind, frame: Frame) -> list[RegionCloseup]:
         # A region that was not seen just now is where its object is believed to be: no picture of it.
         seen = [b for b in mind.present() if b.last_seen == mind.time]
         largest = sorted(seen, key=lambda b: -b.region.area)[:MOST_LOOKS]
@@ -264,7 +266,7 @@ class Collector:
         for b in sorted(largest, key=lambda b: b.id):
             at, matches = self._matches.get(b.region.id, (mind.time, ()))
             picture = jpeg_of(cut_out(frame.image, b))
-            looks.append(Look(b.region.id, b.id, b.name, b.strength, picture, matches, at))
+            looks.append(RegionCloseup(b.region.id, b.id, b.name, b.strength, picture, matches, at))
         return looks
 
 
@@ -317,13 +319,13 @@ def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
     return now
 
 
-def matches_of(hypotheses: Sequence[Hypothesis]) -> dict[int, tuple[Match, ...]]:
+def matches_of(hypotheses: Sequence[Hypothesis]) -> dict[int, tuple[MatchRow, ...]]:
     """The most similar views of each region, best first."""
-    found: dict[int, list[Match]] = {}
+    found: dict[int, list[MatchRow]] = {}
     for h in sorted(hypotheses, key=lambda h: (-h.similarity, h.name, h.view)):
         held = found.setdefault(h.region_id, [])
         if len(held) < BEST_MATCHES:
-            held.append(Match(h.name, h.view, h.similarity))
+            held.append(MatchRow(h.name, h.view, h.similarity))
     return {region: tuple(matches) for region, matches in found.items()}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from visup.agent import Severity, Status
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, css, object_colour
-from visup.report.records import RunData, Span, Subject
+from visup.report.records import ReportedObject, RunData, StateSpan
 from visup.report.summary import called, name_of, span_sentence
 
 CANDIDATE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8a8f98")
@@ -46,7 +46,7 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class FigureLine:
     """A straight line through the distances while a pair moved in one way.
 
     Attributes:
@@ -57,7 +57,7 @@ class Line:
         times: (first, last) seconds.
     """
 
-    span: Span
+    span: StateSpan
     start: float
     end: float
     slope: float
@@ -65,8 +65,8 @@ class Line:
 
 
 def fitted_lines(
-    times: Sequence[float], gaps: Sequence[float], spans: Iterable[Span]
-) -> tuple[Line, ...]:
+    times: Sequence[float], gaps: Sequence[float], spans: Iterable[StateSpan]
+) -> tuple[FigureLine, ...]:
     """Least-squares lines through distances, one for each span (paper, section 7.4).
 
     A gap of 0 only says that the outlines touch, not how deep one body is before the other, so that
@@ -89,7 +89,9 @@ def fitted_lines(
         x = t[inside] - t[inside][0]
         slope, start = np.polynomial.polynomial.polyfit(x, y[inside], 1)[::-1]
         ends = float(t[inside][0]), float(t[inside][-1])
-        lines.append(Line(span, float(start), float(start + slope * x[-1]), float(slope), ends))
+        lines.append(
+            FigureLine(span, float(start), float(start + slope * x[-1]), float(slope), ends)
+        )
     return tuple(lines)
 
 
@@ -132,7 +134,7 @@ def _distance_figure(run: RunData, pair: tuple[int, int]) -> Figure:
     )
 
 
-def _shaded(span: Span) -> dict[str, Any]:
+def _shaded(span: StateSpan) -> dict[str, Any]:
     """A stretch of time in which a pair was one body, as a band behind the lines."""
     return {
         "type": "rect",
@@ -185,7 +187,7 @@ def _band(points: list[tuple[float, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-def _line_trace(line: Line, before: Sequence[Line]) -> dict[str, Any]:
+def _line_trace(line: FigureLine, before: Sequence[FigureLine]) -> dict[str, Any]:
     move = line.span.value
     words = move.replace("_", " ")
     return {
@@ -209,7 +211,7 @@ def vote_figures(run: RunData) -> list[Figure]:
     return [_vote_figure(run, s) for s in sorted(longest, key=lambda s: s.id)]
 
 
-def _vote_figure(run: RunData, subject: Subject) -> Figure:
+def _vote_figure(run: RunData, subject: ReportedObject) -> Figure:
     samples = [(s.time, s.votes.get(subject.id)) for s in run.samples]
     peaks: dict[str, float] = {}
     for _, votes in samples:
@@ -284,7 +286,7 @@ def _timeline(
     title: str,
     run: RunData,
     rows: Mapping[tuple[str, ...], str],
-    colour_of: Callable[[Span], str],
+    colour_of: Callable[[StateSpan], str],
 ) -> Figure | None:
     """Bars over time, one row for each subject, one trace for each value."""
     spans = sorted((s for s in run.spans if s.subject in rows), key=lambda s: s.start)
@@ -307,7 +309,9 @@ def _timeline(
 
 
 def _bars(
-    spans: list[Span], rows: Mapping[tuple[str, ...], str], colour_of: Callable[[Span], str]
+    spans: list[StateSpan],
+    rows: Mapping[tuple[str, ...], str],
+    colour_of: Callable[[StateSpan], str],
 ) -> dict[str, Any]:
     """All spans of one value; what waits or is hidden is faint."""
     words = spans[0].value.replace("_", " ")

@@ -40,7 +40,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class StateSpan:
     """A stretch of time during which something stayed as it was.
 
     Attributes:
@@ -57,7 +57,7 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
-class Match:
+class MatchRow:
     """One hypothesis of the shape matcher, for the similarity table.
 
     Attributes:
@@ -72,7 +72,7 @@ class Match:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RegionCloseup:
     """One region at a key frame and what it looks like.
 
     Attributes:
@@ -90,7 +90,7 @@ class Look:
     believed: str
     share: float
     jpeg: bytes
-    matches: tuple[Match, ...] = ()
+    matches: tuple[MatchRow, ...] = ()
     matched_at: float = 0.0
 
 
@@ -114,11 +114,11 @@ class KeyFrame:
     size: tuple[int, int]
     captions: tuple[str, ...]
     weight: int
-    looks: tuple[Look, ...] = ()
+    looks: tuple[RegionCloseup, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Subject:
+class ReportedObject:
     """An object that was believed to be in the scene.
 
     Attributes:
@@ -137,7 +137,7 @@ class Subject:
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class BehaviourCost:
     """What a behaviour took.
 
     Attributes:
@@ -188,17 +188,17 @@ class RunData:
     events: tuple[Event, ...] = ()
     events_left_out: int = 0
     alerts: tuple[Alert, ...] = ()
-    objects: tuple[Subject, ...] = ()
+    objects: tuple[ReportedObject, ...] = ()
     samples: tuple[Sample, ...] = ()
-    spans: tuple[Span, ...] = ()
+    spans: tuple[StateSpan, ...] = ()
     key_frames: tuple[KeyFrame, ...] = ()
-    efforts: tuple[Effort, ...] = ()
+    efforts: tuple[BehaviourCost, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=empty)
     problem: str | None = None
     notes: tuple[str, ...] = ()
     courses: tuple[Branch, ...] = ()
 
-    def spans_about(self, kind: str) -> tuple[Span, ...]:
+    def spans_about(self, kind: str) -> tuple[StateSpan, ...]:
         """Spans of one kind: 'stage', 'relation' or 'presence'."""
         return tuple(s for s in self.spans if s.subject[0] == kind)
 

@@ -10,7 +10,7 @@ from typing import Any
 from visup.agent import Alert, Event, Severity, StageBelief, TaskBelief
 from visup.report.figures import Figure
 from visup.report.palette import OBJECT_COLOURS, css, object_colour
-from visup.report.records import KeyFrame, Look, RunData
+from visup.report.records import KeyFrame, RegionCloseup, RunData
 from visup.report.summary import (
     SEVERITY_WORDS,
     called,
@@ -214,7 +214,7 @@ def _compared(key: KeyFrame) -> str:
     )
 
 
-def _look(look: Look, time: float) -> str:
+def _look(look: RegionCloseup, time: float) -> str:
     colour = css(object_colour(look.object_id)) if look.object_id else css(OBJECT_COLOURS[0])
     rows = "".join(
         f"<tr{' class=agreed' if m.name == look.believed else ''}><td>{i}</td>"

@@ -6,7 +6,7 @@ from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
 from visup.agent.model.mind import UNKNOWN_OBJECT
-from visup.report.records import KeyFrame, RunData, Span, Subject
+from visup.report.records import KeyFrame, ReportedObject, RunData, StateSpan
 
 VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {
     Verdict.SUCCEEDED: ("Succeeded", "The task went as it should."),
@@ -48,7 +48,7 @@ def summary(run: RunData) -> str:
     return " ".join(s for s in sentences if s)
 
 
-def name_of(subject: Subject) -> str:
+def name_of(subject: ReportedObject) -> str:
     """What an object is called on the page, such as 'Object 2, spartan'."""
     known = subject.name != UNKNOWN_OBJECT
     return f"Object {subject.id}, {spoken(subject.name)}" if known else f"Object {subject.id}"
@@ -64,7 +64,7 @@ def called(run: RunData, object_id: int) -> str:
     return next((name_of(s) for s in run.objects if s.id == object_id), f"Object {object_id}")
 
 
-def span_sentence(span: Span) -> str:
+def span_sentence(span: StateSpan) -> str:
     """'converging from 0.0 to 6.0 s'."""
     return f"{span.value.replace('_', ' ')} from {span.start:.1f} to {span.end:.1f} s"
 

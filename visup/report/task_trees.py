@@ -11,7 +11,7 @@ import json
 from html import escape
 
 from visup.agent import Status
-from visup.report.records import RunData, Span
+from visup.report.records import RunData, StateSpan
 from visup.tasks.tools.outline import Branch
 
 PENDING = Status.PENDING.value
@@ -28,7 +28,7 @@ def changes(run: RunData, task: str, stage: str) -> list[tuple[float, str]]:
     return [(round(s.start, 3), s.value) for s in sorted(spans, key=_start)]
 
 
-def _start(span: Span) -> float:
+def _start(span: StateSpan) -> float:
     return span.start
 
 

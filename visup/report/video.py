@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
-from visup.percepts.video.silence import quiet
+from visup.percepts.video.quiet_decoder import quiet
 from visup.report.annotate import annotate
 
 MOST_WIDTH = 960
 FOURCC = "VP80"
 
 
-class VideoWriter:
+class WebmWriter:
     """Writes pictures as WebM with VP8, which every browser plays.
 
     The first picture fixes the size; the file appears with it.
@@ -88,7 +88,7 @@ class VideoWriter:
         return writer
 
 
-class AnnotatedVideo(VideoWriter):
+class AnnotatedVideo(WebmWriter):
     """Writes each frame with what is believed drawn over it. Give its `add` to an agent as an observer.
 
     Args:

@@ -11,21 +11,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import visup
-from visup.agent import Concern, Frame, Severity, TaskBelief
+from visup.agent import AlertCondition, Frame, Severity, TaskBelief
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.model.step import Step
-from visup.agent.storage.journal import Journal, Limits
+from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
-from visup.agent.storage.jsonable import plain
-from visup.percepts.video import Source
-from visup.runs.settings import WatchSettings
+from visup.agent.storage.jsonable import to_jsonable
+from visup.percepts.video import VideoSource
+from visup.runs.settings import RunOptions, WatchSettings
 from visup.tasks import load_tasks
 from visup.tasks.tools.outline import outline
+from visup.version import __version__
 
 if TYPE_CHECKING:
-    from visup.agent import Verdict
     from visup.report.records import RunData
+    from visup.runs.result import RunResult
 
 MOST_WAITING = 1000
 """Steps that wait while the journal cannot be written; beyond, the oldest are lost."""
@@ -41,9 +41,7 @@ class Recorder:
         settings: Of the run.
         source: What is watched.
         folder: A folder from `fresh_folder`, or that of the run that goes on.
-        video: Whether to write the annotated video.
-        report: Whether to write the report.
-        limits: Of the journal.
+        options: What is written.
         resume: Whether the run goes on.
 
     Attributes:
@@ -59,26 +57,25 @@ class Recorder:
     def __init__(
         self,
         settings: WatchSettings,
-        source: Source,
+        source: VideoSource,
         folder: Path,
+        options: RunOptions,
         *,
-        video: bool = True,
-        report: bool = True,
-        limits: Limits | None = None,
         resume: bool = False,
     ) -> None:
         from visup.report.collector import Collector
         from visup.report.video import AnnotatedVideo
 
         self.folder = folder
-        self.journal = Journal(folder / JOURNAL, limits, resume=resume)
+        keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
+        self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
         self.facts: dict[str, Any] = {
-            "visup": visup.__version__,
+            "visup": __version__,
             "source": source.name,
             "fps": source.fps,
             "size": source.size,
             "live": source.live,
-            "settings": plain(settings),
+            "settings": to_jsonable(settings),
         }
         if not resume:
             self.journal.note(**self.facts)
@@ -86,9 +83,9 @@ class Recorder:
         self.collector = Collector()
         self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
         path = _free(folder / "annotated.webm")
-        self.video = AnnotatedVideo(path, source.fps / settings.every) if video else None
-        self._wants_report = report
-        self._derived = {"report": self.collector.add} if report else {}
+        self.video = AnnotatedVideo(path, source.fps / settings.every) if options.video else None
+        self._wants_report = options.report
+        self._derived = {"report": self.collector.add} if options.report else {}
         if self.video:
             self._derived["annotated video"] = self.video.add
         self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
@@ -109,11 +106,11 @@ class Recorder:
         """Take note of a step that the journal holds already."""
         self._derive(step, frame, ["report"])
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with recording now."""
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
-            yield Concern(
+            yield AlertCondition(
                 "not_recorded",
                 (),
                 Severity.WARNING,
@@ -130,12 +127,7 @@ class Recorder:
             self.notes = (*self.notes, fault.what)
 
     def finish(
-        self,
-        verdict: Verdict | None,
-        steps: int,
-        problem: str | None,
-        ended: str | None,
-        tasks: Sequence[TaskBelief],
+        self, result: RunResult, ended: str, tasks: Sequence[TaskBelief]
     ) -> tuple[Path | None, tuple[str, ...]]:
         """Everything that is made once the last frame was seen.
 
@@ -150,10 +142,12 @@ class Recorder:
             self.notes = (*self.notes, left)
         report = None
         try:
-            said = verdict.value if verdict else None
-            self.journal.note(verdict=said, steps=steps, problem=problem, tasks=tasks)
+            verdict = result.verdict.value if result.verdict else None
+            self.journal.note(
+                verdict=verdict, steps=result.steps, problem=result.problem, tasks=tasks
+            )
             export_events(self.folder / JOURNAL, self.folder / "events.jsonl")
-            report = self._report(verdict, problem)
+            report = self._report(result)
             # Last of all: a run that was killed before can be gone on with.
             self.journal.note(ended=ended)
         except OutputError as fault:
@@ -182,14 +176,14 @@ class Recorder:
                 said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
                 self.notes = (*self.notes, said)
 
-    def _report(self, verdict: Verdict | None, problem: str | None) -> Path | None:
+    def _report(self, result: RunResult) -> Path | None:
         from visup.report.html import write_report
 
         if not self._wants_report:
             return None
         path = self.folder / "report.html"
         try:
-            write_report(self._run_data(verdict, problem), path)
+            write_report(self._run_data(result), path)
         except ExtraMissingError as missing:
             self.notes = (str(missing),)
             return None
@@ -201,9 +195,13 @@ class Recorder:
             return None
         return path
 
-    def _run_data(self, verdict: Verdict | None, problem: str | None) -> RunData:
+    def _run_data(self, result: RunResult) -> RunData:
         return self.collector.finish(
-            verdict, self.facts, problem=problem, notes=self.notes, courses=self._courses
+            result.verdict,
+            self.facts,
+            problem=result.problem,
+            notes=self.notes,
+            courses=self._courses,
         )
 
 

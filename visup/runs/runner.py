@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from visup.agent import Frame, Severity, Verdict
-from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
-from visup.agent.storage.journal import Limits
-from visup.percepts.video import Source
-from visup.percepts.video.live import LiveSource
-from visup.percepts.video.realtime import in_real_time
+from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
+from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
-from visup.runs.settings import WatchSettings
+from visup.runs.settings import RunOptions, WatchSettings
 from visup.runs.wiring import build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 
@@ -29,53 +27,7 @@ if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
 
 Progress = Callable[[int, int | None], None]
-"""Told after each step how many frames are done and how many there are (None when not known)."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunOptions:
-    """How a run is recorded.
-
-    Attributes:
-        video: Whether to write the annotated video.
-        report: Whether to write the report.
-        limits: Of the journal.
-        state_every_s: Seconds of the source between two states from which it could be resumed; 0 for
-            none.
-        sinks: Where alerts go besides, as of `--sink`.
-    """
-
-    video: bool = True
-    report: bool = True
-    limits: Limits = field(default_factory=Limits)
-    state_every_s: float = 30.0
-    sinks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class RunResult:
-    """How a run ended.
-
-    Attributes:
-        verdict: Of the tasks; without a task 'interrupted' if something grave was told, else None.
-        steps: Frames supervised.
-        problem: What was wrong with the source, or None.
-        folder: The run folder, or None.
-        report: The report, or None.
-        notes: What the user should know, such as an extra that is missing.
-    """
-
-    verdict: Verdict | None
-    steps: int
-    problem: str | None = None
-    folder: Path | None = None
-    report: Path | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def exit_code(self) -> int:
-        """0 when all went well, 1 when it failed, was unsafe, or could not be followed."""
-        return 0 if self.verdict in (None, Verdict.SUCCEEDED, Verdict.IN_PROGRESS) else 1
+"""Called after each step with how many frames are done and how many there are (None when not known)."""
 
 
 def fresh_folder(out: Path | None, source: str) -> Path:
@@ -112,14 +64,28 @@ def fresh_folder(out: Path | None, source: str) -> Path:
     return out
 
 
+@dataclass(frozen=True, slots=True)
+class Audience:
+    """Who follows a run while it goes on.
+
+    Attributes:
+        observers: Given each step and its frame, after it is recorded.
+        progress: Given how far the run has come.
+        operator: Who answers questions; nobody by default.
+        notice: Given what cannot wait for a step, such as that a camera dropped: one sentence.
+    """
+
+    observers: Sequence[Observer] = ()
+    progress: Progress | None = None
+    operator: HumanOperator | None = None
+    notice: Callable[[str], None] | None = None
+
+
 def supervise(
     settings: WatchSettings,
     folder: Path | None,
     *,
-    observers: Sequence[Observer] = (),
-    progress: Progress | None = None,
-    operator: HumanOperator | None = None,
-    notice: Callable[[str], None] | None = None,
+    audience: Audience | None = None,
     options: RunOptions | None = None,
     past: InterruptedRun | None = None,
 ) -> RunResult:
@@ -128,11 +94,8 @@ def supervise(
     Args:
         settings: What to watch and against what.
         folder: A folder from `fresh_folder`, that of `past`, or None to record nothing.
-        observers: Told of each step after it is recorded.
-        progress: Told of each step.
-        operator: Who answers questions; nobody by default.
-        notice: Told what cannot wait for a step, such as that a camera dropped: one sentence.
-        options: How it is recorded and told.
+        audience: Who follows the run.
+        options: How it is recorded, and where alerts go.
         past: The run to go on with; `settings` are its own.
 
     Returns:
@@ -141,77 +104,167 @@ def supervise(
     Raises:
         VisupError: Something given is not as it should be.
     """
-    options = options or RunOptions()
-    tally = _SeverityMonitor(past.grave if past else False)
-    troubles = RuntimeFaults()
-    with ExitStack() as stack:
-        source = stack.enter_context(open_video(settings))
-        agent = build_agent(settings, also=(troubles,), live=source.live)
-        stack.callback(agent.close)
-        recorder = _recorder(settings, source, folder, options, past is not None, stack)
-        sinks = Sinks(options.sinks, settings.source)
-        stack.callback(sinks.close)
-        states = CheckpointWriter(folder, options.state_every_s) if folder else None
-        frames: Iterator[Frame] = source
-        notes: tuple[str, ...] = ()
-        if past:
-            frames, notes = _caught_up(agent, source, past, recorder)
-        # The journal comes first: what is told was recorded before.
-        recording = (recorder,) if recorder else ()
-        answering = (_attending(operator, agent, recorder, past),) if operator else ()
-        agent.observers = (tally, *recording, *observers, sinks, *answering)
-        if recorder:
-            troubles.ask(recorder.runtime_faults)
-        troubles.ask(sinks.runtime_faults)
-        if isinstance(source, LiveSource):
-            source.notify = notify(sinks, notice)
-            troubles.ask(source.runtime_faults)
-        pace = in_real_time(source, frames) if _keeps_pace(settings, source) else None
-        if pace:
-            stack.callback(pace.close)
-            troubles.ask(pace.runtime_faults)
-        begin = agent.mind.time if past and past.steps else None
-        steady = MonotonicFrames(pace or frames, source.fps, begin)
-        troubles.ask(steady.runtime_faults)
-        steps = past.steps if past else 0
+    run = supervised(settings, folder, audience or Audience(), options, past)
+    while True:
         try:
-            for step in agent.steps(steady):
-                steps += 1
-                if states:
-                    states.offer(agent, step, lambda: recorder_state(recorder))
+            next(run)
+        except StopIteration as end:
+            result: RunResult = end.value
+            return result
+
+
+def supervised(
+    settings: WatchSettings,
+    folder: Path | None,
+    audience: Audience,
+    options: RunOptions | None = None,
+    past: InterruptedRun | None = None,
+) -> Generator[Step, None, RunResult]:
+    """As `supervise`, one step each time that it is asked for; the source is open when it returns.
+
+    A KeyboardInterrupt thrown in ends the run as stopped by the user, with verdict and report; a
+    generator that is merely closed leaves the run as one that was killed, to be resumed.
+    """
+    run = _supervised(settings, folder, audience, options or RunOptions(), past)
+    next(run)
+    return cast("Generator[Step, None, RunResult]", run)
+
+
+def _supervised(
+    settings: WatchSettings,
+    folder: Path | None,
+    audience: Audience,
+    options: RunOptions,
+    past: InterruptedRun | None,
+) -> Generator[Step | None, None, RunResult]:
+    """First None, once everything is open; then the steps."""
+    with ExitStack() as stack:
+        run = _Run(settings, folder, options, past, stack)
+        frames = run.catch_up(past) if past else run.source
+        run.connect(audience, past)
+        timed = run.timed(frames, past)
+        yield None
+        yield from run.watch(timed, audience.progress)
+        return run.result()
+
+
+class _Run:
+    """A run from its first frame to its result; what it opens is closed with `stack`."""
+
+    def __init__(
+        self,
+        settings: WatchSettings,
+        folder: Path | None,
+        options: RunOptions,
+        past: InterruptedRun | None,
+        stack: ExitStack,
+    ) -> None:
+        self._settings, self._folder, self._stack = settings, folder, stack
+        self._faults = RuntimeFaults()
+        self.source = stack.enter_context(open_video(settings))
+        self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
+        stack.callback(self._agent.close)
+        self._recorder = (
+            Recorder(settings, self.source, folder, options, resume=past is not None)
+            if folder
+            else None
+        )
+        if self._recorder:
+            stack.callback(self._recorder.close)
+        self._sinks = Sinks(options.sinks, settings.source)
+        stack.callback(self._sinks.close)
+        self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
+        self._severity = _SeverityMonitor(past.grave if past else False)
+        self._pace: RealTimeFrames | None = None
+        self._steps = past.steps if past else 0
+        self._stopped = False
+        self._notes: tuple[str, ...] = ()
+
+    def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
+        """Make the agent what it was, and give the frames that are left."""
+        recorder = self._recorder
+        if recorder and past.state:
+            recorder.collector.load(past.state.kept)
+        tell = recorder.catch_up if recorder else lambda step, frame: None
+        frames, self._notes = catch_up(self._agent, self.source, past, tell)
+        return frames
+
+    def connect(self, audience: Audience, past: InterruptedRun | None) -> None:
+        """Let everyone follow the agent, and its surroundings report their faults."""
+        # The journal comes first: what is told was recorded before.
+        recording = (self._recorder,) if self._recorder else ()
+        answering = (self._attending(audience.operator, past),) if audience.operator else ()
+        others = (*audience.observers, self._sinks, *answering)
+        self._agent.observers = (self._severity, *recording, *others)
+        if self._recorder:
+            self._faults.add_source(self._recorder.runtime_faults)
+        self._faults.add_source(self._sinks.runtime_faults)
+        if isinstance(self.source, LiveSource):
+            self.source.notify = notify(self._sinks, audience.notice)
+            self._faults.add_source(self.source.runtime_faults)
+
+    def timed(self, frames: Iterator[Frame], past: InterruptedRun | None) -> MonotonicFrames:
+        """Frames in real time where that is wanted, and in any case with times that grow."""
+        realtime = self._settings.realtime
+        if self.source.live if realtime is None else realtime:
+            self._pace = in_real_time(self.source, frames)
+            self._stack.callback(self._pace.close)
+            self._faults.add_source(self._pace.runtime_faults)
+        begin = self._agent.mind.time if past and past.steps else None
+        monotonic = MonotonicFrames(self._pace or frames, self.source.fps, begin)
+        self._faults.add_source(monotonic.runtime_faults)
+        return monotonic
+
+    def watch(self, frames: Iterable[Frame], progress: Progress | None) -> Iterator[Step]:
+        """Step through frames until they end or the user stops."""
+        count = self.source.frame_count
+        total = None if count is None else -(-count // self._settings.every)
+        try:
+            for step in self._agent.steps(frames):
+                self._steps += 1
+                if self._checkpoints:
+                    self._checkpoints.offer(
+                        self._agent, step, lambda: recorder_state(self._recorder)
+                    )
                 if progress:
-                    progress(steps, _steps_of(source, settings))
+                    progress(self._steps, total)
+                yield step
         except KeyboardInterrupt:
-            tally.stopped = True
-        if states:
-            states.close()
-            notes += (states.note,) if states.note else ()
-        verdict = final_verdict(agent.mind) if agent.mind.tasks else tally.verdict
-        problem = "stopped by the user" if tally.stopped else source.problem
-        if pace and (dropped := pace.note()):
-            notes += (dropped,)
-        notes += sinks.end(verdict, steps)
-        if recorder is None:
-            return RunResult(verdict, steps, problem, notes=notes)
-        ended = source.ended.value if source.ended and not tally.stopped else "stopped"
-        report, more = recorder.finish(verdict, steps, problem, ended, agent.mind.tasks)
-        return RunResult(verdict, steps, problem, folder, report, (*notes, *more))
+            self._stopped = True
 
+    def result(self) -> RunResult:
+        """Close the books."""
+        if self._checkpoints:
+            self._checkpoints.close()
+        mind = self._agent.mind
+        verdict = final_verdict(mind) if mind.tasks else self._severity.verdict
+        problem = "stopped by the user" if self._stopped else self.source.problem
+        told = (
+            self._checkpoints.note if self._checkpoints else None,
+            self._pace.note() if self._pace else None,
+            *self._sinks.end(verdict, self._steps),
+        )
+        notes = (*self._notes, *filter(None, told))
+        result = RunResult(verdict, self._steps, problem, notes=notes)
+        if self._recorder is None:
+            return result
+        ended = self.source.ended.value if self.source.ended and not self._stopped else "stopped"
+        report, more = self._recorder.finish(result, ended, mind.tasks)
+        return replace(result, folder=self._folder, report=report, notes=(*notes, *more))
 
-def _attending(
-    operator: HumanOperator, agent: Agent, recorder: Recorder | None, past: InterruptedRun | None
-) -> Observer:
-    """The operator of a run, who does not say again what was taken up before the run was killed."""
-    if recorder and not past:
-        recorder.journal.note(answers=operator.answers)
-    given = {**past.answers, **operator.answers} if past else operator.answers
-    waiting = {i: name for i, name in given.items() if i not in agent.mind.answers}
-    attend = replace(operator, answers=waiting)
-    return attend.attend(agent, at_once=past is not None)
+    def _attending(self, operator: HumanOperator, past: InterruptedRun | None) -> Observer:
+        """The operator, who does not say again what was taken up before the run was killed."""
+        if self._recorder and not past:
+            self._recorder.journal.note(answers=operator.answers)
+        given = {**past.answers, **operator.answers} if past else operator.answers
+        taken = self._agent.mind.answers
+        waiting = {i: name for i, name in given.items() if i not in taken}
+        attend = replace(operator, answers=waiting)
+        return attend.attend(self._agent, at_once=past is not None)
 
 
 def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:
-    """What tells a sentence to sinks and to `notice` at once."""
+    """A function that gives a sentence to sinks and to `notice` at once."""
 
     def tell(text: str) -> None:
         sinks.notice(text)
@@ -221,57 +274,15 @@ def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str]
     return tell
 
 
-def _recorder(
-    settings: WatchSettings,
-    source: Source,
-    folder: Path | None,
-    options: RunOptions,
-    resume: bool,
-    stack: ExitStack,
-) -> Recorder | None:
-    if folder is None:
-        return None
-    made = Recorder(
-        settings,
-        source,
-        folder,
-        video=options.video,
-        report=options.report,
-        limits=options.limits,
-        resume=resume,
-    )
-    stack.callback(made.close)
-    return made
-
-
-def _caught_up(
-    agent: Agent, source: Source, past: InterruptedRun, recorder: Recorder | None
-) -> tuple[Iterator[Frame], tuple[str, ...]]:
-    if recorder and past.state:
-        recorder.collector.load(past.state.kept)
-    tell = recorder.catch_up if recorder else lambda step, frame: None
-    return catch_up(agent, source, past, tell)
-
-
-def _keeps_pace(settings: WatchSettings, source: Source) -> bool:
-    return source.live if settings.realtime is None else settings.realtime
-
-
-def _steps_of(source: Source, settings: WatchSettings) -> int | None:
-    count = source.frame_count
-    return None if count is None else -(-count // settings.every)
-
-
 class _SeverityMonitor:
     """Whether anything grave was told, for runs without a task."""
 
-    def __init__(self, grave: bool = False) -> None:
-        self.grave = grave
-        self.stopped = False
+    def __init__(self, grave: bool) -> None:
+        self._grave = grave
 
     def __call__(self, step: Step, frame: Frame) -> None:
-        self.grave |= any(e.severity >= Severity.WARNING for e in step.events)
+        self._grave |= any(e.severity >= Severity.WARNING for e in step.events)
 
     @property
     def verdict(self) -> Verdict | None:
-        return Verdict.INTERRUPTED if self.grave else None
+        return Verdict.INTERRUPTED if self._grave else None

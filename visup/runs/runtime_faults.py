@@ -9,39 +9,48 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from visup.agent import Concern, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
+from visup.agent import (
+    AlertCondition,
+    Contract,
+    Directive,
+    Frame,
+    Mind,
+    Observation,
+    Outcome,
+    Percept,
+)
 
 RUNTIME_FAULT = "trouble"
-FaultSource = Callable[[], Iterable[Concern]]
+FaultSource = Callable[[], Iterable[AlertCondition]]
 
 
 class RuntimeFaults:
-    """A behaviour that asks parts of the product for their troubles before each step."""
+    """A behaviour that asks parts of the product for their faults before each step."""
 
     contract = Contract("troubles", gives=(RUNTIME_FAULT,))
 
     def __init__(self) -> None:
-        self._tellers: list[FaultSource] = []
+        self._sources: list[FaultSource] = []
 
-    def ask(self, teller: FaultSource) -> None:
+    def add_source(self, source: FaultSource) -> None:
         """Ask also this one from now on."""
-        self._tellers.append(teller)
+        self._sources.append(source)
 
     def save(self) -> Mapping[str, Any]:
-        """Nothing: each teller answers for now."""
+        """Nothing: each source answers for now."""
         return {}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Nothing is remembered."""
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
-        """One percept of kind 'trouble' for each trouble that holds now."""
-        now = [concern for teller in self._tellers for concern in teller()]
+        """One percept of kind 'trouble' for each fault that holds now."""
+        now = [concern for source in self._sources for concern in source()]
         return [Percept(RUNTIME_FAULT, c, frame.time, self.contract.name) for c in now]
 
 
-def runtime_fault_reasoner(mind: Mind, seen: Observation) -> Outcome:
-    """The reasoner to it: every trouble is a concern."""
-    return Outcome(mind, concerns=seen.of(RUNTIME_FAULT))
+def runtime_fault_reasoner(mind: Mind, observation: Observation) -> Outcome:
+    """Every runtime fault is a concern."""
+    return Outcome(mind, conditions=observation.of(RUNTIME_FAULT))

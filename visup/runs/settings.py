@@ -1,65 +1,36 @@
-"""What a run is given: the settings of `visup watch`, checked before anything starts."""
+"""What a run is given: the settings of `visup watch`, checked before anything starts.
+
+Each setting is described once, here: its annotation says how it is written on the command line, and
+`visup/commands/options.py` makes the options of all commands from that.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from visup.agent.model.errors import SettingsError
 
 
 @dataclass(frozen=True, slots=True)
-class WatchSettings:
-    """All that a supervised run depends on besides the video itself.
+class Option:
+    """How a setting is given on the command line.
 
     Attributes:
-        source: File, folder of images, camera index or URL.
-        tasks: Task files or names of shipped tasks; none for supervision without a task.
-        models: Model database, or None to go without identities.
-        rules: Rules files; the shipped safety rules when empty.
-        actors: Actor -> names of the models that it may be.
-        behaviours: Behaviours of the user's own: files, or `package.module:Class`.
-        plugins: Names of installed behaviours to add.
-        plugin_settings: Name of such a behaviour -> values for its settings.
-        isolate: Names of behaviours that run in processes of their own.
-        budgets: Whether behaviours are held to the budgets that they declare; for live sources.
-        realtime: Whether frames for which visup is too slow are dropped; None for live sources alone.
-        every: Use every n-th frame.
-        fps: Frame rate to assume where the source has none, or None.
-        fov_vertical_deg: Vertical field of view, degrees; None where it is not known.
-        zones: Settings file with zones that rules can name, or None.
-        patience_s: How long a camera or stream that drops is tried again, seconds.
-        attention: Whether objects that are known well are matched less often (`rules/activation/`).
+        help: What it is, one sentence.
+        flag: Such as `--task`; the name of the setting when left out.
+        metavar: What stands for its value in the help.
+        parse: The setting from the texts that were given, where it is not simply them.
+        at_least: The smallest value, or None.
     """
 
-    source: str
-    tasks: tuple[str, ...] = ()
-    models: Path | None = None
-    rules: tuple[Path, ...] = ()
-    actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    behaviours: tuple[Path | str, ...] = ()
-    plugins: tuple[str, ...] = ()
-    plugin_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    isolate: tuple[str, ...] = ()
-    budgets: bool = False
-    realtime: bool | None = None
-    every: int = 1
-    fps: float | None = None
-    fov_vertical_deg: float | None = None
-    zones: Path | None = None
-    patience_s: float = 60.0
-    attention: bool = False
-
-    def __post_init__(self) -> None:
-        if self.every < 1:
-            raise SettingsError(f"--every is {self.every}", expected="1 or more")
-        if self.fps is not None and not 0 < self.fps <= 1000:
-            raise SettingsError(f"--fps is {self.fps}", expected="more than 0, at most 1000")
-        fov = self.fov_vertical_deg
-        if fov is not None and not 0 < fov < 180:
-            raise SettingsError(f"--fov is {fov}", expected="degrees between 0 and 180")
+    help: str
+    flag: str | None = None
+    metavar: str | None = None
+    parse: Callable[[Any], Any] | None = None
+    at_least: float | None = None
 
 
 def parse_actors(bindings: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -87,3 +58,105 @@ def parse_actors(bindings: Iterable[str]) -> dict[str, tuple[str, ...]]:
             )
         actors[name.strip()] = names
     return actors
+
+
+def _parse_plugin_settings(texts: Iterable[str]) -> dict[str, dict[str, Any]]:
+    from visup.agent.plugins.settings import parse_settings
+
+    return parse_settings(texts)
+
+
+@dataclass(frozen=True, slots=True)
+class WatchSettings:
+    """All that a supervised run depends on besides the video itself.
+
+    Raises:
+        SettingsError: A value is out of its range.
+    """
+
+    source: str
+    """File, folder of images, camera index or URL."""
+    tasks: Annotated[
+        tuple[str, ...], Option("Task file, or the name of a shipped task.", "--task", "FILE")
+    ] = ()
+    models: Annotated[
+        Path | None, Option("Model database (see `visup models build`).", metavar="DB")
+    ] = None
+    rules: Annotated[
+        tuple[Path, ...], Option("Rules file, instead of the shipped rules.", metavar="FILE")
+    ] = ()
+    actors: Annotated[
+        Mapping[str, tuple[str, ...]],
+        Option("What an actor of the task looks like.", "--actor", "NAME=MODEL", parse_actors),
+    ] = field(default_factory=dict)
+    behaviours: Annotated[
+        tuple[Path | str, ...],
+        Option("Your own: FILE.py or package.module:Class.", "--behaviour", "FILE"),
+    ] = ()
+    plugins: Annotated[
+        tuple[str, ...], Option("Name of an installed behaviour to add.", "--plugin", "NAME")
+    ] = ()
+    plugin_settings: Annotated[
+        Mapping[str, Mapping[str, Any]],
+        Option(
+            "A setting of a behaviour of your own.",
+            "--set",
+            "NAME.KEY=VALUE",
+            _parse_plugin_settings,
+        ),
+    ] = field(default_factory=dict)
+    isolate: Annotated[
+        tuple[str, ...], Option("Run this behaviour in a process of its own.", metavar="NAME")
+    ] = ()
+    budgets: Annotated[
+        bool, Option("Give up what exceeds its budget; for live sources.", "--budgets")
+    ] = False
+    realtime: Annotated[
+        bool | None,
+        Option(
+            "Drop the frames that visup is too slow for, and say so (default: of live sources)."
+        ),
+    ] = None
+    every: Annotated[int, Option("Use every n-th frame.")] = 1
+    fps: Annotated[float | None, Option("Frame rate, where the source has none.")] = None
+    fov_vertical_deg: Annotated[
+        float | None, Option("Vertical field of view of the camera, degrees.", "--fov")
+    ] = None
+    zones: Annotated[
+        Path | None,
+        Option("File with zones that rules can name (see docs/formats.md).", metavar="FILE"),
+    ] = None
+    patience_s: float = 60.0
+    """How long a camera or stream that drops is tried again, seconds."""
+    attention: Annotated[
+        bool, Option("Match what is known well less often: cheaper.", "--attention")
+    ] = False
+
+    def __post_init__(self) -> None:
+        if self.every < 1:
+            raise SettingsError(f"--every is {self.every}", expected="1 or more")
+        if self.fps is not None and not 0 < self.fps <= 1000:
+            raise SettingsError(f"--fps is {self.fps}", expected="more than 0, at most 1000")
+        fov = self.fov_vertical_deg
+        if fov is not None and not 0 < fov < 180:
+            raise SettingsError(f"--fov is {fov}", expected="degrees between 0 and 180")
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How a run is recorded, and where its alerts go."""
+
+    video: Annotated[bool, Option("Write the annotated video.")] = True
+    report: bool = True
+    """Whether to write the report."""
+    sinks: Annotated[
+        tuple[str, ...],
+        Option("Send alerts there too: jsonl:- or webhook:URL ...", "--sink", "KIND:PLACE"),
+    ] = ()
+    keep_gb: Annotated[
+        float | None, Option("Keep so much of the journal, gigabytes.", at_least=0.0)
+    ] = None
+    state_every_s: Annotated[
+        float,
+        Option("Seconds between states to resume from; 0 for none.", "--state-every", at_least=0.0),
+    ] = 30.0

@@ -15,10 +15,10 @@ from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.video import Source, open_source
-from visup.rules.activation.attention import Attend
-from visup.rules.activation.waking import Wake, wakeful, waking_rules
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.video import VideoSource, open_source
+from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
+from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
 from visup.runs.plugins import user_behaviours
@@ -26,7 +26,7 @@ from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
 from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
-from visup.tasks.grammar.structure import sizes, task_actors, undrawn
+from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ compiling loops takes at the first frames after an installation."""
 __all__ = ["WatchSettings", "build_agent", "final_verdict", "open_video", "reasoning_agent"]
 
 
-def open_video(settings: WatchSettings) -> Source:
+def open_video(settings: WatchSettings) -> VideoSource:
     """The source of a run, opened.
 
     Raises:
@@ -79,7 +79,7 @@ def build_agent(
     _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    behaviours = [*_behaviours(settings, database, sizes(tasks, settings.actors)), *also]
+    behaviours = [*_behaviours(settings, database, declared_sizes(tasks, settings.actors)), *also]
     contracts = [b.contract for b in behaviours]
     return Agent(
         behaviours=behaviours,
@@ -88,7 +88,7 @@ def build_agent(
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
-        limits=replace(_limits(settings, live), wakeful=wakeful(contracts, _rules(settings))),
+        limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
 
 
@@ -155,16 +155,21 @@ def _reasoners(
 ) -> Reasoners:
     interpreting = default_reasoners(rules=_rules(settings))
     following = (task_reasoner(tasks),) if tasks else ()
-    attending = (Attend(),) if settings.attention else ()
-    waking = waking_rules(contracts)
-    match = (*following, *attending, *((Wake(waking),) if waking else ()), runtime_fault_reasoner)
+    attending = (AttentionReasoner(),) if settings.attention else ()
+    waking = activation_rules(contracts)
+    match = (
+        *following,
+        *attending,
+        *((ActivationReasoner(waking),) if waking else ()),
+        runtime_fault_reasoner,
+    )
     return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
     """A zone that nobody has drawn could never be seen to be entered or left."""
     for task in tasks:
-        for zone in undrawn(task):
+        for zone in undrawn_zones(task):
             if zone in drawn:
                 continue
             raise SettingsError(

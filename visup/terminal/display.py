@@ -2,7 +2,7 @@
 
 `shown(record)` gives what rich prints; `html(record)` the same for Jupyter. The records of `visup.agent`
 know nothing of it: they are shown so when they are printed with rich or stand last in a notebook's
-cell, once `visup.terminal.display` can be imported (see `visup/agent/model/notebook.py`).
+cell, once `visup.terminal.display` can be imported (see `visup/agent/model/display.py`).
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ from visup.agent import (
     TaskBelief,
 )
 from visup.agent.model.step import Step
+from visup.report.pictures import html_picture, text_picture
 from visup.stepping.cursor import PausedStep, StepResult
 from visup.stepping.diff import MindChange, MindDiff
-from visup.stepping.explanations.evidence import Why, worded
+from visup.stepping.explanations.evidence import Why, percept_text
 from visup.terminal.narrator import event_row
 from visup.terminal.tables import (
     alert_line,
@@ -74,9 +75,15 @@ def shown(record: Any) -> RenderableType:
 
 
 def html(record: Any) -> str:
-    """A record as HTML that stands by itself in a notebook's cell."""
+    """A record as HTML that stands by itself in a notebook's cell; with its picture, if it has one."""
+    picture = record.draw() if isinstance(record, Step) and record.frame else None
+    return ("" if picture is None else html_picture(picture)) + html_of(_in_words(record))
+
+
+def html_of(text: RenderableType) -> str:
+    """What rich prints as HTML that stands by itself."""
     console = Console(record=True, width=WIDTH + 20, file=StringIO(), force_jupyter=False)
-    console.print(shown(record))
+    console.print(text)
     style = "font-family:Menlo,'DejaVu Sans Mono',monospace;line-height:1.2;white-space:pre"
     return console.export_html(
         inline_styles=True, code_format=f'<pre style="{style}">{{code}}</pre>'
@@ -100,6 +107,15 @@ def _brief(value: object, most: int = 60) -> str:
 
 @shown.register
 def _(record: Step) -> RenderableType:
+    text = _in_words(record)
+    return Group(text_picture(record.draw()), text) if record.frame else text
+
+
+def _in_words(record: Any) -> RenderableType:
+    return _step_in_words(record) if isinstance(record, Step) else shown(record)
+
+
+def _step_in_words(record: Step) -> RenderableType:
     head = Text(f"step of frame {record.frame_index}, {record.time:.2f} s", style="bold")
     told: list[RenderableType] = [event_row(e) for e in worded_once(record.events)]
     told = told or [Text("nothing was told", style="dim")]
@@ -129,7 +145,7 @@ def _(record: Observation) -> RenderableType:
     for report in record.reports:
         branch = tree.add(Text(_report(report)))
         for percept in report.percepts[:12]:
-            branch.add(Text(worded(percept.value)))
+            branch.add(Text(percept_text(percept.value)))
         if more := len(report.percepts) - 12:
             branch.add(Text(f"and {more} more", style="dim")) if more > 0 else None
     return tree
@@ -142,7 +158,9 @@ def _report(r: Report) -> str:
 
 @shown.register
 def _(record: Report) -> RenderableType:
-    return Group(behaviours_table((record,)), *(Text(worded(p.value)) for p in record.percepts))
+    return Group(
+        behaviours_table((record,)), *(Text(percept_text(p.value)) for p in record.percepts)
+    )
 
 
 @shown.register
@@ -174,7 +192,7 @@ def _silhouette(region: Region, columns: int = 40) -> str:
 @shown.register
 def _(record: Percept) -> RenderableType:
     head = f"{record.kind} by {record.source} at {record.time:.2f} s, confidence {record.confidence:.2f}"
-    return Group(Text(head, style="bold"), Text(worded(record.value)))
+    return Group(Text(head, style="bold"), Text(percept_text(record.value)))
 
 
 @shown.register

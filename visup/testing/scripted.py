@@ -18,7 +18,7 @@ from visup.agent import (
     Percept,
 )
 from visup.agent.model.errors import BehaviourError, SettingsError
-from visup.percepts.video.base import Ending, Source
+from visup.percepts.video.source import Ending, VideoSource
 from visup.testing.clips import LabelledFrame
 
 Script = Callable[[Frame], object]
@@ -41,7 +41,7 @@ class Scripted:
         self.directives: list[tuple[Directive, ...]] = []
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report what the script says of one frame; directives are kept to be looked at."""
         self.directives.append(tuple(directives))
@@ -50,7 +50,7 @@ class Scripted:
         return [self.contract.percept(frame, value) for value in values]
 
 
-class ScriptedSource(Source):
+class ScriptedSource(VideoSource):
     """A source of frames that are given.
 
     Args:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.work_image import Floats
 
 Labels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
@@ -17,7 +17,7 @@ LEVELS = 256
 
 
 @compiled
-def flooded(right: Bytes, down: Bytes, marks: Labels) -> None:
+def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
     """The watershed of seeds, pixel for pixel as `cv2.watershed` has it, in two thirds of its time.
 
     Pixels beside the cells wait in a queue for each height of an edge, first come, first served; the
@@ -96,7 +96,7 @@ def _queue(flat: Labels, first: Labels, last: Labels, p: np.uint64, level: np.ui
 
 
 @compiled
-def borders(labels: Labels, count: int) -> tuple[Labels, Labels, Labels]:
+def cell_borders(labels: Labels, count: int) -> tuple[Labels, Labels, Labels]:
     """Pairs of cells that touch, and along how many pixels.
 
     Args:
@@ -156,7 +156,9 @@ def _steps(labels: Labels) -> tuple[Labels, Labels]:
 
 
 @compiled
-def linked(one: Labels, other: Labels, values: Floats, count: int) -> tuple[Labels, Labels, Floats]:
+def csr_links(
+    one: Labels, other: Labels, values: Floats, count: int
+) -> tuple[Labels, Labels, Floats]:
     """Pairs of cells as a symmetric matrix in rows (CSR).
 
     Args:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.work_image import Floats
 
 Labels = NDArray[np.int32]
 
 
 @compiled
-def gathered(
+def cell_statistics(
     labels: Labels, tone: NDArray[np.uint8], busy: Floats, count: int
 ) -> tuple[Floats, Floats, Labels]:
     """What the pixels of each cell are like, all in one pass.
@@ -49,7 +49,7 @@ def gathered(
 
 
 @compiled
-def totals(labels: Labels, values: Floats, count: int) -> Floats:
+def cell_totals(labels: Labels, values: Floats, count: int) -> Floats:
     """Sum of a (h, w) map, most of it 0, in each cell, (count,) float32."""
     height, width = labels.shape
     out = np.zeros(count, np.float32)
@@ -61,7 +61,7 @@ def totals(labels: Labels, values: Floats, count: int) -> Floats:
 
 
 @compiled
-def spread_to(
+def dilate_cells(
     ends: Labels, neighbours: Labels, members: NDArray[np.bool_], steps: int
 ) -> NDArray[np.bool_]:
     """Cells within some steps of (count, K) members.
@@ -93,7 +93,7 @@ def spread_to(
 
 
 @compiled
-def brought(
+def carry_shares(
     old: Labels, new: Labels, flow: Floats, shares: Floats, area: Floats, every: int
 ) -> Floats:
     """Shares of cells of an older image as they come to those of a newer one, along the flow.
@@ -137,7 +137,7 @@ def brought(
 
 
 @compiled
-def flattest(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
+def flat_seeds(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
     """Seeds of a watershed, numbered from 1, and how many.
 
     Args:
@@ -169,7 +169,7 @@ def flattest(strength: Floats, cell: int, flat: float) -> tuple[Labels, Any]:
 
 
 @compiled
-def bounds(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+def bounding_box(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
     """(left, top, right, bottom) around some cells; (large, large, 0, 0) when there are none."""
     left, top, right, bottom = 2**30, 2**30, 0, 0
     for k in range(len(members)):
@@ -180,10 +180,10 @@ def bounds(corners: Labels, members: NDArray[np.bool_]) -> tuple[int, int, int, 
 
 
 @compiled
-def painted(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floats:
+def paint_cells(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floats:
     """1 at the pixels of some cells and 0 elsewhere, (h, w) float32."""
     out = np.zeros(labels.shape, np.float32)
-    left, top, right, bottom = bounds(corners, members)
+    left, top, right, bottom = bounding_box(corners, members)
     for y in range(top, bottom):
         for x in range(left, right):
             out[y, x] = np.float32(members[labels[y, x]])
@@ -191,7 +191,7 @@ def painted(labels: Labels, corners: Labels, members: NDArray[np.bool_]) -> Floa
 
 
 @compiled
-def covered(
+def covered_pixels(
     new: Labels,
     old: Labels,
     corners: Labels,
@@ -203,7 +203,7 @@ def covered(
     """How many pixels of each of `count` cells some old cells cover when moved by whole pixels."""
     out = np.zeros(count, np.int64)
     height, width = new.shape
-    left, top, right, bottom = bounds(corners, members)
+    left, top, right, bottom = bounding_box(corners, members)
     for y in range(max(top, -dy), min(bottom, height - dy)):
         for x in range(max(left, -dx), min(right, width - dx)):
             out[new[y + dy, x + dx]] += members[old[y, x]]
@@ -211,7 +211,7 @@ def covered(
 
 
 @compiled
-def means_of_half(
+def half_size_means(
     labels: Labels, values: Floats, box: tuple[int, int, int, int], count: int
 ) -> Floats:
     """Mean, in each cell, of a map of a part of the image at half its size.
@@ -235,7 +235,7 @@ def means_of_half(
 
 
 @compiled
-def beside_points(
+def sum_point_evidence(
     labels: Labels, xy: Floats, normal: Floats, likelihood: Floats, far: float, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What points say of the cells on both of their sides.
@@ -266,7 +266,7 @@ def beside_points(
 
 
 @compiled
-def weighed(
+def bayes_shares(
     totals: NDArray[np.float64],
     number: NDArray[np.float64],
     more: Floats,

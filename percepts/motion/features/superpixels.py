@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from visup.percepts.motion.features._partition_jit import borders, flooded, linked
+from visup.percepts.motion.features._partition_jit import cell_borders, csr_links, watershed
 from visup.percepts.motion.features._superpixels_jit import (
-    bounds,
-    covered,
-    flattest,
-    gathered,
-    painted,
-    spread_to,
-    totals,
+    bounding_box,
+    cell_statistics,
+    cell_totals,
+    covered_pixels,
+    dilate_cells,
+    flat_seeds,
+    paint_cells,
 )
-from visup.percepts.motion.features.image import Floats, WorkImage
+from visup.percepts.motion.features.work_image import Floats, WorkImage
 
 STIFF = 15.0  # flat cells of one tone are nearly one: a whole sky, a whole face of a box
 CALM = 1.0  # mean gradient up to which a cell is flat, grey levels per pixel
@@ -56,9 +56,11 @@ class Superpixels:
     corners: NDArray[np.int32]
     _known: list[tuple[Floats, Floats]] = field(default_factory=list, repr=False)
 
-    def reach(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    def dilated(self, members: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
         """Which cells lie within some steps of the members; (count, K) bool from the same."""
-        return spread_to(self.link.indptr, self.link.indices, np.ascontiguousarray(members), steps)
+        return dilate_cells(
+            self.link.indptr, self.link.indices, np.ascontiguousarray(members), steps
+        )
 
     def mean(self, values: Floats) -> Floats:
         """Mean of an (h, w) map in each cell, (count,) float32; that of a map asked again is kept.
@@ -75,7 +77,7 @@ class Superpixels:
 
     def _mean(self, values: Floats) -> Floats:
         values = np.ascontiguousarray(values, dtype=np.float32)
-        return np.asarray(totals(self.labels, values, self.count) / self.area)
+        return np.asarray(cell_totals(self.labels, values, self.count) / self.area)
 
     def shifted(self, old: Superpixels, members: NDArray[np.bool_], by: tuple[int, int]) -> Floats:
         """Share of each cell that some cells of another image cover when moved by whole pixels.
@@ -89,16 +91,16 @@ class Superpixels:
             (count,) float32.
         """
         some = np.ascontiguousarray(members)
-        pixels = covered(self.labels, old.labels, old.corners, some, *by, self.count)
+        pixels = covered_pixels(self.labels, old.labels, old.corners, some, *by, self.count)
         return np.asarray(pixels / self.area, dtype=np.float32)
 
     def paint(self, members: NDArray[np.bool_]) -> Floats:
         """A map that is 1 in some cells and 0 elsewhere, (h, w) float32."""
-        return painted(self.labels, self.corners, np.ascontiguousarray(members))
+        return paint_cells(self.labels, self.corners, np.ascontiguousarray(members))
 
     def box(self, members: NDArray[np.bool_]) -> tuple[int, int, int, int]:
         """(x, y, width, height) of the smallest box around some cells; empty when there are none."""
-        x, y, right, bottom = bounds(self.corners, np.ascontiguousarray(members))
+        x, y, right, bottom = bounding_box(self.corners, np.ascontiguousarray(members))
         return (x, y, right - x, bottom - y) if right > x else (0, 0, 0, 0)
 
 
@@ -115,10 +117,10 @@ def superpixels(image: WorkImage, cell: int, contrast: float) -> Superpixels:
     """
     busy = np.abs(image.gx) + np.abs(image.gy)
     # A seed sits on no edge, and the watershed has nothing to find in a cell that is flat all over.
-    seeds, count = flattest(_smoothed(busy), cell, FLAT)
-    flooded(*_edges(image.tone), seeds)
+    seeds, count = flat_seeds(_smoothed(busy), cell, FLAT)
+    watershed(*_edges(image.tone), seeds)
     labels = _settled(seeds)
-    number, sums, corners = gathered(labels, image.tone, busy, count)
+    number, sums, corners = cell_statistics(labels, image.tone, busy, count)
     area = np.maximum(number, 1)
     mean = np.asarray(sums / area[:, None], dtype=np.float32)
     calm = np.exp(-0.5 * (mean[:, 5] / CALM) ** 2)
@@ -158,12 +160,12 @@ def _links(
     labels: NDArray[np.int32], tone: Floats, calm: Floats, contrast: float, cell: int
 ) -> sparse.csr_matrix:
     count = len(tone)
-    i, j, pixels = borders(labels, count)
+    i, j, pixels = cell_borders(labels, count)
     # Maxima along short rows are slow, column by column they are not.
     gaps = np.abs(tone[i] - tone[j])
     unlike = np.maximum(np.maximum(gaps[:, 0], gaps[:, 1]), gaps[:, 2])
     stiff = 1 + STIFF * calm[i] * calm[j]
     alike = stiff * np.exp(-0.5 * (unlike / contrast) ** 2) + LOOSE
     value = (np.minimum(pixels / cell, 2.0) * alike).astype(np.float32)
-    ends, columns, data = linked(i, j, value, count)
+    ends, columns, data = csr_links(i, j, value, count)
     return sparse.csr_matrix((data, columns, ends), shape=(count, count))

@@ -1,1 +1,5 @@
-"""output."""
+"""What is reported of tracks.
+
+`region_report.py` makes regions of tracks and obeys directives; `backward_tracking.py` finds since when a
+region has been in view, by following its points back through older images.
+"""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats, WorkImage, prepare
+from visup.percepts.motion.features.work_image import Floats, WorkImage, prepare_image
 
 SIZE = 400  # longer side of what is kept, pixels
 EVERY_S = 0.16  # between images of the last second
@@ -34,7 +34,7 @@ WINDOW = 9
 Grey = NDArray[np.uint8]
 
 
-class LookBack:
+class BackwardTracker:
     """Remembers older images and finds in them what is new now; one per video."""
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class LookBack:
         due = not self._past or frame.time - self._past[-1][0] >= EVERY_S - 1e-6
         fresh = [r for r in regions if r.id not in self._since]
         if due or fresh:
-            image = prepare(frame, SIZE)
+            image = prepare_image(frame, SIZE)
             self._see(image)
             for r in fresh:
                 self._since[r.id] = self._found_since(image, r, frame.size)

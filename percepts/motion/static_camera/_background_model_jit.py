@@ -1,4 +1,4 @@
-"""Passes over all pixels of the picture of the rest, compiled; `picture` says what they mean."""
+"""Passes over all pixels of the background model, compiled; `background_model` says what they mean."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.work_image import Floats
 
 Mask = NDArray[np.bool_]
 
 
-class Planes(NamedTuple):
+class BackgroundPlanes(NamedTuple):
     """What is known of each pixel: the fields of `Picture`, in its order."""
 
     mean: Floats
@@ -23,7 +23,7 @@ class Planes(NamedTuple):
     other_s: Floats
 
 
-class Shade(NamedTuple):
+class ShadowLimits(NamedTuple):
     """How a shadow differs from what it lies on.
 
     Attributes:
@@ -41,7 +41,7 @@ class Shade(NamedTuple):
     least: float
 
 
-class Pace(NamedTuple):
+class LearningRates(NamedTuple):
     """How fast is learnt.
 
     Attributes:
@@ -66,7 +66,7 @@ class Pace(NamedTuple):
 
 
 @compiled
-def offsets(image: Floats, mean: Floats, variance: Floats, most: float) -> Floats:
+def normalised_distances(image: Floats, mean: Floats, variance: Floats, most: float) -> Floats:
     """Squared distance of each pixel to the rest in standard deviations, at most `most`, (h, w)."""
     height, width = variance.shape
     out = np.empty((height, width), np.float32)
@@ -81,7 +81,7 @@ def offsets(image: Floats, mean: Floats, variance: Floats, most: float) -> Float
 
 
 @compiled
-def _is_dimmed(image: Floats, mean: Floats, y: int, x: int, shade: Shade) -> bool:
+def _is_shadow(image: Floats, mean: Floats, y: int, x: int, shade: ShadowLimits) -> bool:
     """Whether a pixel differs from the rest in brightness, and not in hue."""
     power, common, own = 1.0, 0.0, 0.0
     for i in range(3):
@@ -95,19 +95,19 @@ def _is_dimmed(image: Floats, mean: Floats, y: int, x: int, shade: Shade) -> boo
 
 
 @compiled
-def dimmed(image: Floats, mean: Floats, shade: Shade) -> Mask:
+def shadow_pixels(image: Floats, mean: Floats, shade: ShadowLimits) -> Mask:
     """Where an image differs from the rest in brightness, and not in hue, (h, w)."""
     height, width = mean.shape[:2]
     out = np.empty((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
-            out[y, x] = _is_dimmed(image, mean, y, x, shade)
+            out[y, x] = _is_shadow(image, mean, y, x, shade)
     return out
 
 
 @compiled
-def standing_out(
-    off: Floats, image: Floats, mean: Floats, seen_s: Floats, shade: Shade, least: float
+def foreground_pixels(
+    off: Floats, image: Floats, mean: Floats, seen_s: Floats, shade: ShadowLimits, least: float
 ) -> Mask:
     """Which pixels are further off than `least`, known, and no shadow or reflection, (h, w)."""
     height, width = off.shape
@@ -115,12 +115,14 @@ def standing_out(
     for y in range(height):
         for x in range(width):
             if off[y, x] > least and seen_s[y, x] > 0:
-                out[y, x] = not _is_dimmed(image, mean, y, x, shade)
+                out[y, x] = not _is_shadow(image, mean, y, x, shade)
     return out
 
 
 @compiled
-def surely(labels: NDArray[np.int32], off: Floats, out_of: Mask, count: int, least: float) -> Mask:
+def pixels_near_sure_ones(
+    labels: NDArray[np.int32], off: Floats, out_of: Mask, count: int, least: float
+) -> Mask:
     """Which pixels are in a component that somewhere goes beyond `least`.
 
     Args:
@@ -145,7 +147,9 @@ def surely(labels: NDArray[np.int32], off: Floats, out_of: Mask, count: int, lea
 
 
 @compiled
-def renewed(known: Planes, image: Floats, moving: Mask, gone: Mask, pace: Pace) -> Planes:
+def update_planes(
+    known: BackgroundPlanes, image: Floats, moving: Mask, gone: Mask, pace: LearningRates
+) -> BackgroundPlanes:
     """What is known of each pixel after one more (h, w, 3) image.
 
     Args:
@@ -162,7 +166,7 @@ def renewed(known: Planes, image: Floats, moving: Mask, gone: Mask, pace: Pace) 
     for y in range(height):
         for x in range(width):
             spread, seen, instead = known.variance[y, x], known.seen_s[y, x], known.other_s[y, x]
-            off = _apart(image, known.mean, y, x) / (np.float32(3) * spread)
+            off = _squared_distance(image, known.mean, y, x) / (np.float32(3) * spread)
             moves, is_known = moving[y, x], seen > 0
             fits = off < pace.fits and not moves and is_known
             away = is_known and not fits
@@ -170,7 +174,7 @@ def renewed(known: Planes, image: Floats, moving: Mask, gone: Mask, pace: Pace) 
             weight = weight if fits else np.float32(0)
             step = np.float32(0)
             if away:
-                alike = _apart(image, known.other, y, x) < pace.alike
+                alike = _squared_distance(image, known.other, y, x) < pace.alike
                 step = np.float32(0.3 if alike else 1.0)
                 instead = instead + pace.seconds if alike else pace.seconds
             for i in range(3):
@@ -190,11 +194,11 @@ def renewed(known: Planes, image: Floats, moving: Mask, gone: Mask, pace: Pace) 
             if instead > enough or (gone[y, x] and is_known):
                 mean[y, x] = other[y, x]
                 variance[y, x], seen_s[y, x], other_s[y, x] = 2 * pace.least, instead, 0.0
-    return Planes(mean, variance, seen_s, other, other_s)
+    return BackgroundPlanes(mean, variance, seen_s, other, other_s)
 
 
 @compiled
-def _apart(image: Floats, tones: Floats, y: int, x: int) -> float:
+def _squared_distance(image: Floats, tones: Floats, y: int, x: int) -> float:
     """Squared distance of a pixel of (h, w, 3) images."""
     a = image[y, x, 0] - tones[y, x, 0]
     b = image[y, x, 1] - tones[y, x, 1]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.work_image import Floats
 
 MOST = 60.0  # grey levels by which a pixel may speak against a shift
 

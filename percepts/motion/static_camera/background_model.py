@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera._background_model_jit import (
-    Pace,
-    Planes,
-    Shade,
-    dimmed,
-    offsets,
-    renewed,
-    standing_out,
-    surely,
+    BackgroundPlanes,
+    LearningRates,
+    ShadowLimits,
+    foreground_pixels,
+    normalised_distances,
+    pixels_near_sure_ones,
+    shadow_pixels,
+    update_planes,
 )
 
 Mask = NDArray[np.bool_]
@@ -39,11 +39,11 @@ HUE = 0.055  # how far colour may differ in a shadow, as a share of brightness
 RARE = 10.0  # squared distance beyond which a pixel tells no more of how restless it is
 EVEN = 0.03  # change of exposure that is none
 LIT = 1.12  # brightness in reflected light
-CAST = Shade(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
+CAST = ShadowLimits(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class BackgroundModel:
     """What rests.
 
     Attributes:
@@ -61,47 +61,47 @@ class Picture:
     other_s: Floats
 
 
-def first_picture(image: Floats) -> Picture:
+def initial_model(image: Floats) -> BackgroundModel:
     """What rests, after one (h, w, 3) image."""
     bare = np.zeros(image.shape[:2], np.float32)
-    return Picture(image, bare + NOISE**2, bare + 0.01, image, bare)
+    return BackgroundModel(image, bare + NOISE**2, bare + 0.01, image, bare)
 
 
-def forgotten(picture: Picture, where: Mask) -> Picture:
+def with_unknown(picture: BackgroundModel, where: Mask) -> BackgroundModel:
     """The picture without what it shows in some places: an object may have stood there."""
     return replace(picture, seen_s=np.where(where, 0, picture.seen_s).astype(np.float32))
 
 
-def filled(picture: Picture, image: Floats, bare: Mask) -> Picture:
+def with_revealed(picture: BackgroundModel, image: Floats, bare: Mask) -> BackgroundModel:
     """The picture with what is seen of an image where it was unknown and nothing hides the rest."""
     new = bare & (picture.seen_s <= 0)
     if not new.any():
         return picture
-    fresh = first_picture(image)
+    fresh = initial_model(image)
     planes = [getattr(picture, f.name).copy() for f in fields(picture)]
     for plane, f in zip(planes, fields(picture), strict=True):
         plane[new] = getattr(fresh, f.name)[new]
-    return Picture(*planes)
+    return BackgroundModel(*planes)
 
 
-def shaded(picture: Picture, image: Floats) -> Mask:
+def shadow_mask(picture: BackgroundModel, image: Floats) -> Mask:
     """Where an image differs as a shadow or a reflection does: in brightness, not in hue."""
-    return dimmed(image, picture.mean, CAST)
+    return shadow_pixels(image, picture.mean, CAST)
 
 
-def changed(picture: Picture, image: Floats) -> Mask:
+def foreground_mask(picture: BackgroundModel, image: Floats) -> Mask:
     """Which pixels show something else than what rests, (h, w) bool; where that is unknown, none."""
-    far = offsets(image, picture.mean, picture.variance, 100.0)
+    far = normalised_distances(image, picture.mean, picture.variance, 100.0)
     off = np.asarray(cv2.GaussianBlur(far, (3, 3), 0.8), dtype=np.float32)
-    out = standing_out(off, image, picture.mean, picture.seen_s, CAST, NEAR**2)
+    out = foreground_pixels(off, image, picture.mean, picture.seen_s, CAST, NEAR**2)
     near = cv2.medianBlur(out.view(np.uint8), 5)
     count, labels = cv2.connectedComponents(near, connectivity=8)
-    return surely(np.asarray(labels, np.int32), off, out, count, (FAR * 1.5) ** 2)
+    return pixels_near_sure_ones(np.asarray(labels, np.int32), off, out, count, (FAR * 1.5) ** 2)
 
 
-def learnt(
-    picture: Picture, image: Floats, moving: Mask, seconds: float, gone: Mask | None = None
-) -> Picture:
+def update_background(
+    picture: BackgroundModel, image: Floats, moving: Mask, seconds: float, gone: Mask | None = None
+) -> BackgroundModel:
     """The picture after one more image.
 
     Args:
@@ -114,7 +114,7 @@ def learnt(
     Returns:
         The new picture.
     """
-    pace = Pace(
+    pace = LearningRates(
         seconds,
         1 - float(np.exp(-seconds / SETTLE_S)),
         1 - float(np.exp(-seconds / RESTLESS_S)),
@@ -124,12 +124,14 @@ def learnt(
         (8 * NOISE) ** 2,
         3 * (FAR * NOISE) ** 2,
     )
-    known = Planes(*(getattr(picture, f.name) for f in fields(picture)))
+    known = BackgroundPlanes(*(getattr(picture, f.name) for f in fields(picture)))
     nowhere = np.zeros(moving.shape, dtype=bool)
-    return Picture(*renewed(known, image, moving, nowhere if gone is None else gone, pace))
+    return BackgroundModel(
+        *update_planes(known, image, moving, nowhere if gone is None else gone, pace)
+    )
 
 
-def edges(image: Floats, box: tuple[int, int, int, int]) -> Floats:
+def edge_strength(image: Floats, box: tuple[int, int, int, int]) -> Floats:
     """Strength of the edges of a (h, w, 3) image in a box (x0, y0, x1, y1), (y, x) float32."""
     x, y = max(box[0] - 1, 0), max(box[1] - 1, 0)
     grey = image[y : box[3] + 1, x : box[2] + 1].mean(axis=2)
@@ -138,7 +140,7 @@ def edges(image: Floats, box: tuple[int, int, int, int]) -> Floats:
     return np.asarray(inner, np.float32)
 
 
-def exposed(picture: Picture, image: Floats) -> Picture:
+def match_exposure(picture: BackgroundModel, image: Floats) -> BackgroundModel:
     """The picture as it would look at the exposure of an image, after the median change of tone."""
     step = 4
     rest, now = picture.mean[::step, ::step], image[::step, ::step]

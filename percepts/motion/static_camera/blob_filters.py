@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
-from visup.percepts.motion.static_camera.background_model import edges
-from visup.percepts.motion.static_camera.blob import Silhouette, Silhouettes, cut
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.static_camera.background_model import edge_strength
+from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, crop
 
 LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
 LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
@@ -22,7 +22,7 @@ GHOST = 0.6  # edges in the image, as a share of those at rest, below which noth
 FRAGMENT = 0.2  # gap between a part and its object, as a share of its length
 
 
-def is_salient(s: Silhouette) -> bool:
+def is_salient_blob(s: BlobTrack) -> bool:
     """Whether a side of an object's box has left its place and kept a course while it did.
 
     The opposite side must have followed it, unless the border of the image cuts the object. Shadows do so
@@ -30,24 +30,24 @@ def is_salient(s: Silhouette) -> bool:
     """
     if s.shadow:
         return False
-    gone = s.gone()
+    gone = s.displacement()
     least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
-    left = (gone > least) & (gone > STRAIGHT * s.way)
+    left = (gone > least) & (gone > STRAIGHT * s.path_length)
     if not s.cut:
         # What stays and only grows or shrinks, as a shadow on a thing at rest, moves one side alone.
-        ways = s.sides - s.start
+        ways = s.sides - s.initial_sides
         left = left & (np.roll(ways, 2) * np.sign(ways) >= FOLLOWED * gone)
     return s.frames >= 3 and bool(left.any())
 
 
-def joined(known: Silhouettes) -> Silhouettes:
+def merge_parts(known: BlobTracks) -> BlobTracks:
     """Give small parts that were born beside an object, and go with it, to that object."""
     out = list(known)
     for s in known:
-        if s.now is None:
+        if s.visible is None:
             continue
         for i, host in enumerate(out):
-            if host.key >= s.key or host.now is None or s.cut or not _goes_with(s, host):
+            if host.key >= s.key or host.visible is None or s.cut or not _moves_with(s, host):
                 continue
             out[i] = _with_part(host, s)
             out = [o for o in out if o.key != s.key]
@@ -55,7 +55,7 @@ def joined(known: Silhouettes) -> Silhouettes:
     return tuple(out)
 
 
-def _goes_with(s: Silhouette, host: Silhouette) -> bool:
+def _moves_with(s: BlobTrack, host: BlobTrack) -> bool:
     if np.count_nonzero(s.shape) > LIMB * np.count_nonzero(host.shape) or s.frames < 3:
         return False
     a, b = s.sides, host.sides
@@ -65,10 +65,10 @@ def _goes_with(s: Silhouette, host: Silhouette) -> bool:
     return bool(gap <= max(3, FRAGMENT * max(host.shape.shape)) and off < 0.5 * speed + 3.0)
 
 
-def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
-    assert host.now is not None
-    assert s.now is not None
-    (a, shape), (b, part) = host.now, s.now
+def _with_part(host: BlobTrack, s: BlobTrack) -> BlobTrack:
+    assert host.visible is not None
+    assert s.visible is not None
+    (a, shape), (b, part) = host.visible, s.visible
     box = (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3]))
     mask = np.zeros((box[3] - box[1], box[2] - box[0]), dtype=bool)
     tone = np.zeros((*mask.shape, 3), dtype=np.float32)
@@ -78,10 +78,12 @@ def _with_part(host: Silhouette, s: Silhouette) -> Silhouette:
         if t.shape[:2] == m.shape:
             tone[where] = t
     corner = (float(box[0]), float(box[1]))
-    return replace(host, id=host.id or s.id, now=(box, mask), shape=mask, tone=tone, corner=corner)
+    return replace(
+        host, id=host.id or s.id, visible=(box, mask), shape=mask, tone=tone, corner=corner
+    )
 
 
-def is_deep_shadow(s: Silhouette, image: Floats, rest: Floats) -> bool:
+def is_deep_shadow(s: BlobTrack, image: Floats, rest: Floats) -> bool:
     """Whether an outline shows the rest, dimmed by one factor all over: what is cast, not what casts.
 
     Objects differ from what they hide by more in one place than in another.
@@ -91,10 +93,10 @@ def is_deep_shadow(s: Silhouette, image: Floats, rest: Floats) -> bool:
         image: (h, w, 3) float32.
         rest: (h, w, 3) float32, the picture of the rest at the exposure of the image.
     """
-    if s.now is None or s.crowded:
+    if s.visible is None or s.merged:
         return False
-    box, shape = s.now
-    now, before = cut(image, box)[shape], cut(rest, box)[shape]
+    box, shape = s.visible
+    now, before = crop(image, box)[shape], crop(rest, box)[shape]
     power = np.einsum("ij,ij->i", before, before) + 1.0
     bright = np.einsum("ij,ij->i", now, before) / power
     gap = now - bright[:, None] * before
@@ -104,7 +106,7 @@ def is_deep_shadow(s: Silhouette, image: Floats, rest: Floats) -> bool:
     return bool(dim and np.quantile(hue, 0.9) <= SAME_HUE)
 
 
-def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
+def is_ghost(s: BlobTrack, now: Floats, rest: Floats) -> bool:
     """Whether an outline has its edges in the picture of the rest: it shows where something left.
 
     A shadow dims the edges of what it falls on, and nothing has left; what is so thin that it has
@@ -115,11 +117,13 @@ def is_ghost(s: Silhouette, now: Floats, rest: Floats) -> bool:
         now: (h, w, 3) float32 image.
         rest: (h, w, 3) float32 picture of the rest.
     """
-    if s.now is None or s.crowded:
+    if s.visible is None or s.merged:
         return False
-    box, shape = s.now
+    box, shape = s.visible
     inner = cv2.erode(np.pad(shape, 1).astype(np.uint8), np.ones((3, 3), np.uint8))[1:-1, 1:-1]
     if s.shadow and inner.any():
         return False
     rim = shape & (inner == 0)
-    return float(edges(now, box)[rim].mean()) < GHOST * float(edges(rest, box)[rim].mean())
+    return float(edge_strength(now, box)[rim].mean()) < GHOST * float(
+        edge_strength(rest, box)[rim].mean()
+    )

@@ -16,19 +16,20 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
-from visup.percepts.motion.static_camera.blob import (
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.static_camera.blob_track import (
+    BlobTrack,
+    BlobTracks,
+    Box,
+    Foreground,
     Mask,
-    Silhouette,
-    Silhouettes,
-    View,
     at_border,
-    cropped,
-    cut,
-    histogram_of,
-    window_of,
+    crop,
+    crop_mask,
+    template_window,
+    tone_histogram,
 )
-from visup.percepts.motion.static_camera.templates import shared, sought
+from visup.percepts.motion.static_camera.templates import best_template_shift, split_blob
 
 CLAIM = 0.25  # share of the smaller of object and blob that must be common for a claim
 VISIBLE = 0.2  # share of its template below which an object is hidden
@@ -40,7 +41,7 @@ PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an 
 GROWN = 1.3  # how much more than its template is seen of an object that has come into view
 
 
-def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]:
+def track_blobs(known: BlobTracks, view: Foreground, born: int) -> tuple[BlobTracks, int]:
     """Bring objects to the next frame, and add those that are new.
 
     Args:
@@ -51,62 +52,62 @@ def follow(known: Silhouettes, view: View, born: int) -> tuple[Silhouettes, int]
     Returns:
         All objects, hidden ones too; how many were born.
     """
-    ahead = [_moved(s, view.seconds) for s in known]
+    ahead = [_predicted(s, view.seconds) for s in known]
     claims = _claims(ahead, view)
-    out: list[Silhouette] = []
+    out: list[BlobTrack] = []
     taken = np.zeros(view.count + 1, dtype=bool)
-    rivals = [_rivals(b, claims, ahead) for b in range(view.count + 1)]
+    rivals = [_claimants(b, claims, ahead) for b in range(view.count + 1)]
     claims = [[b for b in c if i in rivals[b]] for i, c in enumerate(claims)]
     parts: list[list[Mask]] = [[] for _ in ahead]
     for b in range(1, view.count + 1):
-        for i, mask in shared(b, [(i, ahead[i]) for i in rivals[b]], view):
+        for i, mask in split_blob(b, [(i, ahead[i]) for i in rivals[b]], view):
             parts[i].append(mask)
             taken[b] = True
     left = []
     for i, s in enumerate(ahead):
         alone = all(len(rivals[b]) == 1 for b in claims[i])
-        whole, others = _whole(s, parts[i], alone)
+        whole, others = _merged_parts(s, parts[i], alone)
         left += others
         pieces = (
             alone
-            and sum(_is_much(p, max(parts[i], key=np.count_nonzero)) for p in parts[i]) > 1
+            and sum(_is_large_part(p, max(parts[i], key=np.count_nonzero)) for p in parts[i]) > 1
             and not others
         )
-        out.append(_seen(s, known[i], whole, alone, view, pieces=pieces))
+        out.append(_updated(s, known[i], whole, alone, view, pieces=pieces))
     fresh = [view.labels == b for b in range(1, view.count + 1) if not taken[b]] + left
     for mask in fresh:
         born += 1
-        out.append(_born(mask, view, born))
+        out.append(_initiated(mask, view, born))
     return tuple(out), born
 
 
-def _moved(s: Silhouette, seconds: float) -> Silhouette:
+def _predicted(s: BlobTrack, seconds: float) -> BlobTrack:
     x, y = s.corner
     return replace(s, corner=(x + s.velocity[0] * seconds, y + s.velocity[1] * seconds))
 
 
-def _claims(ahead: Sequence[Silhouette], view: View) -> list[list[int]]:
+def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
     """The blobs that each object claims by where it is expected; else the nearest free one."""
     areas = np.bincount(view.labels.ravel(), minlength=view.count + 1)
     claims: list[list[int]] = []
     for s in ahead:
-        at, own = window_of(s, view.labels.shape)
-        common = np.bincount(cut(view.labels, at)[cut(s.shape, own)], minlength=view.count + 1)
+        at, own = template_window(s, view.labels.shape)
+        common = np.bincount(crop(view.labels, at)[crop(s.shape, own)], minlength=view.count + 1)
         least = CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
         claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
-    _reach_out(ahead, view, claims, areas)
+    _assign_unclaimed(ahead, view, claims, areas)
     return claims
 
 
-def _rivals(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[Silhouette]) -> list[int]:
+def _claimants(blob: int, claims: Sequence[Sequence[int]], ahead: Sequence[BlobTrack]) -> list[int]:
     """Those who share a blob: what was never seen apart is no object of its own."""
     all_ = [i for i, c in enumerate(claims) if blob in c]
-    known = [i for i in all_ if ahead[i].alone >= APART]
+    known = [i for i in all_ if ahead[i].isolated_frames >= APART]
     return known or all_[:1]
 
 
-def _reach_out(
-    ahead: Sequence[Silhouette], view: View, claims: list[list[int]], areas: NDArray[np.int64]
+def _assign_unclaimed(
+    ahead: Sequence[BlobTrack], view: Foreground, claims: list[list[int]], areas: NDArray[np.int64]
 ) -> None:
     """Let objects that claim nothing have the free blobs nearby, all in all at the least cost."""
     free = sorted(set(range(1, view.count + 1)) - {b for c in claims for b in c})
@@ -114,11 +115,11 @@ def _reach_out(
     if not free or not lost:
         return
     cost = np.full((len(lost), len(free)), 1e3)
-    looks = [_look(view.labels == b, view) for b in free]
+    looks = [_blob_appearance(view.labels == b, view) for b in free]
     for row, i in enumerate(lost):
         s = ahead[i]
         size = float(np.hypot(*s.shape.shape))
-        waited = view.time - s.seen
+        waited = view.time - s.last_seen
         allowed = (
             0.6 * size + 0.5 * float(np.hypot(*s.velocity)) * waited + 0.2 * size * min(waited, 3)
         )
@@ -133,16 +134,18 @@ def _reach_out(
             claims[lost[row]].append(free[col])
 
 
-def _look(mask: Mask, view: View) -> tuple[tuple[float, float], Floats]:
+def _blob_appearance(mask: Mask, view: Foreground) -> tuple[tuple[float, float], Floats]:
     ys, xs = np.nonzero(mask)
     centre = (
         (float(xs.min()) + float(xs.max()) + 1) / 2,
         (float(ys.min()) + float(ys.max()) + 1) / 2,
     )
-    return centre, histogram_of(view.image[ys, xs])
+    return centre, tone_histogram(view.image[ys, xs])
 
 
-def _whole(s: Silhouette, parts: Sequence[Mask], alone: bool) -> tuple[Mask | None, list[Mask]]:
+def _merged_parts(
+    s: BlobTrack, parts: Sequence[Mask], alone: bool
+) -> tuple[Mask | None, list[Mask]]:
     """The parts of an object as one mask, and those too far from the largest to be its own."""
     if not parts:
         return None, []
@@ -150,9 +153,9 @@ def _whole(s: Silhouette, parts: Sequence[Mask], alone: bool) -> tuple[Mask | No
     whole, others = order[0], []
     reach = max(3, round(FRAGMENT * max(s.shape.shape)))
     # What rests before an object parts it for as long as it takes to pass, and no longer.
-    two = s.parted > PASSED * max(s.shape.shape)
+    two = s.split_px > PASSED * max(s.shape.shape)
     for part in order[1:]:
-        if two and _is_much(part, whole):
+        if two and _is_large_part(part, whole):
             others.append(part)
             continue
         near = cv2.dilate(whole.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
@@ -163,19 +166,19 @@ def _whole(s: Silhouette, parts: Sequence[Mask], alone: bool) -> tuple[Mask | No
     return whole, others
 
 
-def _is_much(part: Mask, whole: Mask) -> bool:
+def _is_large_part(part: Mask, whole: Mask) -> bool:
     return int(np.count_nonzero(part)) > PIECE * int(np.count_nonzero(whole))
 
 
-def _born(mask: Mask, view: View, key: int) -> Silhouette:
-    box, shape = cropped(mask)
-    tone = cut(view.image, box)
-    histogram = histogram_of(tone[shape])
+def _initiated(mask: Mask, view: Foreground, key: int) -> BlobTrack:
+    box, shape = crop_mask(mask)
+    tone = crop(view.image, box)
+    histogram = tone_histogram(tone[shape])
     corner = (float(box[0]), float(box[1]))
     now = (box, shape)
     t = view.time
     start = np.array(box, dtype=np.float32)
-    return Silhouette(
+    return BlobTrack(
         key,
         0,
         t,
@@ -194,54 +197,72 @@ def _born(mask: Mask, view: View, key: int) -> Silhouette:
     )
 
 
-def _seen(
-    s: Silhouette,
-    before: Silhouette,
+def _updated(
+    s: BlobTrack,
+    before: BlobTrack,
     mask: Mask | None,
     alone: bool,
-    view: View,
+    view: Foreground,
     *,
     pieces: bool,
-) -> Silhouette:
-    """An object after what is seen of it in a frame."""
+) -> BlobTrack:
+    """An object after what is seen of it in a frame.
+
+    Args:
+        s: As predicted.
+        before: As it was in the frame before.
+        mask: Its pixels; None when it is hidden.
+        alone: Whether it shares no blob.
+        view: The frame.
+        pieces: Whether it is seen in several large pieces.
+    """
     full = np.count_nonzero(s.shape)
     if mask is None or np.count_nonzero(mask) < VISIBLE * full:
-        return replace(s, now=None, crowded=not alone)
-    box, shape = cropped(mask)
-    elapsed = max(view.time - before.seen, view.seconds, 1e-3)
+        return replace(s, visible=None, merged=not alone)
+    box, shape = crop_mask(mask)
     if not alone and np.count_nonzero(mask) < GROWN * full:
-        # Of what is partly hidden only the shift of its template tells where it is.
-        _, dx, dy = sought(s, mask.astype(np.float32), view)
-        corner = (s.corner[0] + dx, s.corner[1] + dy)
-        gain = 0.3 * FOLLOW
-        velocity = (
-            s.velocity[0] + gain * dx / view.seconds,
-            s.velocity[1] + gain * dy / view.seconds,
-        )
-        moved = replace(s, corner=corner, velocity=velocity)
+        moved = _shifted(s, mask, view)
     else:
-        corner = (float(box[0]), float(box[1]))
-        old = before.centre
-        new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
-        gain = max(FOLLOW, 1 / (s.frames + 0.0))
-        velocity = (
-            s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
-            s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
-        )
-        tone = cut(view.image, box)
-        histogram = 0.8 * s.histogram + 0.2 * histogram_of(tone[shape])
-        moved = replace(
-            s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram
-        )
-    step = float(np.abs(moved.sides - before.sides).mean())
+        moved = _measured_anew(s, before, box, shape, view)
+    gone = np.abs(moved.sides - before.sides)
     return replace(
         moved,
-        seen=view.time,
+        last_seen=view.time,
         frames=s.frames + 1,
-        way=s.way + np.abs(moved.sides - before.sides),
-        alone=s.alone + int(alone),
-        now=(box, shape),
-        crowded=not alone,
+        path_length=s.path_length + gone,
+        isolated_frames=s.isolated_frames + int(alone),
+        visible=(box, shape),
+        merged=not alone,
         cut=s.cut or at_border(box, view),
-        parted=before.parted + step if pieces else 0.0,
+        split_px=before.split_px + float(gone.mean()) if pieces else 0.0,
     )
+
+
+def _shifted(s: BlobTrack, mask: Mask, view: Foreground) -> BlobTrack:
+    """An object partly hidden: only the shift of its template tells where it is."""
+    _, dx, dy = best_template_shift(s, mask.astype(np.float32), view)
+    gain = 0.3 * FOLLOW
+    corner = (s.corner[0] + dx, s.corner[1] + dy)
+    velocity = (
+        s.velocity[0] + gain * dx / view.seconds,
+        s.velocity[1] + gain * dy / view.seconds,
+    )
+    return replace(s, corner=corner, velocity=velocity)
+
+
+def _measured_anew(
+    s: BlobTrack, before: BlobTrack, box: Box, shape: Mask, view: Foreground
+) -> BlobTrack:
+    """An object seen whole: its box, velocity, template and tones are what is seen."""
+    elapsed = max(view.time - before.last_seen, view.seconds, 1e-3)
+    old = before.centre
+    new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+    gain = max(FOLLOW, 1 / (s.frames + 0.0))
+    velocity = (
+        s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
+        s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
+    )
+    tone = crop(view.image, box)
+    histogram = 0.8 * s.histogram + 0.2 * tone_histogram(tone[shape])
+    corner = (float(box[0]), float(box[1]))
+    return replace(s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram)

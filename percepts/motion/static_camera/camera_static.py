@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from visup.percepts.motion.layers.dominant import GRID
-from visup.percepts.motion.layers.layers import STILL, Affine, distances
-from visup.percepts.motion.tracks.scene import Scene
+from visup.percepts.motion.layers.affine import STILL, Affine, distances
+from visup.percepts.motion.layers.dominant_motion import BALANCE_GRID
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 TELLS = 16.0  # information, 1 / pixels squared, of a point that would show a motion
 FITS = 9.0  # squared distance within which a point rests
@@ -15,7 +15,7 @@ RESTS = 0.85  # share of those parts that rest when the camera does
 MOVES = 0.6  # the same below which the camera moves
 
 
-def camera_rests(scene: Scene) -> bool | None:
+def is_camera_static(scene: FrameMeasurements) -> bool | None:
     """Whether the camera is seen to rest: all over the view, away from objects, nothing moves.
 
     Args:
@@ -30,11 +30,11 @@ def camera_rests(scene: Scene) -> bool | None:
     return True if shares and all(s is not None and s >= RESTS for s in shares) else None
 
 
-def _still_share(scene: Scene, number: int) -> float | None:
+def _still_share(scene: FrameMeasurements, number: int) -> float | None:
     c = scene.measured[number].constraints
     use = c.information[:, 0] + c.information[:, 2] > TELLS
     use &= scene.owner[scene.cell_of(c)] == 0
-    rows, cols = GRID
+    rows, cols = BALANCE_GRID
     row = np.clip(c.xy[:, 1] * rows / scene.image.shape[0], 0, rows - 1).astype(np.int64)
     col = np.clip(c.xy[:, 0] * cols / scene.image.shape[1], 0, cols - 1).astype(np.int64)
     place = (row * cols + col)[use]

@@ -15,23 +15,34 @@ import numpy as np
 
 from visup.agent import Frame, Region
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
 from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera.background_model import (
-    Picture,
-    changed,
-    exposed,
-    filled,
-    first_picture,
-    forgotten,
-    learnt,
+    BackgroundModel,
+    foreground_mask,
+    initial_model,
+    match_exposure,
+    update_background,
+    with_revealed,
+    with_unknown,
 )
-from visup.percepts.motion.static_camera.blob import Mask, Silhouette, Silhouettes, View, view_of
-from visup.percepts.motion.static_camera.blob_filters import is_deep_shadow, is_ghost, joined
-from visup.percepts.motion.static_camera.blob_tracker import follow
-from visup.percepts.motion.static_camera.camera_static import camera_rests
-from visup.percepts.motion.static_camera.track_fusion import Evidence, Telling
-from visup.percepts.motion.tracks.scene import Scene
+from visup.percepts.motion.static_camera.blob_filters import is_deep_shadow, is_ghost, merge_parts
+from visup.percepts.motion.static_camera.blob_track import (
+    BlobTrack,
+    BlobTracks,
+    Foreground,
+    Mask,
+    find_blobs,
+)
+from visup.percepts.motion.static_camera.blob_tracker import track_blobs
+from visup.percepts.motion.static_camera.camera_static import is_camera_static
+from visup.percepts.motion.static_camera.track_fusion import (
+    FusionFrame,
+    MotionEvidence,
+    TrackFusion,
+)
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 REST_S = 1.0  # how long the camera must rest before the picture is believed, seconds
 LONGEST_S = 4.0  # most seconds of rest that make up for times when too little is seen
@@ -45,7 +56,7 @@ STRIDE_PX, MOST_STRIDES = 4.0, 32
 HALO = 7  # pixels: a region's outline may be off by half as much
 
 
-class RestingView:
+class StaticCameraSegmenter:
     """Silhouettes before the picture of what rests; one per video.
 
     Attributes:
@@ -54,116 +65,130 @@ class RestingView:
 
     def __init__(self) -> None:
         self._forget()
-        self._telling = Telling()
+        self._fusion = TrackFusion()
 
     def _forget(self) -> None:
-        self._picture: Picture | None = None
-        self._known: Silhouettes = ()
-        self._time = self._since = self._rested_s = 0.0
-        self._born = 0
+        self._background: BackgroundModel | None = None
+        self._tracks: BlobTracks = ()
+        self._time = self._since = self._static_s = 0.0
+        self._last_key = 0
         self.active = False
 
     def step(
         self,
         frame: Frame,
-        scene: Scene,
+        scene: FrameMeasurements,
         regions: Sequence[Region],
-        ids: int,
+        ids: IdAllocator,
         settings: MotionSettings,
-        evidence: Evidence,
-    ) -> tuple[tuple[Region, ...], int]:
+        evidence: MotionEvidence,
+    ) -> tuple[Region, ...]:
         """What is to be reported of a frame.
 
         Args:
             frame: The frame.
             scene: As measured.
             regions: Those of the layers of motion.
-            ids: The last public id given.
+            ids: Gives public ids.
             settings: Gives how long objects are remembered.
             evidence: Which points are seen to move by themselves.
 
         Returns:
-            Regions by id: those of the layers unless the camera rests; the last public id given.
+            Regions by id: those of the layers unless the camera is static.
         """
-        fresh = [r for r in regions if not self._telling.knows(r.id)]
-        self._telling.note(regions, frame.time, settings.memory_s)
+        fresh = [r for r in regions if not self._fusion.knows(r.id)]
+        self._fusion.note(regions, frame.time, settings.memory_s)
         many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
-        if not self._is_at_rest(camera_rests(scene), scene.seconds):
-            return self._telling.alone(regions, many), ids
-        image = _prepared(frame)
-        if self._picture is None:
-            hidden = covered(regions, frame.size, image.shape[:2])
-            self._picture = forgotten(first_picture(image), hidden)
-            self._time = self._since = frame.time
-            return self._telling.alone(regions, many), ids
-        self._reveal(image, frame, regions, fresh)
-        view = self._seen(image, frame.time, settings)
-        if view is None:
-            return self._telling.alone(regions, many), ids
-        self.active = min(frame.time - self._since, self._rested_s) >= REST_S
+        foreground = self._foreground(frame, scene, regions, fresh, settings)
+        if foreground is None:
+            return self._fusion.passthrough(regions, ids, many)
+        self.active = min(frame.time - self._since, self._static_s) >= REST_S
         if not self.active:
-            return self._telling.alone(regions, many), ids
-        told, self._known, ids = self._telling.together(
-            frame.size, view, self._known, regions, ids, evidence, many
-        )
-        return told, ids
+            return self._fusion.passthrough(regions, ids, many)
+        fused = FusionFrame(frame.size, foreground, evidence, many)
+        out, self._tracks = self._fusion.fuse(fused, self._tracks, regions, ids)
+        return out
+
+    def _foreground(
+        self,
+        frame: Frame,
+        scene: FrameMeasurements,
+        regions: Sequence[Region],
+        fresh: Sequence[Region],
+        settings: MotionSettings,
+    ) -> Foreground | None:
+        """What differs from the background; None while the camera moves or none is known."""
+        if not self._is_static(is_camera_static(scene), scene.seconds):
+            return None
+        image = _prepare(frame)
+        if self._background is None:
+            hidden = region_mask(regions, frame.size, image.shape[:2])
+            self._background = with_unknown(initial_model(image), hidden)
+            self._time = self._since = frame.time
+            return None
+        self._reveal(image, frame, regions, fresh)
+        return self._track_blobs(image, frame.time, settings)
 
     def _reveal(
         self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
     ) -> None:
         """Forget what a region hid since the picture was begun, and look where none hides it now."""
-        assert self._picture is not None
-        picture, shape = self._picture, image.shape[:2]
+        assert self._background is not None
+        picture, shape = self._background, image.shape[:2]
         age = frame.time - self._since
         if fresh and age < START_S:
-            change = changed(exposed(picture, image), image)
+            change = foreground_mask(match_exposure(picture, image), image)
             for r in fresh:
-                here = covered([r], frame.size, shape)
+                here = region_mask([r], frame.size, shape)
                 if change[here].mean() < KNOWN:
-                    picture = forgotten(picture, here & ~change)
-                was = swept(here, r, age, shape[1] / frame.size[0])
-                picture = forgotten(picture, was & ~here & change)
-        told = covered(regions, frame.size, shape)
-        self._picture = filled(picture, image, ~told)
+                    picture = with_unknown(picture, here & ~change)
+                was = swept_mask(here, r, age, shape[1] / frame.size[0])
+                picture = with_unknown(picture, was & ~here & change)
+        told = region_mask(regions, frame.size, shape)
+        self._background = with_revealed(picture, image, ~told)
 
-    def _is_at_rest(self, rests: bool | None, seconds: float) -> bool:
+    def _is_static(self, rests: bool | None, seconds: float) -> bool:
         """Whether the camera rests, as far as is known; else all is forgotten."""
         step = seconds if rests else -seconds
-        self._rested_s = min(max(self._rested_s + step, 0.0), LONGEST_S)
-        if rests is False or self._rested_s <= 0:
+        self._static_s = min(max(self._static_s + step, 0.0), LONGEST_S)
+        if rests is False or self._static_s <= 0:
             self._forget()
-        return self._rested_s > 0
+        return self._static_s > 0
 
-    def _seen(self, image: Floats, now: float, settings: MotionSettings) -> View | None:
+    def _track_blobs(
+        self, image: Floats, now: float, settings: MotionSettings
+    ) -> Foreground | None:
         """Follow the silhouettes into a frame, and learn from it; None when it shows another view."""
-        assert self._picture is not None
+        assert self._background is not None
         seconds = max(now - self._time, 1e-3)
         self._time = now
-        picture = exposed(self._picture, image)
-        change = changed(picture, image)
+        picture = match_exposure(self._background, image)
+        change = foreground_mask(picture, image)
         if change.mean() > FLOODED:
             self._forget()
             return None
-        view = view_of(image, change, settings.least_blob * change.size, now, seconds)
-        known, self._born = follow(self._known, view, self._born)
-        known = joined(known)
+        view = find_blobs(image, change, settings.least_blob * change.size, now, seconds)
+        known, self._last_key = track_blobs(self._tracks, view, self._last_key)
+        known = merge_parts(known)
         known = tuple(
             s if s.id else replace(s, shadow=is_deep_shadow(s, image, picture.mean)) for s in known
         )
         ghosts = [s for s in known if is_ghost(s, image, picture.mean)]
         known = tuple(s for s in known if s not in ghosts)
-        told = painted([s for s in known if s.id], change.shape)
+        told = blob_mask([s for s in known if s.id], change.shape)
         held = (cv2.dilate(told.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
-        self._picture = learnt(picture, image, held, seconds, painted(ghosts, change.shape))
-        self._known = tuple(
+        self._background = update_background(
+            picture, image, held, seconds, blob_mask(ghosts, change.shape)
+        )
+        self._tracks = tuple(
             s
             for s in known
-            if now - s.seen <= (settings.missed_s if s.id else max(YOUNG_S, 2.5 * seconds))
+            if now - s.last_seen <= (settings.missed_s if s.id else max(YOUNG_S, 2.5 * seconds))
         )
         return view
 
 
-def _prepared(frame: Frame) -> Floats:
+def _prepare(frame: Frame) -> Floats:
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
@@ -174,7 +199,7 @@ def _prepared(frame: Frame) -> Floats:
     return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.7), dtype=np.float32)
 
 
-def covered(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
+def region_mask(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
     """(h, w) bool: the pixels of the picture that some regions may hide.
 
     Args:
@@ -201,7 +226,7 @@ def covered(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, 
     return np.asarray(cv2.dilate(out, np.ones((HALO, HALO), np.uint8)) > 0)
 
 
-def swept(here: Mask, region: Region, seconds: float, scale: float) -> Mask:
+def swept_mask(here: Mask, region: Region, seconds: float, scale: float) -> Mask:
     """Where a region was during the last seconds if it moved as it does now, (h, w) bool.
 
     Args:
@@ -223,11 +248,11 @@ def swept(here: Mask, region: Region, seconds: float, scale: float) -> Mask:
     return out
 
 
-def painted(known: Sequence[Silhouette], shape: tuple[int, int]) -> Mask:
+def blob_mask(known: Sequence[BlobTrack], shape: tuple[int, int]) -> Mask:
     """(h, w) bool: what is visible of some objects."""
     out = np.zeros(shape, dtype=bool)
     for s in known:
-        if s.now is not None:
-            (x0, y0, x1, y1), mask = s.now
+        if s.visible is not None:
+            (x0, y0, x1, y1), mask = s.visible
             out[y0:y1, x0:x1] |= mask
     return out

@@ -11,17 +11,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.features.image import Floats
+from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera._templates_jit import best_shift
-from visup.percepts.motion.static_camera.blob import Mask, Silhouette, View, cut, window_of
+from visup.percepts.motion.static_camera.blob_track import (
+    BlobTrack,
+    Foreground,
+    Mask,
+    crop,
+    template_window,
+)
 
 SEARCH = 3  # pixels around the prediction in which a template is sought
 ENOUGH = 1200  # pixels of a template that are compared, about
 TAKEN = 0.3  # how far a pixel that another object shows still speaks for one behind it
 
 
-def shared(
-    blob: int, rivals: Sequence[tuple[int, Silhouette]], view: View
+def split_blob(
+    blob: int, rivals: Sequence[tuple[int, BlobTrack]], view: Foreground
 ) -> list[tuple[int, Mask]]:
     """What part of a blob each of its claimants has.
 
@@ -39,8 +45,8 @@ def shared(
     ys, xs = np.nonzero(whole)
     tones = view.image[ys, xs]
     costs = [np.empty(0, np.float32)] * len(rivals)
-    for n, dx, dy in _arranged([s for _, s in rivals], whole, view):
-        costs[n] = _cost(rivals[n][1], dx, dy, xs, ys, tones)
+    for n, dx, dy in _placed_templates([s for _, s in rivals], whole, view):
+        costs[n] = _pixel_costs(rivals[n][1], dx, dy, xs, ys, tones)
     winner = np.argmin(costs, axis=0)
     out = []
     for n, (i, _) in enumerate(rivals):
@@ -50,20 +56,22 @@ def shared(
     return out
 
 
-def _arranged(rivals: Sequence[Silhouette], blob: Mask, view: View) -> list[tuple[int, int, int]]:
+def _placed_templates(
+    rivals: Sequence[BlobTrack], blob: Mask, view: Foreground
+) -> list[tuple[int, int, int]]:
     """Number and shift of each object in a blob; the best seen first, the others beside it."""
     free, left, out = blob.astype(np.float32), list(range(len(rivals))), []
     while left:
-        fits = [(sought(rivals[n], free, view), n) for n in left]
+        fits = [(best_template_shift(rivals[n], free, view), n) for n in left]
         (_, dx, dy), n = min(fits)
         left.remove(n)
         out.append((n, dx, dy))
-        where, own = window_of(rivals[n], blob.shape, dx, dy)
-        cut(free, where)[cut(rivals[n].shape, own)] *= TAKEN
+        where, own = template_window(rivals[n], blob.shape, dx, dy)
+        crop(free, where)[crop(rivals[n].shape, own)] *= TAKEN
     return out
 
 
-def sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
+def best_template_shift(s: BlobTrack, blob: Floats, view: Foreground) -> tuple[float, int, int]:
     """The shift from its prediction at which a template fits a blob best.
 
     Args:
@@ -82,8 +90,8 @@ def sought(s: Silhouette, blob: Floats, view: View) -> tuple[float, int, int]:
     return best_shift(view.image, blob, s.shape, tone, corner, reach, step)
 
 
-def _cost(
-    s: Silhouette, dx: int, dy: int, xs: NDArray[np.int64], ys: NDArray[np.int64], tones: Floats
+def _pixel_costs(
+    s: BlobTrack, dx: int, dy: int, xs: NDArray[np.int64], ys: NDArray[np.int64], tones: Floats
 ) -> Floats:
     """How little each of N pixels looks like a part of an object, (N,) float32."""
     pad = 30

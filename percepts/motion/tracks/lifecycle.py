@@ -9,15 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
 from visup.percepts.motion.features.settings import MotionSettings
-from visup.percepts.motion.layers.dense import CLIP
-from visup.percepts.motion.layers.discovery import discover, rate_of, slack_of
-from visup.percepts.motion.layers.layers import distances
-from visup.percepts.motion.tracks.merge_split import NEAR_STEPS, joined
-from visup.percepts.motion.tracks.salience import is_salient, is_swallowing
-from visup.percepts.motion.tracks.scene import Measured, Scene, least_area, moves_like
-from visup.percepts.motion.tracks.tracking import Indices, Motion, Track, Tracks, remember
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.layers.affine import distances
+from visup.percepts.motion.layers.dense_labelling import CLIP, Labelling
+from visup.percepts.motion.layers.layer_discovery import affine_rate, discover_layers, layer_slack
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+from visup.percepts.motion.tracks.measurements import (
+    BaselineMotion,
+    FrameMeasurements,
+    min_region_area,
+)
+from visup.percepts.motion.tracks.merge_split import NEAR_STEPS, merged
+from visup.percepts.motion.tracks.salience import has_absorbed_background, is_salient
+from visup.percepts.motion.tracks.track import PartMotion, Track, Tracks, new_track
+from visup.percepts.motion.tracks.track_fitting import moves_like
+from visup.percepts.motion.tracks.track_update import update_track
 
 LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
 SURE = 200.0  # the same for one that has only just appeared
@@ -25,14 +32,16 @@ BEHIND = 0.3  # share of a cell in which an object is expected behind another
 SLIVER = 3.5  # length over width of a strip that is no object
 
 
-def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> Tracks:
+def initiate(
+    tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings, last_key: int
+) -> Tracks:
     """Add tracks for groups of constraints that no layer explains.
 
     Args:
         tracks: Those known.
         scene: The frame.
         settings: Gives the most tracks.
-        born: How many were born before.
+        last_key: The greatest key given so far.
 
     Returns:
         The known tracks, then the new ones.
@@ -42,35 +51,27 @@ def bear(tracks: Tracks, scene: Scene, settings: MotionSettings, born: int) -> T
     for m in scene.measured:
         c = m.constraints
         free = _unexplained(m, out, scene, owned)
-        for model, index in discover(c, free, scene.image.shape, settings.cell):
+        for model, index in discover_layers(c, free, scene.image.shape, settings.cell):
             if len(out) >= settings.max_regions:
                 return tuple(out)
             share = np.zeros(scene.cells.count, dtype=np.float32)
             share[scene.cell_of(c)[index]] = 1
-            share = scene.cells.reach(share[:, None] > 0, 1)[:, 0] * 0.7 * ~owned
-            born += 1
-            middle = c.xy[index].mean(axis=0)
-            motion = Motion().with_rate(c.lag, rate_of(model, c, scene.time), float(len(index)))
-            t = Track(
-                born,
-                0,
-                scene.time,
-                scene.time,
-                share.astype(np.float32),
-                motions=(motion,),
-                centre=(float(middle[0]), float(middle[1])),
-            )
-            host = _territory(out, share > 0, motion, scene)
+            share = scene.cells.dilated(share[:, None] > 0, 1)[:, 0] * 0.7 * ~owned
+            last_key += 1
+            rate = affine_rate(model, c, scene.time)
+            motion = PartMotion().with_rate(c.lag, rate, float(len(index)))
+            t = new_track(last_key, scene.time, share, motion, c.xy[index].mean(axis=0))
+            host = _former_owner(out, share > 0, motion, scene)
             if host is None:
                 out.append(t)
             else:
-                out[host] = joined(out[host], t)
+                out[host] = merged(out[host], t)
             owned = owned | (share > 0)
     return tuple(out)
 
 
-def _territory(
-    tracks: Sequence[Track], where: NDArray[np.bool_], motion: Motion, scene: Scene
+def _former_owner(
+    tracks: Sequence[Track], where: NDArray[np.bool_], motion: PartMotion, scene: FrameMeasurements
 ) -> int | None:
     """The track that is hidden in most of these cells, or else was of late in most of them."""
     if not where.any():
@@ -78,46 +79,52 @@ def _territory(
     for i, t in enumerate(tracks):
         if (
             t.id
-            and t.hidden is not None
-            and (scene.cells.mean(t.hidden)[where] > BEHIND).mean() > 0.5
+            and t.occluded is not None
+            and (scene.cells.mean(t.occluded)[where] > BEHIND).mean() > 0.5
             and moves_like(motion, t)
         ):
             return i
     for i, t in enumerate(tracks):
-        if not t.id or t.recent is None:
+        if not t.id or t.recent_share is None:
             continue
         # What comes out from behind an object is not a part of it.
         others = [
-            o.own > BEHIND
+            o.predicted_share > BEHIND
             for o in tracks
-            if o is not t and o.hidden is not None and o.own is not None
+            if o is not t and o.occluded is not None and o.predicted_share is not None
         ]
         free = where & ~np.any(others, axis=0) if others else where
         most = np.count_nonzero(free) > 0.5 * np.count_nonzero(where)
-        if most and np.mean(t.recent[free] > 0.3) > 0.5:
+        if most and np.mean(t.recent_share[free] > 0.3) > 0.5:
             return i if moves_like(motion, t) else _uncovered(tracks, i, where, motion, scene)
     return None
 
 
 def _uncovered(
-    tracks: Sequence[Track], host: int, where: NDArray[np.bool_], motion: Motion, scene: Scene
+    tracks: Sequence[Track],
+    host: int,
+    where: NDArray[np.bool_],
+    motion: PartMotion,
+    scene: FrameMeasurements,
 ) -> int | None:
     """Whose part it is that turned up where a track was: the track's, unless another moves so.
 
     What an occluder uncovers moves as what it hid, and lies beside the rest of that.
     """
-    near = scene.cells.reach(where[:, None], NEAR_STEPS)[:, 0]
+    near = scene.cells.dilated(where[:, None], NEAR_STEPS)[:, 0]
     best, most = host, 0
     for i, t in enumerate(tracks):
-        if i != host and t.id and t.own is not None and moves_like(motion, t):
-            there = int(np.count_nonzero(near & ((t.own > BEHIND) | (t.share > BEHIND))))
+        if i != host and t.id and t.predicted_share is not None and moves_like(motion, t):
+            there = int(
+                np.count_nonzero(near & ((t.predicted_share > BEHIND) | (t.share > BEHIND)))
+            )
             if there > most:
                 best, most = i, there
     return best
 
 
 def _unexplained(
-    m: Measured, tracks: Sequence[Track], scene: Scene, owned: NDArray[np.bool_]
+    m: BaselineMotion, tracks: Sequence[Track], scene: FrameMeasurements, owned: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     c = m.constraints
     at = scene.cell_of(c)
@@ -125,72 +132,79 @@ def _unexplained(
     if not (tracks and out.any()):
         return np.asarray(out)
     members = np.stack([t.share for t in tracks], axis=1) > 0.3
-    near = scene.cells.reach(members, NEAR_STEPS)[at]
+    near = scene.cells.dilated(members, NEAR_STEPS)[at]
     for k, t in enumerate(tracks):
         left = np.flatnonzero(out & near[:, k])
         if not len(left):
             continue
         parts = t.predicted(c.lag, c.span_s)
         some = c.take(left)
-        off = np.min([distances(p, some, slack_of(p, t.centre)) for p in parts], axis=0)
+        off = np.min([distances(p, some, layer_slack(p, t.centre)) for p in parts], axis=0)
         out[left] = off >= 16
     return np.asarray(out)
 
 
 def update(
     tracks: Tracks,
-    scene: Scene,
-    posterior: Floats,
-    winner: Indices,
+    scene: FrameMeasurements,
+    labelling: Labelling,
     likelihood: Floats,
     settings: MotionSettings,
 ) -> Tracks:
-    """Bring each track's shape and evidence up to date with the posterior."""
-    least = 0.3 * least_area(scene, settings)
-    at = winner[scene.at]
+    """Bring each track's shape and evidence up to date with the posterior.
+
+    Args:
+        tracks: K tracks, predicted.
+        scene: The frame.
+        labelling: Labels of its superpixels.
+        likelihood: (N, K + 2) float32, log likelihood of the labels at the points.
+        settings: Gives the least area of a region.
+    """
+    least = 0.3 * min_region_area(scene, settings)
+    at = labelling.winner[scene.at]
     out = []
     for k, t in enumerate(tracks, 1):
         gain = np.clip(likelihood[:, k] - likelihood[:, 0], -CLIP, CLIP)[at == k]
         t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
-        out.append(remember(t, posterior, winner, k, scene.cells, scene.time, least))
+        out.append(update_track(t, k, labelling, scene.cells, scene.time, least))
     return tuple(out)
 
 
-def bury(tracks: Tracks, scene: Scene, settings: MotionSettings) -> Tracks:
+def delete(tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings) -> Tracks:
     """Drop what was never confirmed and is gone, and what has been hidden too long."""
     out = []
     for t in tracks:
-        gone = scene.time - t.seen
+        gone = scene.time - t.last_seen
         if t.id == 0:
             keep = gone <= 0.2 and t.evidence > -20
         else:
-            keep = gone <= (settings.memory_s if t.hidden is not None else 0.5)
+            keep = gone <= (settings.memory_s if t.occluded is not None else 0.5)
             # As surely the background as it had to be something else to be told.
-            keep = keep and t.evidence > -LIKELY and not is_swallowing(t, scene)
+            keep = keep and t.evidence > -LIKELY and not has_absorbed_background(t, scene)
         if keep:
             out.append(t)
     keys = {t.key for t in out}
-    return tuple(_with_known(t, keys) for t in out)
+    return tuple(_without_keys_of_deleted(t, keys) for t in out)
 
 
-def _with_known(t: Track, keys: set[int]) -> Track:
+def _without_keys_of_deleted(t: Track, keys: set[int]) -> Track:
     """A track that has forgotten how it stood to others than these: keys never come back."""
-    if t.apart.keys() <= keys and t.alike.keys() <= keys:
+    if t.separate_s.keys() <= keys and t.merge_votes.keys() <= keys:
         return t
 
     def known(values: Mapping[int, float]) -> Mapping[int, float]:
         return MappingProxyType({k: v for k, v in values.items() if k in keys})
 
-    return replace(t, apart=known(t.apart), alike=known(t.alike))
+    return replace(t, separate_s=known(t.separate_s), merge_votes=known(t.merge_votes))
 
 
-def _is_thin(t: Track, scene: Scene) -> bool:
+def _is_thin(t: Track, scene: FrameMeasurements) -> bool:
     """Whether no cell of a track lies inside it: such a one must move more surely to be told."""
     rest = t.share <= 0.5
-    return bool(scene.cells.reach(rest[:, None], 1)[:, 0].all())
+    return bool(scene.cells.dilated(rest[:, None], 1)[:, 0].all())
 
 
-def _is_sliver(t: Track, scene: Scene) -> bool:
+def _is_sliver(t: Track, scene: FrameMeasurements) -> bool:
     """Whether a thin track is a long strip.
 
     Where two backgrounds meet, and along a straight edge that tells of one component of motion
@@ -205,31 +219,33 @@ def _is_sliver(t: Track, scene: Scene) -> bool:
 
 
 def confirm(
-    tracks: Tracks, scene: Scene, ids: int, settings: MotionSettings, sought: Sequence[bool]
-) -> tuple[Tracks, int]:
+    tracks: Tracks,
+    scene: FrameMeasurements,
+    ids: IdAllocator,
+    settings: MotionSettings,
+    sought: Sequence[bool],
+) -> Tracks:
     """Give public ids to tracks that have lasted and surely move.
 
     Args:
         tracks: All tracks.
         scene: The frame.
-        ids: The last public id given.
+        ids: Gives them.
         settings: Says how long is lasting.
         sought: Which tracks lie where cogitation asked to look: half as much will do for those.
-
-    Returns:
-        The tracks and the last public id given.
     """
     out = []
     for t, wanted in zip(tracks, sought, strict=True):
         need = 0.5 if wanted else 1.0
-        if not t.id and t.seen == scene.time and _is_sure(t, scene, settings, need):
-            ids += 1
-            t = replace(t, id=ids)
+        if not t.id and t.last_seen == scene.time and _is_confirmed(t, scene, settings, need):
+            t = replace(t, id=ids.new())
         out.append(t)
-    return tuple(out), ids
+    return tuple(out)
 
 
-def _is_sure(t: Track, scene: Scene, settings: MotionSettings, need: float) -> bool:
+def _is_confirmed(
+    t: Track, scene: FrameMeasurements, settings: MotionSettings, need: float
+) -> bool:
     """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
     thin = _is_thin(t, scene)
     if t.frames < 2 or t.evidence < need * (2 if thin else 1) * LIKELY:
@@ -238,5 +254,5 @@ def _is_sure(t: Track, scene: Scene, settings: MotionSettings, need: float) -> b
         return False
     if t.evidence > need * SURE and is_salient(t, scene, at_once=True, need=need):
         return True
-    lasts = t.frames >= 3 and scene.time - t.born >= need * settings.confirm_s
+    lasts = t.frames >= 3 and scene.time - t.initiated >= need * settings.confirm_s
     return lasts and is_salient(t, scene, need=need)

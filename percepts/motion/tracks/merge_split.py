@@ -11,12 +11,22 @@ from scipy.sparse.csgraph import connected_components
 
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
-from visup.percepts.motion.layers._layers_jit import quantile
-from visup.percepts.motion.layers.discovery import middle, rate_of, same_motion, slack_of
-from visup.percepts.motion.layers.layers import Affine, distances, fit_affine
+from visup.percepts.motion.layers._affine_jit import quantile
+from visup.percepts.motion.layers.affine import Affine, distances, fit_affine
+from visup.percepts.motion.layers.layer_discovery import (
+    affine_rate,
+    layer_slack,
+    median_motion,
+    same_motion,
+)
+from visup.percepts.motion.tracks.measurements import (
+    BaselineMotion,
+    FrameMeasurements,
+    min_region_area,
+)
 from visup.percepts.motion.tracks.salience import LITTLE_BORDER, border_share
-from visup.percepts.motion.tracks.scene import Measured, Scene, least_area, moves_like
-from visup.percepts.motion.tracks.tracking import Indices, Motion, Track, Tracks
+from visup.percepts.motion.tracks.track import Indices, PartMotion, Track, Tracks, new_track
+from visup.percepts.motion.tracks.track_fitting import moves_like
 
 NEAR_STEPS = 4  # cells between tracks that touch
 APART_S = 1.5
@@ -27,8 +37,12 @@ SURROUNDED = 0.75  # share of what is around a track that is one other, of which
 CONTACT = 5.0  # affinity of two cells that are flat and of one tone
 
 
-def absorb(
-    tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings, born: int
+def assign_unknown(
+    tracks: Tracks,
+    scene: FrameMeasurements,
+    winner: Indices,
+    settings: MotionSettings,
+    last_key: int,
 ) -> Tracks:
     """Give parts that move as no layer does to the track that they touch, or make them tracks.
 
@@ -42,23 +56,23 @@ def absorb(
     for i in range(count):
         part = np.zeros(scene.cells.count, dtype=bool)
         part[unknown[number == i]] = True
-        ring = scene.cells.reach(part[:, None], 1)[:, 0] & ~part
+        ring = scene.cells.dilated(part[:, None], 1)[:, 0] & ~part
         # Whose place it was counts first, then whom it touches.
-        k = _most(scene.owner[part], len(tracks), 0.3)
-        k = _most(winner[ring], len(tracks), 0.25) if k is None else k
+        k = _majority(scene.owner[part], len(tracks), 0.3)
+        k = _majority(winner[ring], len(tracks), 0.25) if k is None else k
         size = scene.cells.area[part].sum()
         if k is not None:
             share = np.where(part, 1, out[k].share).astype(np.float32)
             out[k] = replace(out[k], share=share)
-        elif size > least_area(scene, settings):
-            t = _alone(part, scene, born + 1)
+        elif size > min_region_area(scene, settings):
+            t = _unknown_track(part, scene, last_key + 1)
             if t is not None and len(out) < settings.max_regions:
-                born += 1
+                last_key += 1
                 out.append(t)
     return tuple(out)
 
 
-def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: Scene) -> bool:
+def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: FrameMeasurements) -> bool:
     """Whether a part is too large, and reaches too far beyond the image, for a limb of its host."""
     area = scene.cells.area
     return bool(
@@ -67,7 +81,7 @@ def _is_ground(part: NDArray[np.bool_], host: NDArray[np.bool_], scene: Scene) -
     )
 
 
-def _most(labels: Indices, count: int, share: float) -> int | None:
+def _majority(labels: Indices, count: int, share: float) -> int | None:
     """The track, from 0, that has more than a share of some labels and more than any other."""
     if not count or not len(labels):
         return None
@@ -76,7 +90,7 @@ def _most(labels: Indices, count: int, share: float) -> int | None:
     return k if numbers[k] > share * len(labels) else None
 
 
-def _alone(part: NDArray[np.bool_], scene: Scene, key: int) -> Track | None:
+def _unknown_track(part: NDArray[np.bool_], scene: FrameMeasurements, key: int) -> Track | None:
     """A new track for cells that move as no layer does; None when there is too little to go by."""
     c = scene.measured[0].constraints
     inside = np.flatnonzero(part[scene.cell_of(c)])
@@ -84,23 +98,14 @@ def _alone(part: NDArray[np.bool_], scene: Scene, key: int) -> Track | None:
         return None
     weight = np.zeros(len(c), dtype=np.float32)
     weight[inside] = 1
-    start = middle(c, inside)
-    fit = fit_affine(c, weight, start, slack=slack_of(start))
-    motion = Motion().with_rate(c.lag, rate_of(fit, c, scene.time), float(len(inside)))
+    start = median_motion(c, inside)
+    fit = fit_affine(c, weight, start, slack=layer_slack(start))
+    motion = PartMotion().with_rate(c.lag, affine_rate(fit, c, scene.time), float(len(inside)))
     centre = scene.cells.centre[part].mean(axis=0)
-    return Track(
-        key,
-        0,
-        scene.time,
-        scene.time,
-        part.astype(np.float32),
-        motions=(motion,),
-        centre=(float(centre[0]), float(centre[1])),
-        evidence=10.0,
-    )
+    return new_track(key, scene.time, part, motion, centre, evidence=10.0)
 
 
-def release(tracks: Tracks, scene: Scene, winner: Indices) -> Tracks:
+def split_occluded(tracks: Tracks, scene: FrameMeasurements, winner: Indices) -> Tracks:
     """Give back to a hidden track what its occluder holds but what moves as the hidden one did.
 
     The occluder has gone on: where points move as the track did when it was last in view, and not
@@ -108,9 +113,9 @@ def release(tracks: Tracks, scene: Scene, winner: Indices) -> Tracks:
     """
     out = list(tracks)
     for j, t in enumerate(tracks):
-        if not t.id or not t.mostly_hidden or t.hidden is None:
+        if not t.id or not t.mostly_occluded or t.occluded is None:
             continue
-        there = scene.cells.mean(t.hidden) > 0.5
+        there = scene.cells.mean(t.occluded) > 0.5
         for k, o in enumerate(tracks):
             held = there & (winner == k + 1)
             if k != j and held.any() and _moves_as(t, o, held, scene):
@@ -124,7 +129,9 @@ def release(tracks: Tracks, scene: Scene, winner: Indices) -> Tracks:
     return tuple(out)
 
 
-def _moves_as(hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: Scene) -> bool:
+def _moves_as(
+    hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: FrameMeasurements
+) -> bool:
     """Whether points in some cells move as a hidden track did, and not as its occluder."""
     m = scene.measured[-1]
     c = m.constraints
@@ -133,8 +140,8 @@ def _moves_as(hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: S
     if np.count_nonzero(inside) < 6 or rate is None or c.span_s > 0.7:
         return False
     own, other = np.zeros((2, 3)), np.zeros((2, 3))
-    own[:, 2] = np.asarray(hidden.pace) * c.span_s
-    other[:, 2] = np.asarray(occluder.pace) * c.span_s
+    own[:, 2] = np.asarray(hidden.unoccluded_velocity) * c.span_s
+    other[:, 2] = np.asarray(occluder.unoccluded_velocity) * c.span_s
     if np.hypot(*(own[:, 2] - other[:, 2])) < 1.0:
         return False
     to_own = np.median(distances(Affine(own), c, 0.3)[inside])
@@ -142,7 +149,9 @@ def _moves_as(hidden: Track, occluder: Track, where: NDArray[np.bool_], scene: S
     return bool(to_own < 6 and to_other > 16)
 
 
-def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSettings) -> Tracks:
+def merge_tracks(
+    tracks: Tracks, scene: FrameMeasurements, winner: Indices, settings: MotionSettings
+) -> Tracks:
     """Join tracks that were never seen apart and again and again move as one.
 
     Two objects that came together stay two, however rigidly they are coupled: they have been seen
@@ -151,23 +160,23 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
     if len(tracks) < 2:
         return tracks
     members = winner[:, None] == np.arange(1, len(tracks) + 1)
-    ring = scene.cells.reach(members, 1) & ~members
-    near = scene.cells.reach(members | ring, NEAR_STEPS - 1)
+    ring = scene.cells.dilated(members, 1) & ~members
+    near = scene.cells.dilated(members | ring, NEAR_STEPS - 1)
     touch = (near.astype(np.float32).T @ members.astype(np.float32)) > 0
     around = ring.astype(np.float32).T @ members.astype(np.float32)
     inside = around > SURROUNDED * ring.sum(axis=0)[:, None]
-    grown = _grown_together(scene, winner, len(tracks))
+    grown = _without_edge_between(scene, winner, len(tracks))
     seen = members.any(axis=0)
     touch = (touch | touch.T) & seen & seen[:, None]
     moving = _moving(scene, members)
-    out = _kept_apart(tracks, (seen & seen[:, None]) & ~touch, scene.seconds)
+    out = _with_separation_time(tracks, (seen & seen[:, None]) & ~touch, scene.seconds)
     for j in range(len(tracks) - 1, 0, -1):
         for i in np.flatnonzero(touch[:j, j]):
             a, b = out[i], out[j]
-            apart = a.apart.get(b.key, 0.0)
-            if apart > APART_S or not _may_join(a, b, members[:, i], members[:, j], scene):
+            apart = a.separate_s.get(b.key, 0.0)
+            if apart > APART_S or not _may_merge(a, b, members[:, i], members[:, j], scene):
                 continue
-            votes = a.alike.get(b.key, 0.0)
+            votes = a.merge_votes.get(b.key, 0.0)
             # One all but surrounded by the other is a part of it.
             if grown[i, j] or inside[i, j] or inside[j, i]:
                 votes += 1.0
@@ -175,23 +184,23 @@ def merge(tracks: Tracks, scene: Scene, winner: Indices, settings: MotionSetting
                 both = tuple(bool(m[i] and m[j]) for m in moving)
                 votes += _vote(scene, a, members[:, i], members[:, j], both)
             votes = max(votes, -VOTES)
-            out[i] = replace(a, alike=_with(a.alike, b.key, votes))
+            out[i] = replace(a, merge_votes=_with(a.merge_votes, b.key, votes))
             if votes >= VOTES:
-                out[i] = joined(out[i], b)
+                out[i] = merged(out[i], b)
                 out[j] = replace(b, id=-1)
                 break
     return tuple(t for t in out if t.id >= 0)
 
 
-def _may_join(
-    a: Track, b: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], scene: Scene
+def _may_merge(
+    a: Track, b: Track, in_a: NDArray[np.bool_], in_b: NDArray[np.bool_], scene: FrameMeasurements
 ) -> bool:
     """Whether one is not the ground on which the other goes; what was told is no ground.
 
     What goes behind another is surrounded by it at last, and is no part of it for that.
     """
     if bool(a.id) == bool(b.id):
-        return not (a.id and (a.mostly_hidden or b.mostly_hidden))
+        return not (a.id and (a.mostly_occluded or b.mostly_occluded))
     told, other = (in_a, in_b) if a.id else (in_b, in_a)
     return not _is_ground(other, told, scene)
 
@@ -200,18 +209,20 @@ def _with(values: Mapping[int, float], key: int, value: float) -> Mapping[int, f
     return MappingProxyType({**values, key: value})
 
 
-def _kept_apart(tracks: Tracks, apart: NDArray[np.bool_], seconds: float) -> list[Track]:
+def _with_separation_time(tracks: Tracks, apart: NDArray[np.bool_], seconds: float) -> list[Track]:
     """The tracks with the time for which each was seen apart from those behind it."""
     out = []
     for i, t in enumerate(tracks):
         others = [tracks[j].key for j in np.flatnonzero(apart[i]) if j > i]
-        longer = {key: t.apart.get(key, 0.0) + seconds for key in others}
-        out.append(replace(t, apart=MappingProxyType({**t.apart, **longer})) if longer else t)
+        longer = {key: t.separate_s.get(key, 0.0) + seconds for key in others}
+        out.append(
+            replace(t, separate_s=MappingProxyType({**t.separate_s, **longer})) if longer else t
+        )
     return out
 
 
 def _vote(
-    scene: Scene,
+    scene: FrameMeasurements,
     a: Track,
     in_a: NDArray[np.bool_],
     in_b: NDArray[np.bool_],
@@ -227,12 +238,14 @@ def _vote(
         mine, other = in_a[at], in_b[at]
         if not both:
             continue
-        same = same_motion(c, mine, other, start, slack_of(start, a.centre))
+        same = same_motion(c, mine, other, start, layer_slack(start, a.centre))
         votes += 0.0 if same is None else (1.0 if same else -1.0)
     return votes
 
 
-def _grown_together(scene: Scene, winner: Indices, count: int) -> NDArray[np.bool_]:
+def _without_edge_between(
+    scene: FrameMeasurements, winner: Indices, count: int
+) -> NDArray[np.bool_]:
     """(count, count): whether no image edge parts two tracks where they touch, as links of an arm."""
     link = scene.cells.link
     strong = np.flatnonzero(link.data > CONTACT)
@@ -244,7 +257,7 @@ def _grown_together(scene: Scene, winner: Indices, count: int) -> NDArray[np.boo
     return out
 
 
-def _moving(scene: Scene, members: NDArray[np.bool_]) -> list[list[bool]]:
+def _moving(scene: FrameMeasurements, members: NDArray[np.bool_]) -> list[list[bool]]:
     """Which of K tracks with (count, K) members are told to move, over each baseline."""
     return [
         [_moves(m, mine) for mine in members[scene.cell_of(m.constraints)].T]
@@ -252,14 +265,14 @@ def _moving(scene: Scene, members: NDArray[np.bool_]) -> list[list[bool]]:
     ]
 
 
-def _moves(m: Measured, which: NDArray[np.bool_]) -> bool:
+def _moves(m: BaselineMotion, which: NDArray[np.bool_]) -> bool:
     """Whether these constraints tell that something moves against the background."""
     if np.count_nonzero(which) < 4:
         return False
     return quantile(m.background.distances(m.constraints)[which], 0.7) > 9
 
 
-def joined(a: Track, b: Track) -> Track:
+def merged(a: Track, b: Track) -> Track:
     """Two tracks as one.
 
     Args:
@@ -270,20 +283,23 @@ def joined(a: Track, b: Track) -> Track:
         The first with the cells and motions of both.
     """
     ids = [i for i in (a.id, b.id) if i]
-    apart = {k: max(a.apart.get(k, 0.0), b.apart.get(k, 0.0)) for k in {*a.apart, *b.apart}}
+    apart = {
+        k: max(a.separate_s.get(k, 0.0), b.separate_s.get(k, 0.0))
+        for k in {*a.separate_s, *b.separate_s}
+    }
     return replace(
         a,
         id=min(ids) if ids else 0,
-        born=min(a.born, b.born),
+        initiated=min(a.initiated, b.initiated),
         share=np.clip(a.share + b.share, 0, 1),
         motions=_parts(a.motions + b.motions),
         evidence=a.evidence + b.evidence,
         frames=max(a.frames, b.frames),
-        apart=MappingProxyType(apart),
+        separate_s=MappingProxyType(apart),
     )
 
 
-def _parts(motions: tuple[Motion, ...]) -> tuple[Motion, ...]:
+def _parts(motions: tuple[PartMotion, ...]) -> tuple[PartMotion, ...]:
     """The best supported motions, few enough that they do not explain everything."""
     keep = sorted(range(len(motions)), key=lambda i: -motions[i].support)[:MOST_PARTS]
     return tuple(motions[i] for i in sorted(keep))

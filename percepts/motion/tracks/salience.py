@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.fast_replace import replace
-from visup.percepts.motion.features.image import Floats
 from visup.percepts.motion.features.superpixels import Superpixels
-from visup.percepts.motion.layers.camera_model import slack_of
-from visup.percepts.motion.layers.discovery import middle
-from visup.percepts.motion.layers.layers import Affine, Doubles, distances, fit_affine
-from visup.percepts.motion.tracks.scene import Measured, Scene
-from visup.percepts.motion.tracks.tracking import Indices, Track
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.layers.affine import Affine, Doubles, distances, fit_affine
+from visup.percepts.motion.layers.background_motion import background_slack
+from visup.percepts.motion.layers.layer_discovery import median_motion
+from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
+from visup.percepts.motion.tracks.track import Indices, Track
 
 LEAST_GONE = 1.0  # pixels against the background: less is told of leaves as well
 FAR_GONE = 4.0  # pixels, for a track too young to have swung back yet
@@ -45,7 +45,9 @@ FOOT = 0.15  # share of the height of a region that is its foot
 AHEAD = 0.4  # how much faster than the background, the same way, a near thing that rests may go
 
 
-def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track, ...]:
+def update_salience(
+    tracks: Sequence[Track], scene: FrameMeasurements, winner: Indices
+) -> tuple[Track, ...]:
     """Add up how far each track has gone from its surroundings, and how well they explain it.
 
     Args:
@@ -59,38 +61,49 @@ def weigh(tracks: Sequence[Track], scene: Scene, winner: Indices) -> tuple[Track
     young = [k for k, t in enumerate(tracks, 1) if not t.id]
     members = winner[:, None] == np.asarray(young, dtype=winner.dtype)
     # Points of its own outline may lie in the cells right beside it.
-    beside = scene.cells.reach(members, 1)
-    rings = scene.cells.reach(beside, RING_STEPS - 1) & ~beside & (winner == 0)[:, None]
+    beside = scene.cells.dilated(members, 1)
+    rings = scene.cells.dilated(beside, RING_STEPS - 1) & ~beside & (winner == 0)[:, None]
     ring_of = dict(zip(young, rings.T, strict=True))
     return tuple(
-        _watched(t, k, scene, winner) if t.id else _weighed(t, k, scene, winner, ring_of[k])
+        _confirmed_updated(t, k, scene, winner)
+        if t.id
+        else _candidate_updated(t, k, scene, winner, ring_of[k])
         for k, t in enumerate(tracks, 1)
     )
 
 
-def rests(t: Track, scene: Scene) -> bool:
+def is_stationary(t: Track, scene: FrameMeasurements) -> bool:
     """Whether an object does not move against the background over the baselines of this frame.
 
     Then motion tells nothing of where it ends: slow objects show over the longer baselines, and one
     that has stopped stays as it was.
     """
-    seen = [t.explained.get(_octave(m), 0.0) for m in scene.measured]
+    seen = [t.background_fit.get(_octave(m), 0.0) for m in scene.measured]
     return bool(t.id) and min(seen) > RESTS
 
 
-def is_swallowing(t: Track, scene: Scene) -> bool:
+def stationary_cells(tracks: Sequence[Track], scene: FrameMeasurements) -> NDArray[np.bool_]:
+    """(count,) bool: superpixels of objects that do not move against the background."""
+    out = np.zeros(scene.cells.count, dtype=bool)
+    for t in tracks:
+        if is_stationary(t, scene):
+            out |= t.share > 0.5
+    return out
+
+
+def has_absorbed_background(t: Track, scene: FrameMeasurements) -> bool:
     """Whether an object has grown over the background until that explains all of it.
 
     What has stopped is explained as well, but has not grown since it moved.
     """
     area = float(scene.cells.area[t.share > 0.5].sum())
-    rests_always = bool(t.id) and min(t.explained.values(), default=0.0) > RESTS
+    rests_always = bool(t.id) and min(t.background_fit.values(), default=0.0) > RESTS
     return rests_always and area > GROWN * max(t.moving_area, 1.0)
 
 
-def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
+def _confirmed_updated(t: Track, k: int, scene: FrameMeasurements, winner: Indices) -> Track:
     """Note how well the background explains an object, over each baseline."""
-    explained = dict(t.explained)
+    explained = dict(t.background_fit)
     for m in scene.measured:
         mine = winner[scene.cell_of(m.constraints)] == k
         if np.count_nonzero(mine) >= FEWEST:
@@ -98,61 +111,73 @@ def _watched(t: Track, k: int, scene: Scene, winner: Indices) -> Track:
     area = t.moving_area
     if min(explained.values(), default=1.0) < EXPLAINED:
         area = float(scene.cells.area[winner == k].sum())
-    return replace(t, explained=MappingProxyType(explained), moving_area=area)
+    return replace(t, background_fit=MappingProxyType(explained), moving_area=area)
 
 
-def _weighed(t: Track, k: int, scene: Scene, winner: Indices, ring: NDArray[np.bool_]) -> Track:
-    explained, borne = dict(t.explained), dict(t.borne)
-    foot = foot_of(winner == k, scene.cells)
+def _candidate_updated(
+    t: Track, k: int, scene: FrameMeasurements, winner: Indices, ring: NDArray[np.bool_]
+) -> Track:
+    explained, borne = dict(t.background_fit), dict(t.long_baseline_course)
+    foot = foot_point(winner == k, scene.cells)
     for m in scene.measured:
         at = scene.cell_of(m.constraints)
         mine, around = winner[at] == k, ring[at]
         local = tuple(
-            model for model in (surroundings(m, around), standing(m, foot)) if model is not None
+            model
+            for model in (surrounding_motion(m, around), upright_motion(m, foot))
+            if model is not None
         )
         if np.count_nonzero(mine) >= FEWEST:
             _note(explained, m, _misfit(m, local)[mine])
         if m is scene.measured[0]:
-            t = _gone_on(t, m, local, scene)
+            t = _with_step(t, m, local, scene)
         _note_course(borne, t, m, local, scene)
-    return replace(t, explained=MappingProxyType(explained), borne=MappingProxyType(borne))
+    return replace(
+        t, background_fit=MappingProxyType(explained), long_baseline_course=MappingProxyType(borne)
+    )
 
 
-def _gone_on(t: Track, m: Measured, local: Sequence[Affine], scene: Scene) -> Track:
+def _with_step(
+    t: Track, m: BaselineMotion, local: Sequence[Affine], scene: FrameMeasurements
+) -> Track:
     """Add the step of a frame, if it was seen: what was not measured again has gone nowhere."""
     if not any(rate.time == scene.time for rate in t.motions[0].rates.values()):
         return t
-    step = _apart(t.brisk() * scene.seconds, t, m, local)
-    gone = t.gone[0] + float(step[0]), t.gone[1] + float(step[1])
-    return replace(t, gone=gone, way=t.way + float(np.hypot(*step)))
+    step = _displacement_from_background(t.instant_velocity() * scene.seconds, t, m, local)
+    gone = t.displacement[0] + float(step[0]), t.displacement[1] + float(step[1])
+    return replace(t, displacement=gone, path_length=t.path_length + float(np.hypot(*step)))
 
 
 def _note_course(
-    borne: dict[int, float], t: Track, m: Measured, local: Sequence[Affine], scene: Scene
+    borne: dict[int, float],
+    t: Track,
+    m: BaselineMotion,
+    local: Sequence[Affine],
+    scene: FrameMeasurements,
 ) -> None:
     """Note how much of the way gone step by step shows over a baseline longer than a swing."""
     rate = t.motions[0].rates.get(m.constraints.lag)
     if m.constraints.span_s < SWING_S or rate is None or rate.time != scene.time:
         return
-    age = scene.time - t.born + scene.seconds
-    way = t.way * min(1.0, m.constraints.span_s / age)
-    net = _apart(rate.velocity(t.centre) * rate.span_s, t, m, local)
+    age = scene.time - t.initiated + scene.seconds
+    way = t.path_length * min(1.0, m.constraints.span_s / age)
+    net = _displacement_from_background(rate.velocity(t.centre) * rate.span_s, t, m, local)
     borne[_octave(m)] = float(np.hypot(*net)) / max(way, 1e-6)
 
 
-def _note(explained: dict[int, float], m: Measured, misfit: NDArray[np.float32]) -> None:
+def _note(explained: dict[int, float], m: BaselineMotion, misfit: NDArray[np.float32]) -> None:
     """Bring the running share of points that are explained over a baseline up to date."""
     share = float(np.mean(misfit < FITS))
     before = explained.get(_octave(m), share)
     explained[_octave(m)] = before + FOLLOW * (share - before)
 
 
-def _octave(m: Measured) -> int:
+def _octave(m: BaselineMotion) -> int:
     """Number of a baseline: those of nearly one length, as a video begins, are one."""
     return round(float(np.log2(m.constraints.lag)))
 
 
-def surroundings(m: Measured, around: NDArray[np.bool_]) -> Affine | None:
+def surrounding_motion(m: BaselineMotion, around: NDArray[np.bool_]) -> Affine | None:
     """The motion of what surrounds a region over one baseline; None when too little is seen of it.
 
     Args:
@@ -166,10 +191,12 @@ def surroundings(m: Measured, around: NDArray[np.bool_]) -> Affine | None:
     if len(index) < FEWEST_AROUND:
         return None
     c = m.constraints
-    return fit_affine(c, around.astype(np.float32), middle(c, index), rigidity=1.0, slack=0.2)
+    return fit_affine(
+        c, around.astype(np.float32), median_motion(c, index), rigidity=1.0, slack=0.2
+    )
 
 
-def foot_of(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, float] | None:
+def foot_point(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, float] | None:
     """(x, y) of the lowest part of a region; None when it is empty or the image cuts it there.
 
     Args:
@@ -186,7 +213,7 @@ def foot_of(mine: NDArray[np.bool_], cells: Superpixels) -> tuple[float, float] 
     return float(np.average(cells.centre[low, 0], weights=cells.area[low])), float(bottom)
 
 
-def standing(m: Measured, foot: tuple[float, float] | None) -> Affine | None:
+def upright_motion(m: BaselineMotion, foot: tuple[float, float] | None) -> Affine | None:
     """The motion of a thing at rest that stands upright on the ground, seen by a camera that travels.
 
     It is as far away as the ground at its foot, so all of it goes as the background does there:
@@ -199,15 +226,17 @@ def standing(m: Measured, foot: tuple[float, float] | None) -> Affine | None:
     return Affine(matrix)
 
 
-def _misfit(m: Measured, local: Sequence[Affine]) -> NDArray[np.float32]:
+def _misfit(m: BaselineMotion, local: Sequence[Affine]) -> NDArray[np.float32]:
     """Squared distance of each constraint to the background or the surroundings, what fits best."""
     out, c = m.background.distances(m.constraints), m.constraints
     for model in local:
-        out = np.minimum(out, distances(model, c, slack_of(model, c)))
+        out = np.minimum(out, distances(model, c, background_slack(model, c)))
     return out
 
 
-def is_salient(t: Track, scene: Scene, *, at_once: bool = False, need: float = 1.0) -> bool:
+def is_salient(
+    t: Track, scene: FrameMeasurements, *, at_once: bool = False, need: float = 1.0
+) -> bool:
     """Whether a track has left its place, on a course, over some baseline clearly.
 
     What takes up much of the image border is not surrounded by a ground, it is one: a near wall,
@@ -225,15 +254,15 @@ def is_salient(t: Track, scene: Scene, *, at_once: bool = False, need: float = 1
     """
     if border_share(t.share, scene.cells) > (LITTLE_BORDER if at_once else MOST_BORDER):
         return False
-    gone = float(np.hypot(*t.gone))
-    explained = min(t.explained.values(), default=0.0)
-    straight, borne = gone >= STRAIGHT * t.way, _is_borne_out(t)
+    gone = float(np.hypot(*t.displacement))
+    explained = min(t.background_fit.values(), default=0.0)
+    straight, borne = gone >= STRAIGHT * t.path_length, _is_borne_out(t)
     if at_once:
         # Steps of slow things are half noise: a longer baseline tells better of their course.
         course = straight if borne is None else borne
         clear = explained < CLEAR / need and gone >= need * NEAR_GONE
         return clear and course and not _runs_ahead(t, scene)
-    least = LEAST_GONE if scene.time - t.born >= need * SWING_S else FAR_GONE
+    least = LEAST_GONE if scene.time - t.initiated >= need * SWING_S else FAR_GONE
     # Leaves that happen to swing one way feed a track, step after step, and then others do.
     course = straight and borne is not False
     return explained < EXPLAINED / need and gone >= need * least and course
@@ -241,7 +270,11 @@ def is_salient(t: Track, scene: Scene, *, at_once: bool = False, need: float = 1
 
 def _is_borne_out(t: Track) -> bool | None:
     """Whether the longest baseline shows the way gone step by step; None if none is long enough."""
-    return t.borne[max(t.borne)] >= STRAIGHT if t.borne else None
+    return (
+        t.long_baseline_course[max(t.long_baseline_course)] >= STRAIGHT
+        if t.long_baseline_course
+        else None
+    )
 
 
 def border_share(share: Floats, cells: Superpixels) -> float:
@@ -251,19 +284,21 @@ def border_share(share: Floats, cells: Superpixels) -> float:
     return float(np.mean(share[border] > 0.5))
 
 
-def _runs_ahead(t: Track, scene: Scene) -> bool:
+def _runs_ahead(t: Track, scene: FrameMeasurements) -> bool:
     """Whether a track moves as the background does, only faster: as near things at rest do."""
     ground = np.asarray(scene.measured[0].background.models[-1].shift(t.centre))
     speed = float(np.hypot(*ground))
     if speed < 1.0:
         return False
-    more = t.brisk() * scene.seconds - ground
+    more = t.instant_velocity() * scene.seconds - ground
     along = float(more @ ground) / speed**2
     across = abs(float(more[0] * ground[1] - more[1] * ground[0])) / speed**2
     return along > 0 and across < along + AHEAD
 
 
-def _apart(moved: Doubles, t: Track, m: Measured, local: Sequence[Affine]) -> Doubles:
+def _displacement_from_background(
+    moved: Doubles, t: Track, m: BaselineMotion, local: Sequence[Affine]
+) -> Doubles:
     """(x, y) pixels that a track moved against the background nearest to its motion."""
     models = (*m.background.models, *local)
     ways = [moved - np.asarray(b.shift(t.centre)) for b in models]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from visup.percepts.motion.features.image import Floats
-from visup.percepts.motion.tracks.scene import Scene
-from visup.percepts.motion.tracks.tracking import Track
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
+from visup.percepts.motion.tracks.track import Track
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looked:
+class SegmentationTrace:
     """The workings of one step; for reading only.
 
     Attributes:
@@ -21,7 +21,7 @@ class Looked:
             superpixel.
     """
 
-    scene: Scene
+    scene: FrameMeasurements
     tracks: tuple[Track, ...]
     keys: tuple[int, ...]
     posterior: Floats

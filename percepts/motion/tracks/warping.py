@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.motion.features._superpixels_jit import means_of_half
-from visup.percepts.motion.features.image import Floats, WorkImage
+from visup.percepts.motion.features._superpixels_jit import half_size_means
 from visup.percepts.motion.features.superpixels import Superpixels
-from visup.percepts.motion.layers.layers import Affine
-from visup.percepts.motion.tracks.scene import Scene
-from visup.percepts.motion.tracks.tracking import Track
+from visup.percepts.motion.features.work_image import Floats, WorkImage
+from visup.percepts.motion.layers.affine import Affine
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
+from visup.percepts.motion.tracks.track import Track
 
 
 def flow_back(new: NDArray[np.uint8], old: NDArray[np.uint8], engine: cv2.DISOpticalFlow) -> Floats:
@@ -23,7 +23,7 @@ def flow_back(new: NDArray[np.uint8], old: NDArray[np.uint8], engine: cv2.DISOpt
     return np.asarray(engine.calc(new, old, np.zeros((*new.shape, 2), np.float32)))
 
 
-def compare(
+def warp_likelihood(
     new: WorkImage,
     old: WorkImage,
     models: Sequence[Affine],
@@ -53,7 +53,7 @@ def compare(
     return np.multiply(off, np.float32(-0.5), out=off)
 
 
-def precision_of(image: WorkImage, noise: float, box: tuple[int, int, int, int]) -> Floats:
+def grey_precision(image: WorkImage, noise: float, box: tuple[int, int, int, int]) -> Floats:
     """Inverse variance to expect of a warped image's grey values, (h, w) float32.
 
     Where the image is steep, a small error of the motion makes a large one of the grey value.
@@ -86,8 +86,12 @@ def _warp(grey: NDArray[np.uint8], model: Affine, box: tuple[int, int, int, int]
     return cv2.warpAffine(grey, back, (w, h), flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
 
-def warped(
-    scene: Scene, tracks: Sequence[Track], old: WorkImage, near: NDArray[np.bool_], noise: float
+def dense_likelihood(
+    scene: FrameMeasurements,
+    tracks: Sequence[Track],
+    old: WorkImage,
+    near: NDArray[np.bool_],
+    noise: float,
 ) -> Floats:
     """Dense evidence: which motion brings the older image to look like the newest one.
 
@@ -108,8 +112,10 @@ def warped(
     if not any_near.any():
         return out
     box = _halved(cells.box(any_near), cells)
-    precision = precision_of(scene.image, noise, box)
-    zero = _cell_mean(cells, compare(scene.image, old, m.background.models, box, precision), box)
+    precision = grey_precision(scene.image, noise, box)
+    zero = _cell_mean(
+        cells, warp_likelihood(scene.image, old, m.background.models, box, precision), box
+    )
     out[any_near, 0] = zero[any_near]
     out[any_near, 1:] = -4.5
     for k, t in enumerate(tracks, 1):
@@ -118,7 +124,7 @@ def warped(
             models = t.predicted(c.lag, c.span_s)
             x, y, w, h = own = _halved(cells.box(near[:, k - 1]), cells)
             there = np.s_[y - box[1] : y - box[1] + h, x - box[0] : x - box[0] + w]
-            fit = compare(scene.image, old, models, own, precision[there])
+            fit = warp_likelihood(scene.image, old, models, own, precision[there])
             out[mine, k] = _cell_mean(cells, fit, own)[mine]
             hid = mine[_was_hidden(scene, mine, models[0], k)]
             out[hid, 0] = np.maximum(out[hid, 0], out[hid, k])
@@ -126,7 +132,9 @@ def warped(
     return out
 
 
-def _was_hidden(scene: Scene, which: NDArray[np.int64], model: Affine, k: int) -> NDArray[np.bool_]:
+def _was_hidden(
+    scene: FrameMeasurements, which: NDArray[np.int64], model: Affine, k: int
+) -> NDArray[np.bool_]:
     """Which of some cells, were they background, the track would have hidden in the older image.
 
     There the background need not look as it does now, so a poor comparison says nothing against it.
@@ -155,4 +163,4 @@ def _halved(box: tuple[int, int, int, int], cells: Superpixels) -> tuple[int, in
 
 def _cell_mean(cells: Superpixels, values: Floats, box: tuple[int, int, int, int]) -> Floats:
     """Mean of a map of a box, at half the size, in each cell; 0 where none of its pixels is seen."""
-    return means_of_half(cells.labels, np.ascontiguousarray(values), box, cells.count)
+    return half_size_means(cells.labels, np.ascontiguousarray(values), box, cells.count)

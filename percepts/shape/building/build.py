@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.percepts.shape.building.parts import Part, made, parts_of, read_part
-from visup.percepts.shape.building.views import half_sphere_directions, load_mesh, render_views
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.database.directions import merged
-from visup.percepts.shape.index.records import NewView
+from visup.percepts.shape.building.build_parts import BuildPart, is_made, parts_of, read_part
+from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.database.view_directions import merge_symmetric
+from visup.percepts.shape.index.view_records import NewView
 from visup.percepts.shape.matching.exemplars import medoids, similarity_matrix
-from visup.percepts.shape.matching.similarity import shape_of
+from visup.percepts.shape.matching.shape_similarity import shape_of
 from visup.percepts.shape.silhouette.silhouette import binary_picture, looks_cut, normalise
 
 VIEWS = 32
@@ -122,7 +122,7 @@ def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
         DatabaseError: The file is no mesh.
         ExtraMissingError: What renders meshes is not installed.
     """
-    return merged(rendered(mesh, half_sphere_directions(count, seed)))
+    return merge_symmetric(rendered(mesh, half_sphere_directions(count, seed)))
 
 
 def rendered(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
@@ -219,7 +219,7 @@ def build_database(
 
     def stored() -> Iterator[NewView]:
         for parts in every:
-            yield from merged([v for part in parts for v in read_part(part)])
+            yield from merge_symmetric([v for part in parts for v in read_part(part)])
         for name, masks in silhouettes.items():
             yield from silhouette_views(name, masks, clusters)
 
@@ -244,11 +244,11 @@ def _check_names(meshes: Sequence[Path]) -> None:
         )
 
 
-def _make(parts: Sequence[Part], jobs: int, progress: Progress | None) -> None:
+def _make(parts: Sequence[BuildPart], jobs: int, progress: Progress | None) -> None:
     """Make all parts that are not made yet."""
     done, total = 0, sum(p.count for p in parts)
 
-    def tell(part: Part) -> None:
+    def tell(part: BuildPart) -> None:
         nonlocal done
         done += part.count
         if progress is not None:
@@ -256,7 +256,7 @@ def _make(parts: Sequence[Part], jobs: int, progress: Progress | None) -> None:
 
     left = []
     for part in parts:
-        if made(part):
+        if is_made(part):
             tell(part)
         else:
             left.append(part)
@@ -276,7 +276,7 @@ def _make(parts: Sequence[Part], jobs: int, progress: Progress | None) -> None:
             raise
 
 
-def make_part(part: Part) -> None:
+def make_part(part: BuildPart) -> None:
     """Render a part's views and keep them in its file.
 
     Raises:

@@ -21,27 +21,27 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.database.storage import (
-    Contents,
+    FileContents,
     damaged,
     open_checked,
     read_contents,
     read_shape,
 )
-from visup.percepts.shape.index.records import Direction, NotAsExpectedError, View, decode
-from visup.percepts.shape.matching.similarity import Shape
+from visup.percepts.shape.index.view_records import Direction, InvalidRecordError, ModelView, decode
+from visup.percepts.shape.matching.shape_similarity import Shape
 
 KEPT = 4096
 """Shapes kept in memory at most, about 20 kB each."""
 
 
-class Views(Sequence[View]):
+class Views(Sequence[ModelView]):
     """The views of a database.
 
     Args:
         contents: What stands in the file.
     """
 
-    def __init__(self, contents: Contents) -> None:
+    def __init__(self, contents: FileContents) -> None:
         self._contents = contents
 
     @classmethod
@@ -57,22 +57,22 @@ class Views(Sequence[View]):
         return len(self._contents.views)
 
     @overload
-    def __getitem__(self, key: int) -> View: ...
+    def __getitem__(self, key: int) -> ModelView: ...
     @overload
-    def __getitem__(self, key: slice) -> tuple[View, ...]: ...
-    def __getitem__(self, key: int | slice) -> View | tuple[View, ...]:
+    def __getitem__(self, key: slice) -> tuple[ModelView, ...]: ...
+    def __getitem__(self, key: int | slice) -> ModelView | tuple[ModelView, ...]:
         """A view by its number in the file, from 0; or some of them."""
         if isinstance(key, slice):
             return tuple(self._view(k) for k in range(len(self))[key])
         return self._view(range(len(self))[key])
 
-    def __iter__(self) -> Iterator[View]:
+    def __iter__(self) -> Iterator[ModelView]:
         return (self._view(k) for k in range(len(self)))
 
-    def _view(self, number: int) -> View:
+    def _view(self, number: int) -> ModelView:
         row = self.records[number]
         direction = None if np.isnan(row["direction"][0]) else _direction(row["direction"])
-        return View(
+        return ModelView(
             id=number + 1,
             name=self.names[row["model"]],
             number=int(row["number"]),
@@ -90,7 +90,7 @@ class Views(Sequence[View]):
 
     @property
     def records(self) -> NDArray[Any]:
-        """(V,) records of `records.VIEW`: all that is known but the shapes."""
+        """(V,) records of `view_records.VIEW`: all that is known but the shapes."""
         return self._contents.views
 
     @property
@@ -171,9 +171,9 @@ class Shapes(Sequence[Shape]):
         stored = read_shape(self._path, self._file, number)
         try:
             return decode(stored, self._views.records[number])
-        except NotAsExpectedError as e:
+        except InvalidRecordError as e:
             raise _damaged_shape(self._path, number, e) from e
 
 
-def _damaged_shape(path: Path, number: int, found: NotAsExpectedError) -> DatabaseError:
+def _damaged_shape(path: Path, number: int, found: InvalidRecordError) -> DatabaseError:
     return damaged(path, f"view {number + 1} with {found}", "a rooted graph and its outline")

@@ -1,9 +1,9 @@
 """The search: from a shape to the views that it looks like, best first.
 
-Whole shapes: the index leaves the likeliest views; their areas and outlines are compared at once, then their
-shock graphs, until no other view can do better. Shapes that the image border cuts: the views that look
-most like it once they are cut in the same way (`cuts.py`) are compared likewise, their graphs as a whole
-of which the shape is a part.
+Whole shapes: the index leaves the likeliest views; their areas and outlines are compared at once, then
+their shock graphs, until no other view can do better. Shapes that the image border cuts: the views that
+look most like it once they are cut in the same way (`truncated_views.py`) are compared likewise, their
+graphs as a whole of which the shape is a part.
 """
 
 from __future__ import annotations
@@ -16,18 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.database.catalogue import Shapes, Views
-from visup.percepts.shape.index.index import Summaries, ViewIndex
-from visup.percepts.shape.index.records import View
+from visup.percepts.shape.index.view_index import ViewIndex, ViewSummaries
+from visup.percepts.shape.index.view_records import ModelView
 from visup.percepts.shape.matching.graph_matching import (
-    Match,
+    GraphMatch,
     MatchWeights,
     match_ceiling,
     match_nodes,
 )
-from visup.percepts.shape.matching.similarity import GRAPH_SHARE, Likeness, Shape, second_looks
-from visup.percepts.shape.matching.truncated import Cut, CutIndex, query_map, what_is_left
+from visup.percepts.shape.matching.shape_similarity import (
+    GRAPH_SHARE,
+    Likeness,
+    Shape,
+    compare_outlines_and_areas,
+)
+from visup.percepts.shape.matching.truncated_views import CutIndex, CutLine, cut_outline, query_map
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
-from visup.percepts.shape.silhouette.areas import Overlaps
+from visup.percepts.shape.silhouette.area_overlap import AreaOverlaps
 
 CUT_SHARE = 0.95
 """What a likeness counts for which a whole view had to be cut: where to cut is free to fit."""
@@ -50,9 +55,9 @@ class ViewMatch:
         cut: Where the view was cut to look like a silhouette that the image border cuts.
     """
 
-    view: View
+    view: ModelView
     likeness: Likeness
-    cut: Cut | None = None
+    cut: CutLine | None = None
 
     @property
     def similarity(self) -> float:
@@ -95,7 +100,7 @@ class Ranking:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class SearchLimits:
     """What is wanted of a search.
 
     Attributes:
@@ -128,7 +133,7 @@ class Wanted:
         return found[-1].similarity if len(found) >= self.top else self.threshold
 
 
-class Search:
+class ViewSearch:
     """Searches the views of a database.
 
     Args:
@@ -144,7 +149,7 @@ class Search:
     def index(self) -> ViewIndex:
         """The sieves that leave the likeliest views."""
         rows = self._views.records
-        return ViewIndex(self._shapes, summaries=Summaries.read(rows))
+        return ViewIndex(self._shapes, summaries=ViewSummaries.read(rows))
 
     @cached_property
     def _part_index(self) -> ViewIndex:
@@ -158,7 +163,7 @@ class Search:
         self,
         query: Shape,
         among: NDArray[np.intp],
-        wanted: Wanted,
+        wanted: SearchLimits,
         favoured: NDArray[np.intp] | None = None,
     ) -> Ranking:
         """The views that a shape looks like as it is.
@@ -171,7 +176,7 @@ class Search:
         """
         likely = self.index.candidates(query, among, wanted.most, favoured)
         shapes = [self._shapes[k] for k in likely.numbers]
-        looks = second_looks(query, shapes, likely.overlaps, mirror=wanted.mirror)
+        looks = compare_outlines_and_areas(query, shapes, likely.overlaps, mirror=wanted.mirror)
         ceilings = GRAPH_SHARE * likely.bounds + looks.worth
         found: list[ViewMatch] = []
         for n in np.argsort(-ceilings, kind="stable"):
@@ -186,7 +191,7 @@ class Search:
             found = wanted.best([*found, ViewMatch(self._views[number], likeness)])
         return Ranking(tuple(found), len(likely.numbers))
 
-    def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> Match:
+    def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> GraphMatch:
         """Graphs matched in their own order, so that the result does not depend on who asks."""
         a, b = query.graph, self._shapes[number].graph
         root = self.index.weights.root
@@ -194,7 +199,7 @@ class Search:
             return match_nodes(b, a, similar.T, root).turned()
         return match_nodes(a, b, similar, root)
 
-    def cut(self, query: Shape, among: NDArray[np.intp], wanted: Wanted) -> Ranking:
+    def cut(self, query: Shape, among: NDArray[np.intp], wanted: SearchLimits) -> Ranking:
         """The whole views that a shape looks like which the image border cuts.
 
         Args:
@@ -210,7 +215,7 @@ class Search:
         own = query_map(query.contour, border)
         likely = self._cut_index.likeliest(own, among, wanted.most, mirror=wanted.mirror)
         left = [_left_of(self._shapes[number], cut) for number, cut in likely]
-        looks = second_looks(query, left, _covered([c for _, c in likely], border))
+        looks = compare_outlines_and_areas(query, left, _covered([c for _, c in likely], border))
         found: list[ViewMatch] = []
         for n in np.argsort(-looks.worth, kind="stable"):
             if CUT_SHARE * (GRAPH_SHARE + float(looks.worth[n])) < wanted.least(found):
@@ -224,7 +229,7 @@ class Search:
             found = wanted.best([*found, ViewMatch(self._views[number], lowered, cut)])
         return Ranking(tuple(found), len(likely))
 
-    def _part(self, query: Shape, number: int, cut: Cut, least: float) -> Match:
+    def _part(self, query: Shape, number: int, cut: CutLine, least: float) -> GraphMatch:
         """The query's graph as a part of a view's, in the view's unit of length.
 
         Where they cannot give so much to the similarity as is needed, nothing is matched.
@@ -232,16 +237,16 @@ class Search:
         graph = _scaled(query.graph, (1.0 - cut.share) ** 0.5)
         bounds, similar = self._part_index.bounds(graph, np.array([number]), part=True)
         if GRAPH_SHARE * bounds[0] < least:
-            return Match(0.0, ())
+            return GraphMatch(0.0, ())
         return match_nodes(graph, self._shapes[number].graph, similar[0], 0.0, part=True)
 
 
-def _left_of(whole: Shape, cut: Cut) -> Shape:
+def _left_of(whole: Shape, cut: CutLine) -> Shape:
     """What a cut leaves of a shape; its graph stays that of the whole."""
-    return replace(whole, contour=what_is_left(whole.contour, cut), cut=True)
+    return replace(whole, contour=cut_outline(whole.contour, cut), cut=True)
 
 
-def _covered(cuts: Sequence[Cut], border: float) -> Overlaps:
+def _covered(cuts: Sequence[CutLine], border: float) -> AreaOverlaps:
     """How what cuts leave lies on the silhouette: the border tells the rotation."""
     mirrored = np.array([c.mirrored for c in cuts], dtype=bool)
     alike = np.array([c.similarity for c in cuts])
@@ -250,7 +255,7 @@ def _covered(cuts: Sequence[Cut], border: float) -> Overlaps:
     turned = np.angle(np.exp(1j * (border + bearings - np.pi)))
     # A cut is found for one side only: the other counts nothing.
     similarity = np.stack([np.where(mirrored, 0.0, alike), np.where(mirrored, alike, 0.0)], axis=1)
-    return Overlaps(similarity, np.stack([straight, turned], axis=1))
+    return AreaOverlaps(similarity, np.stack([straight, turned], axis=1))
 
 
 def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:

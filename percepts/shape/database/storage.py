@@ -23,13 +23,14 @@ from pathlib import Path
 import numpy as np
 
 from visup.agent.model.errors import DatabaseError
-from visup.percepts.shape.index.records import (
+from visup.percepts.shape.index.outline_sketch import sketch
+from visup.percepts.shape.index.view_records import (
     ALSO,
     LAYOUT,
     POINT,
     VIEW,
+    InvalidRecordError,
     NewView,
-    NotAsExpectedError,
     Records,
     ShapeBytes,
     check_nodes,
@@ -37,8 +38,7 @@ from visup.percepts.shape.index.records import (
     node_records,
     records,
 )
-from visup.percepts.shape.index.sketch import sketch
-from visup.percepts.shape.silhouette.outline import outline_heights
+from visup.percepts.shape.silhouette.height_functions import outline_heights
 
 APPLICATION_ID = 0x76697375
 """'visu' in ASCII, in the header of every database file."""
@@ -67,7 +67,7 @@ _BUILD_HINT = "build it anew with 'visup models build'"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contents:
+class FileContents:
     """All that stands in a file but the shapes.
 
     Attributes:
@@ -94,7 +94,7 @@ def write_new(path: Path, views: Iterable[NewView]) -> None:
         for table in _TABLES:
             file.execute(table)
         file.executemany("INSERT INTO layout VALUES (?, ?)", LAYOUT.items())
-        _insert(file, Contents((), np.empty(0, VIEW), np.empty(0, ALSO)), views)
+        _insert(file, FileContents((), np.empty(0, VIEW), np.empty(0, ALSO)), views)
 
 
 def write_more(path: Path, views: Iterable[NewView]) -> None:
@@ -133,7 +133,7 @@ def _replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _insert(file: sqlite3.Connection, before: Contents, views: Iterable[NewView]) -> None:
+def _insert(file: sqlite3.Connection, before: FileContents, views: Iterable[NewView]) -> None:
     """Append views in blocks; models new to the file get the next codes."""
     codes = {name: code for code, name in enumerate(before.names)}
     numbers = dict(enumerate(np.bincount(before.views["model"], minlength=len(codes)).tolist()))
@@ -277,7 +277,7 @@ def _check_tables(path: Path, file: sqlite3.Connection) -> None:
         )
 
 
-def read_contents(path: Path) -> Contents:
+def read_contents(path: Path) -> FileContents:
     """All that stands in a database but the shapes.
 
     Raises:
@@ -290,12 +290,12 @@ def read_contents(path: Path) -> Contents:
             _check_views(views, also, len(names))
             (last,) = file.execute("SELECT max(view) FROM shapes").fetchone()
             if (-1 if last is None else last) != len(views) - 1:
-                raise NotAsExpectedError("other views than shapes")
-        except NotAsExpectedError as e:
+                raise InvalidRecordError("other views than shapes")
+        except InvalidRecordError as e:
             raise damaged(path, str(e), "what 'visup models' writes") from e
         except _UNREADABLE as e:
             raise _unreadable(path, e) from e
-    return Contents(names, views, also)
+    return FileContents(names, views, also)
 
 
 def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:
@@ -303,12 +303,12 @@ def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:
     for code, name, crc in file.execute("SELECT code, name, crc FROM models ORDER BY code"):
         # A damaged tree may lead round in circles: codes that do not count up end the reading.
         if code != len(names) or not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
-            raise NotAsExpectedError(f"model {len(names)} without a name")
+            raise InvalidRecordError(f"model {len(names)} without a name")
         if crc != _sum(code, name.encode()):
-            raise NotAsExpectedError(f"a wrong check sum of model {code}")
+            raise InvalidRecordError(f"a wrong check sum of model {code}")
         names.append(name)
     if len(set(names)) < len(names):
-        raise NotAsExpectedError("two models of one name")
+        raise InvalidRecordError("two models of one name")
     return tuple(names)
 
 
@@ -317,11 +317,11 @@ def _read_blocks(file: sqlite3.Connection) -> tuple[Records, Records]:
     query = "SELECT number, views, also, crc FROM blocks ORDER BY number"
     for expected, (number, data, further, crc) in enumerate(file.execute(query)):
         if number != expected:
-            raise NotAsExpectedError(f"block {expected} is missing")
+            raise InvalidRecordError(f"block {expected} is missing")
         rows = records(data, VIEW, 1, BLOCK, f"views in block {number}")
         others = records(further, ALSO, 0, BLOCK * 10_000, f"directions in block {number}")
         if crc != _sum(number, data, further):
-            raise NotAsExpectedError(f"a wrong check sum of block {number}")
+            raise InvalidRecordError(f"a wrong check sum of block {number}")
         views.append(rows)
         also.append(others)
     return np.concatenate(views), np.concatenate(also)
@@ -335,12 +335,12 @@ def _check_views(views: Records, also: Records, models: int) -> None:
     """
     used = np.unique(views["model"])
     if len(used) and int(used[-1]) >= models:
-        raise NotAsExpectedError("a view of no model")
+        raise InvalidRecordError("a view of no model")
     if len(used) < models:
-        raise NotAsExpectedError("a model without views")
+        raise InvalidRecordError("a model without views")
     expected = _numbers_within(views["model"])
     if not np.array_equal(views["number"], expected):
-        raise NotAsExpectedError("views that are not numbered")
+        raise InvalidRecordError("views that are not numbered")
     directions = np.concatenate([views["direction"], also["direction"]])
     length = np.linalg.norm(directions, axis=1)
     unknown = np.isnan(directions).all(axis=1)
@@ -356,7 +356,7 @@ def _check_views(views: Records, also: Records, models: int) -> None:
         (np.diff(also["view"].astype(np.int64)) >= 0, "directions in disorder"),
     ):
         if not bool(sound.all()):
-            raise NotAsExpectedError(what)
+            raise InvalidRecordError(what)
     check_nodes(views["root"])
 
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.database.database import ModelDatabase, Ranking, ViewMatch
+from visup.percepts.shape.database.model_database import ModelDatabase, Ranking, ViewMatch
 from visup.percepts.shape.drawing.sheet import (
     BODY,
     COLOURS,
@@ -26,9 +26,9 @@ from visup.percepts.shape.drawing.sheet import (
     Sheet,
     legend,
 )
-from visup.percepts.shape.matching.similarity import Shape, shape_of
+from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
 from visup.percepts.shape.shocks.shock_graph import ShockGraph, shock_graph
-from visup.percepts.shape.shocks.shocks import Kind, label_branch
+from visup.percepts.shape.shocks.shock_labels import ShockKind, label_branch
 from visup.percepts.shape.shocks.skeleton import skeletonise
 from visup.percepts.shape.silhouette.silhouette import Silhouette
 
@@ -79,7 +79,7 @@ def _draw_graph(sheet: Sheet, graph: ShockGraph, place: Place, radius: float = 3
 
 
 def _colour(graph: ShockGraph, node: int) -> Colour:
-    return COLOURS.get(Kind(int(graph.kinds[node])), INK)
+    return COLOURS.get(ShockKind(int(graph.kinds[node])), INK)
 
 
 def contact_sheet(database: ModelDatabase, names: Sequence[str] | None = None) -> NDArray[np.uint8]:
@@ -344,10 +344,10 @@ def ascii_shocks(silhouette: Silhouette, columns: int = 40) -> str:
     return "\n".join("".join(line).rstrip() for line in text)
 
 
-def _labelled_points(silhouette: Silhouette) -> list[tuple[NDArray[np.float64], Kind]]:
+def _labelled_points(silhouette: Silhouette) -> list[tuple[NDArray[np.float64], ShockKind]]:
     """Points along the skeleton with their kinds; necks and seeds last, so that they show on top."""
     skeleton = skeletonise(silhouette.contour)
-    found: list[tuple[NDArray[np.float64], Kind]] = []
+    found: list[tuple[NDArray[np.float64], ShockKind]] = []
     for branch in skeleton.branches:
         points = skeleton.points[branch]
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -356,5 +356,7 @@ def _labelled_points(silhouette: Silhouette) -> list[tuple[NDArray[np.float64], 
             dense = np.stack([np.interp(at, along, points[:, k]) for k in (0, 1)], axis=1)
             found += [(p, shock.kind) for p in dense]
     graph = shock_graph(silhouette)
-    spots = [n for n in range(1, len(graph)) if graph.kinds[n] in (Kind.NECK, Kind.SEED)]
-    return found + [(graph.positions[n].astype(float), Kind(int(graph.kinds[n]))) for n in spots]
+    spots = [n for n in range(1, len(graph)) if graph.kinds[n] in (ShockKind.NECK, ShockKind.SEED)]
+    return found + [
+        (graph.positions[n].astype(float), ShockKind(int(graph.kinds[n]))) for n in spots
+    ]

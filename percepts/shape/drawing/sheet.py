@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from visup.percepts.shape.shocks.shocks import Kind
+from visup.percepts.shape.shocks.shock_labels import ShockKind
 
 Colour = tuple[int, int, int]
 """Red, green, blue."""
@@ -23,11 +23,11 @@ RULE: Colour = (224, 227, 232)
 BODY: Colour = (226, 230, 236)
 OUTLINE: Colour = (150, 158, 170)
 
-COLOURS: dict[Kind, Colour] = {
-    Kind.PROTRUSION: (230, 126, 20),
-    Kind.NECK: (208, 38, 58),
-    Kind.BEND: (36, 150, 72),
-    Kind.SEED: (38, 108, 214),
+COLOURS: dict[ShockKind, Colour] = {
+    ShockKind.PROTRUSION: (230, 126, 20),
+    ShockKind.NECK: (208, 38, 58),
+    ShockKind.BEND: (36, 150, 72),
+    ShockKind.SEED: (38, 108, 214),
 }
 """Colour of each kind of shock."""
 

@@ -11,9 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.matching.graph_matching import match
-from visup.percepts.shape.matching.similarity import GRAPH_SHARE, Shape, second_looks
-from visup.percepts.shape.silhouette.areas import AreaIndex
+from visup.percepts.shape.matching.graph_matching import match_graphs
+from visup.percepts.shape.matching.shape_similarity import (
+    GRAPH_SHARE,
+    Shape,
+    compare_outlines_and_areas,
+)
+from visup.percepts.shape.silhouette.area_overlap import AreaIndex
 
 
 def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
@@ -21,8 +25,10 @@ def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
     out = np.eye(len(shapes))
     index = AreaIndex(np.stack([s.areas for s in shapes]))
     for i, shape in enumerate(shapes):
-        looks = second_looks(shape, shapes[:i], index.overlaps(shape.areas, np.arange(i)))
-        graphs = np.array([match(shape.graph, o.graph).similarity for o in shapes[:i]])
+        looks = compare_outlines_and_areas(
+            shape, shapes[:i], index.overlaps(shape.areas, np.arange(i))
+        )
+        graphs = np.array([match_graphs(shape.graph, o.graph).similarity for o in shapes[:i]])
         out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + looks.worth
     return out
 

@@ -50,7 +50,7 @@ WEIGHTS = MatchWeights()
 
 
 @dataclass(frozen=True, slots=True)
-class Match:
+class GraphMatch:
     """What two graphs have in common.
 
     Attributes:
@@ -61,9 +61,9 @@ class Match:
     similarity: float
     pairs: tuple[tuple[int, int, float], ...]
 
-    def turned(self) -> Match:
+    def turned(self) -> GraphMatch:
         """The same with the graphs exchanged."""
-        return Match(self.similarity, tuple((v, u, s) for u, v, s in self.pairs))
+        return GraphMatch(self.similarity, tuple((v, u, s) for u, v, s in self.pairs))
 
 
 def embed(graph: ShockGraph, weights: MatchWeights = WEIGHTS) -> NDArray[np.float32]:
@@ -87,7 +87,7 @@ def node_similarities(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray
     return np.asarray(np.exp(-np.maximum(squares, 0.0)), dtype=np.float32)
 
 
-def match(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) -> Match:
+def match_graphs(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) -> GraphMatch:
     """Match two graphs.
 
     Args:
@@ -99,7 +99,7 @@ def match(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) -> Matc
         The similarity, the same whichever comes first, and the corresponding nodes.
     """
     if b.key < a.key:
-        return match(b, a, weights).turned()
+        return match_graphs(b, a, weights).turned()
     similar = node_similarities(embed(a, weights), embed(b, weights))
     return match_nodes(a, b, similar, weights.root)
 
@@ -111,7 +111,7 @@ def match_nodes(
     root: float,
     *,
     part: bool = False,
-) -> Match:
+) -> GraphMatch:
     """Match two graphs whose nodes are compared already.
 
     Args:
@@ -131,7 +131,7 @@ def match_nodes(
     whole = float(similar[0, 0])
     total = sum(worth for _, _, worth in pairs)
     found = ((0, 0, whole), *((u, v, float(similar[u, v])) for u, v, _ in pairs))
-    return Match(min(1.0, root * whole + (1 - root) * total), found)
+    return GraphMatch(min(1.0, root * whole + (1 - root) * total), found)
 
 
 def match_ceiling(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> float:

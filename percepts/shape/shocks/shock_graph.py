@@ -7,7 +7,7 @@ a bend or protrusion has at most two parents, one for each of its ends. Each nod
 looks like (radii along it, length) and what the shape looks like from it, so that nodes can be
 compared without looking at edges.
 
-Read next: `signature.py`, then `match.py`.
+Read next: `topological_signature.py`, then `graph_matching.py`.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.shocks.context import (
-    Places,
+from visup.percepts.shape.shocks.shock_labels import ShockKind, label_branch
+from visup.percepts.shape.shocks.skeletal_context import (
+    SkeletonPlaces,
     SkeletonTree,
     directed_contexts,
     whole_context,
 )
-from visup.percepts.shape.shocks.shocks import Kind, label_branch
-from visup.percepts.shape.shocks.signature import descendants
-from visup.percepts.shape.shocks.signature import signatures as topological_signatures
 from visup.percepts.shape.shocks.skeleton import Skeleton, skeletonise
+from visup.percepts.shape.shocks.topological_signature import descendants
+from visup.percepts.shape.shocks.topological_signature import signatures as topological_signatures
 from visup.percepts.shape.silhouette.silhouette import Silhouette
 
 PROFILE = 8
@@ -55,18 +55,18 @@ class ShockGraph:
     Lengths are in units of the square root of the silhouette's area, about its centroid, y down.
 
     Attributes:
-        kinds: (N,) int8, `Kind` of each node.
+        kinds: (N,) int8, `ShockKind` of each node.
         edges: (M, 2) int16, (parent, child), sorted.
         weights: (N,) float32, share of the skeleton's length that each node stands for, every node a
             little longer than it is; they sum to 1, and the root's is 0.
         lengths: (N,) float32, length along the skeleton; 0 for necks, seeds and the root.
         profiles: (N, PROFILE) float32, radius from the node's thicker end to its thinner.
         contexts: (N, CONTEXT) float32, how much of the shape lies how far and in which direction from
-            the node, see `context.py`; rows but the root's sum to 1.
+            the node, see `skeletal_context.py`; rows but the root's sum to 1.
         positions: (N, 2) float32, (x, y) of the node's middle.
         directions: (N, 2) float32, unit vector along the node at its middle, away from the greater
             part of the shape; 0 for points.
-        signatures: (N, signature.LENGTH) float32, topological signature vectors.
+        signatures: (N, topological_signature.LENGTH) float32, topological signature vectors.
         below: (N, N) bool, row u marks u and its descendants.
         key: Digest of the content; orders graphs where an order must not depend on the caller.
     """
@@ -88,10 +88,10 @@ class ShockGraph:
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _PlacedShock:
     """A shock and where it lies: on which branch, between which offsets, thicker end first."""
 
-    kind: Kind
+    kind: ShockKind
     branch: int
     thick: float
     thin: float
@@ -134,11 +134,11 @@ def shock_graph(silhouette: Silhouette) -> ShockGraph:
 
 def _parts_and_links(
     skeleton: Skeleton, tree: SkeletonTree
-) -> tuple[list[_Part], list[tuple[int, int]]]:
+) -> tuple[list[_PlacedShock], list[tuple[int, int]]]:
     """Shocks of the whole skeleton and (parent, child) pairs between them, without the root."""
     if not skeleton.branches:
-        return [_Part(Kind.SEED, 0, 0.0, 0.0, (0, 0), float(skeleton.radii[0]))], []
-    parts: list[_Part] = []
+        return [_PlacedShock(ShockKind.SEED, 0, 0.0, 0.0, (0, 0), float(skeleton.radii[0]))], []
+    parts: list[_PlacedShock] = []
     meets: dict[int, list[int]] = {}
     for number, branch in enumerate(skeleton.branches):
         for part in _parts_of_branch(skeleton, branch, number, tree.offsets(number)):
@@ -153,7 +153,7 @@ def _parts_and_links(
 
 def _parts_of_branch(
     skeleton: Skeleton, branch: NDArray[np.intp], number: int, along: NDArray[np.float64]
-) -> list[_Part]:
+) -> list[_PlacedShock]:
     radii = skeleton.radii[branch]
     parts = []
     for shock in label_branch(radii, along):
@@ -161,22 +161,24 @@ def _parts_of_branch(
         thick, thin = (a, b) if radii[a] >= radii[b] else (b, a)
         ends = (int(branch[thick]), int(branch[thin]))
         mean = float(radii[a : b + 1].mean())
-        parts.append(_Part(shock.kind, number, float(along[thick]), float(along[thin]), ends, mean))
+        parts.append(
+            _PlacedShock(shock.kind, number, float(along[thick]), float(along[thin]), ends, mean)
+        )
     return parts
 
 
-def _link(point: int, meeting: Sequence[int], parts: list[_Part]) -> list[tuple[int, int]]:
+def _link(point: int, meeting: Sequence[int], parts: list[_PlacedShock]) -> list[tuple[int, int]]:
     """Parent and children among the parts that meet at one skeleton point."""
-    spots = [p for p in meeting if parts[p].kind in (Kind.NECK, Kind.SEED)]
+    spots = [p for p in meeting if parts[p].kind in (ShockKind.NECK, ShockKind.SEED)]
     runs = [p for p in meeting if p not in spots]
     if spots:
         node = spots[0]
-        is_seed = parts[node].kind is Kind.SEED
+        is_seed = parts[node].kind is ShockKind.SEED
         return [(node, r) if is_seed else (r, node) for r in runs]
-    if all(parts[r].kind is Kind.PROTRUSION and parts[r].ends[0] == point for r in runs):
+    if all(parts[r].kind is ShockKind.PROTRUSION and parts[r].ends[0] == point for r in runs):
         first = parts[runs[0]]
         at, radius = first.thick, max(parts[r].mean for r in runs)
-        parts.append(_Part(Kind.SEED, first.branch, at, at, (point, point), radius))
+        parts.append(_PlacedShock(ShockKind.SEED, first.branch, at, at, (point, point), radius))
         return [(len(parts) - 1, r) for r in runs]
     if len(runs) < 2:
         return []
@@ -185,8 +187,8 @@ def _link(point: int, meeting: Sequence[int], parts: list[_Part]) -> list[tuple[
 
 
 def _ordered(
-    parts: list[_Part], links: list[tuple[int, int]]
-) -> tuple[list[_Part], NDArray[np.int16]]:
+    parts: list[_PlacedShock], links: list[tuple[int, int]]
+) -> tuple[list[_PlacedShock], NDArray[np.int16]]:
     """Parts in the order of their node numbers, and all edges, those from the root among them."""
     order = _order(parts, links)
     number = {p: n + 1 for n, p in enumerate(order)}
@@ -196,7 +198,7 @@ def _ordered(
     return [parts[p] for p in order], np.array(edges, dtype=np.int16).reshape(-1, 2)
 
 
-def _order(parts: list[_Part], links: list[tuple[int, int]]) -> list[int]:
+def _order(parts: list[_PlacedShock], links: list[tuple[int, int]]) -> list[int]:
     """Part numbers, parents before children, longer first; the shortest dropped when too many."""
     lengths = np.array([p.length for p in parts])
     kept = set(np.argsort(-lengths, kind="stable")[:MOST_NODES].tolist())
@@ -213,12 +215,12 @@ def _order(parts: list[_Part], links: list[tuple[int, int]]) -> list[int]:
 
 
 def _assemble(
-    silhouette: Silhouette, tree: SkeletonTree, parts: list[_Part], edges: NDArray[np.int16]
+    silhouette: Silhouette, tree: SkeletonTree, parts: list[_PlacedShock], edges: NDArray[np.int16]
 ) -> ShockGraph:
     """Measure the nodes and freeze the arrays."""
     branch = np.array([p.branch for p in parts])
     thick, thin = np.array([(p.thick, p.thin) for p in parts]).T
-    middle = Places(branch, 0.5 * (thick + thin))
+    middle = SkeletonPlaces(branch, 0.5 * (thick + thin))
     positions = tree.points_at(branch, middle.offset)
     area = _sample_area(silhouette)
     homes, thickness = _explain_area(area, tree)
@@ -243,7 +245,7 @@ def _assemble(
 
 def _directions(
     tree: SkeletonTree,
-    middle: Places,
+    middle: SkeletonPlaces,
     lengths: NDArray[np.float64],
     onwards: NDArray[np.float64],
 ) -> NDArray[np.float64]:
@@ -298,9 +300,9 @@ def _sample_area(silhouette: Silhouette) -> NDArray[np.float64]:
 
 def _explain_area(
     area: NDArray[np.float64], tree: SkeletonTree
-) -> tuple[Places, NDArray[np.float64]]:
+) -> tuple[SkeletonPlaces, NDArray[np.float64]]:
     """The place on the skeleton whose disc holds each point of the area deepest, and its radius."""
     power = -2 * area @ tree.points.T
     power += (tree.points**2).sum(axis=1) - tree.radii**2
     best = power.argmin(axis=1)
-    return Places(tree.places.branch[best], tree.places.offset[best]), tree.radii[best]
+    return SkeletonPlaces(tree.places.branch[best], tree.places.offset[best]), tree.radii[best]

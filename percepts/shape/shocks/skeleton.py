@@ -7,7 +7,7 @@ the inscribed circle (the circularity residual of Ogniewicz and Kubler, Hierarch
 1995). The residual only grows towards the middle of a shape, so that pruning by it leaves a connected
 tree; on a disc it is zero everywhere and the centre alone is left.
 
-Read next: `shocks.py`.
+Read next: `shock_labels.py`.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
-from visup.percepts.shape.silhouette.areas import area_map
-from visup.percepts.shape.silhouette.islands import joined
+from visup.percepts.shape.silhouette.area_overlap import area_map
+from visup.percepts.shape.silhouette.fragments import join_fragments
 
 SMOOTHING = 0.015
 """Standard deviation of the Gaussian, as a share of the square root of the area."""
@@ -52,7 +52,7 @@ class Silhouette:
         unit: Pixels of the source image per unit of length; the square root of `area`.
         area: Area in the source image, holes filled, pixels squared.
         areas: (RINGS, ANGLES) uint8, the mask's own area by ring and angle, with its holes and islands;
-            see `areas.area_map`.
+            see `area_overlap.area_map`.
         cut: Whether the border of the source image cuts the silhouette.
         border: Where the border that cuts lies as seen from the silhouette: 0 right, pi/2 below, pi
             left, -pi/2 above, radians; None when nothing is cut.
@@ -85,7 +85,7 @@ def normalise(
         smoothing: Standard deviation of the Gaussian in units of the square root of the area.
 
     Returns:
-        The silhouette of the largest part with the islands that lie near (`islands.py`), its holes
+        The silhouette of the largest part with the islands that lie near (`fragments.py`), its holes
         filled, or None when nothing of at least `LEAST_AREA` pixels is there.
 
     Raises:
@@ -161,7 +161,7 @@ def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], 
 
 def _solid(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
     """What belongs together, holes filled, and where its corner lies."""
-    whole = joined(part)
+    whole = join_fragments(part)
     x, y, w, h = cv2.boundingRect(whole.astype(np.uint8))
     inside = whole[y : y + h, x : x + w]
     around = np.pad((~inside).astype(np.uint8), 1, constant_values=1)

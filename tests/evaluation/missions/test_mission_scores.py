@@ -7,31 +7,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.evaluation.missions.mission_scores import (
+from visup.evaluation.missions.scores import (
     EVENT_TOLERANCE_S,
+    MissionTruth,
+    ReportedEvent,
     StageSample,
-    Told,
     TrueAlert,
     TrueEvent,
     TrueStage,
-    Truths,
     failing_latency,
     matched_events,
+    parse_truth,
     precision_recall_f1,
     scored_alerts,
     stage_share,
     true_outcome,
-    truths_of,
 )
 
 A, B = frozenset({"a"}), frozenset({"b"})
-FAILS = Truths(
+FAILS = MissionTruth(
     events=(),
     stages=(TrueStage("approach", 2, 12, "complete"), TrueStage("captured", 12, 30, "failing")),
     alerts=(TrueAlert("stage_failing", 12.8),),
     verdict="failed",
 )
-UNSAFE = Truths(
+UNSAFE = MissionTruth(
     events=(),
     stages=(TrueStage("approach", 2, 20, "unsafe"),),
     alerts=(TrueAlert("unexpected_object", 7), TrueAlert("collision_course", 9, A | B)),
@@ -40,7 +40,8 @@ UNSAFE = Truths(
 
 times = st.integers(0, 12).map(lambda n: n / 2)
 told_events = st.lists(
-    st.builds(Told, st.sampled_from(["exit", "entry"]), st.sampled_from([A, B]), times), max_size=5
+    st.builds(ReportedEvent, st.sampled_from(["exit", "entry"]), st.sampled_from([A, B]), times),
+    max_size=5,
 )
 true_events = st.lists(
     st.builds(TrueEvent, st.sampled_from(["exit", "entry"]), st.sampled_from([A, B]), times),
@@ -48,12 +49,12 @@ true_events = st.lists(
 )
 
 
-def most_matches(told: list[Told], true: list[TrueEvent]) -> int:
+def most_matches(told: list[ReportedEvent], true: list[TrueEvent]) -> int:
     """Brute force: the largest number of events that any pairing makes right."""
     said = [t for t in told if not (t.kind == "entry" and t.time < 2)]
     real = [t for t in true if not (t.kind == "entry" and t.time < 2)]
     if len(said) < len(real):
-        said = [*said, *[Told("none", frozenset(), 0.0)] * (len(real) - len(said))]
+        said = [*said, *[ReportedEvent("none", frozenset(), 0.0)] * (len(real) - len(said))]
     return max(
         sum(
             a.kind == b.kind
@@ -67,7 +68,7 @@ def most_matches(told: list[Told], true: list[TrueEvent]) -> int:
 
 @given(told_events, true_events)
 def test_events_are_matched_once_each_and_nearly_as_well_as_any_pairing(
-    told: list[Told], true: list[TrueEvent]
+    told: list[ReportedEvent], true: list[TrueEvent]
 ) -> None:
     right, excess, missed = matched_events(told, true)
     scored = [t for t in told if not (t.kind == "entry" and t.time < 2)]
@@ -80,17 +81,21 @@ def test_events_are_matched_once_each_and_nearly_as_well_as_any_pairing(
 
 @given(true_events)
 def test_telling_the_truth_scores_one(true: list[TrueEvent]) -> None:
-    counts = matched_events([Told(e.kind, e.objects, e.time) for e in true], true)
+    counts = matched_events([ReportedEvent(e.kind, e.objects, e.time) for e in true], true)
     assert counts[1:] == (0, 0)
     assert precision_recall_f1(*counts) == (1.0, 1.0, 1.0)
 
 
 def test_entries_in_the_first_two_seconds_count_on_neither_side() -> None:
-    assert matched_events([Told("entry", A, 0.5)], [TrueEvent("entry", A, 0.0)]) == (0, 0, 0)
+    assert matched_events([ReportedEvent("entry", A, 0.5)], [TrueEvent("entry", A, 0.0)]) == (
+        0,
+        0,
+        0,
+    )
 
 
 def test_a_wrong_object_is_both_excess_and_missed() -> None:
-    assert matched_events([Told("exit", A, 5)], [TrueEvent("exit", B, 5)]) == (0, 1, 1)
+    assert matched_events([ReportedEvent("exit", A, 5)], [TrueEvent("exit", B, 5)]) == (0, 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -105,11 +110,13 @@ def test_a_wrong_object_is_both_excess_and_missed() -> None:
         (UNSAFE, 7.0, ("approach", "unsafe")),
     ],
 )
-def test_what_is_true_when(truths: Truths, time: float, expected: tuple[str, str] | None) -> None:
+def test_what_is_true_when(
+    truths: MissionTruth, time: float, expected: tuple[str, str] | None
+) -> None:
     assert true_outcome(truths, time) == expected
 
 
-def samples(truths: Truths, shift: float = 0.0) -> list[StageSample]:
+def samples(truths: MissionTruth, shift: float = 0.0) -> list[StageSample]:
     out = []
     for i in range(0, 800):
         t = i / 25
@@ -119,7 +126,7 @@ def samples(truths: Truths, shift: float = 0.0) -> list[StageSample]:
 
 
 @pytest.mark.parametrize("truths", [FAILS, UNSAFE])
-def test_truth_told_within_a_second_is_perfect_and_later_it_is_not(truths: Truths) -> None:
+def test_truth_told_within_a_second_is_perfect_and_later_it_is_not(truths: MissionTruth) -> None:
     assert stage_share(samples(truths), truths) == 1.0
     assert stage_share(samples(truths, 0.9), truths) == 1.0
     late = stage_share(samples(truths, 3.0), truths)
@@ -130,7 +137,7 @@ def test_truth_told_within_a_second_is_perfect_and_later_it_is_not(truths: Truth
 def test_silence_scores_nothing_and_nothing_to_score_is_none() -> None:
     silent = [StageSample(i / 25, None, None) for i in range(800)]
     assert stage_share(silent, FAILS) == 0.0
-    assert stage_share(silent, Truths((), (), (), "interrupted")) is None
+    assert stage_share(silent, MissionTruth((), (), (), "interrupted")) is None
 
 
 def test_latency_of_failing() -> None:
@@ -144,21 +151,30 @@ def test_latency_of_failing() -> None:
     [
         ([], (0, 0)),
         (
-            [Told("unexpected_object", A, 8, True), Told("collision_course", A | B, 11.9, True)],
+            [
+                ReportedEvent("unexpected_object", A, 8, True),
+                ReportedEvent("collision_course", A | B, 11.9, True),
+            ],
             (2, 0),
         ),
-        ([Told("unexpected_object", A, 8, False)], (0, 0)),
-        ([Told("unexpected_object", A, 10.5, True)], (0, 1)),
-        ([Told("collision_course", A, 9, True)], (0, 1)),
-        ([Told("unexpected_object", A, 7, True), Told("unexpected_object", B, 7.5, True)], (1, 1)),
+        ([ReportedEvent("unexpected_object", A, 8, False)], (0, 0)),
+        ([ReportedEvent("unexpected_object", A, 10.5, True)], (0, 1)),
+        ([ReportedEvent("collision_course", A, 9, True)], (0, 1)),
+        (
+            [
+                ReportedEvent("unexpected_object", A, 7, True),
+                ReportedEvent("unexpected_object", B, 7.5, True),
+            ],
+            (1, 1),
+        ),
     ],
 )
-def test_alerts(told: list[Told], expected: tuple[int, int]) -> None:
+def test_alerts(told: list[ReportedEvent], expected: tuple[int, int]) -> None:
     assert scored_alerts(told, UNSAFE.alerts) == expected
 
 
 def test_truth_is_read_as_it_stands_in_the_file() -> None:
-    read = truths_of(
+    read = parse_truth(
         {
             "events": [{"kind": "coupled", "objects": ["a", "b"], "frame": 50}],
             "stages": [{"stage": "s", "from_s": 1, "to_s": 2, "outcome": "complete"}],

@@ -9,7 +9,7 @@ import pytest
 
 from tests.paths import ROOT
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.missions.missions import evaluate_missions
+from visup.evaluation.missions.runner import evaluate_missions
 
 MISSIONS = ROOT.parent / "shared" / "data" / "missions"
 KEYS = {

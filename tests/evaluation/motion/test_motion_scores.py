@@ -11,10 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 from tests.percepts.motion.clips import SIZE, clip, texture
 from visup.agent.model.errors import SettingsError, SourceError
-from visup.evaluation.motion.mot import box_distance, mot_scores, read_truth
-from visup.evaluation.motion.motion import evaluate_motion, find_clips
-from visup.evaluation.motion.motion_scores import (
-    Overlaps,
+from visup.evaluation.motion.mask_scores import (
+    MaskOverlaps,
     boundary,
     boundary_measure,
     has_ghost,
@@ -23,6 +21,8 @@ from visup.evaluation.motion.motion_scores import (
     overlaps_of,
     region_similarity,
 )
+from visup.evaluation.motion.mot_scores import box_distance, mot_scores, read_truth
+from visup.evaluation.motion.runner import evaluate_motion, find_sequences
 
 masks = arrays(bool, (14, 17))
 
@@ -102,7 +102,7 @@ def test_id_switches(ids: list[int | None], switches: int) -> None:
     assert id_switches(ids) == switches
 
 
-def overlaps(index: int, regions: dict[int, np.ndarray], labels: np.ndarray) -> Overlaps:
+def overlaps(index: int, regions: dict[int, np.ndarray], labels: np.ndarray) -> MaskOverlaps:
     names = {"arm": 2, "satellite": 3}
     return overlaps_of(index, index / 25, labels.astype(np.uint8), names, regions)
 
@@ -174,7 +174,7 @@ def test_a_broken_line_of_truth_is_told_with_its_place(tmp_path: Path) -> None:
 
 def test_nothing_to_score_is_told(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="nothing to score"):
-        find_clips(tmp_path)
+        find_sequences(tmp_path)
 
 
 def test_sequences_are_found_run_and_scored(tmp_path: Path) -> None:

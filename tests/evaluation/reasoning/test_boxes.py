@@ -31,12 +31,12 @@ from visup.rules.relations.direction import CONVERSE, DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
 from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import rcc8
-from visup.rules.relations.thresholds import AWAY, DIRECTION, DISTANCE, SIDE, JudgeSettings
+from visup.rules.relations.thresholds import AWAY, DIRECTION, DISTANCE, SIDE, ThresholdSettings
 
 A = (100.0, 200.0, 80.0, 60.0)
 MIRROR = {"converging": "diverging", "diverging": "converging"}
 NO_NOISE = BoxSettings(
-    JudgeSettings(noise_px=0.0, level_enter=0.0, level_exit=0.0, state_minimum_s=0.0)
+    ThresholdSettings(noise_px=0.0, level_enter=0.0, level_exit=0.0, state_minimum_s=0.0)
 )
 
 

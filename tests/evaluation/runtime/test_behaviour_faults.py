@@ -11,17 +11,25 @@ from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.mind import Mind
 from visup.agent.model.records import Observation
 from visup.evaluation.runtime import behaviour_faults
-from visup.evaluation.runtime.behaviour_faults import KINDS, Trial, draw, evaluate_faults, run
+from visup.evaluation.runtime.behaviour_faults import (
+    KINDS,
+    BehaviourFaultTrial,
+    draw,
+    evaluate_faults,
+    run,
+)
 from visup.evaluation.runtime.fault_injection import DEADLY, FAULTS, WAITING
 from visup.rules.language.parser import shipped_rules
-from visup.rules.predicates.inputs_missing import blind, inputs
+from visup.rules.predicates.inputs_missing import inputs_missing, percepts_read
 
 QUICK = sorted(FAULTS.keys() - WAITING - DEADLY)
 
 
 @pytest.mark.parametrize("fault", QUICK)
 def test_a_fault_within_the_process_is_told_and_nothing_reads_fine(fault: str) -> None:
-    trial = Trial(QUICK.index(fault), fault, KINDS[len(fault) % len(KINDS)], False, 14)
+    trial = BehaviourFaultTrial(
+        QUICK.index(fault), fault, KINDS[len(fault) % len(KINDS)], False, 14
+    )
     run(trial)
     assert trial.problems == []
     assert trial.recovered
@@ -29,7 +37,7 @@ def test_a_fault_within_the_process_is_told_and_nothing_reads_fine(fault: str) -
 
 @pytest.mark.parametrize("fault", sorted(WAITING | DEADLY))
 def test_a_fault_in_another_process_is_told_and_nothing_reads_fine(fault: str) -> None:
-    trial = Trial(0, fault, "region", True, 14)
+    trial = BehaviourFaultTrial(0, fault, "region", True, 14)
     run(trial)
     assert trial.problems == []
     assert trial.recovered
@@ -43,7 +51,7 @@ def test_the_campaign_sees_what_is_taken_for_known(
 
     class Careless(Agent):
         def __post_init__(self) -> None:
-            def forget(mind: Mind, seen: Observation) -> object:
+            def forget(mind: Mind, observation: Observation) -> object:
                 from visup.agent import Outcome
 
                 return Outcome(replace(mind, unknown=frozenset()))
@@ -53,24 +61,24 @@ def test_the_campaign_sees_what_is_taken_for_known(
             super().__post_init__()
 
     monkeypatch.setattr(behaviour_faults, "Agent", Careless)
-    trial = Trial(0, "exception", kind, False, 14)
+    trial = BehaviourFaultTrial(0, "exception", kind, False, 14)
     run(trial)
     assert any(p.startswith("unknown: ") for p in trial.problems)
 
 
 def test_the_campaign_sees_rules_that_read_what_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("visup.rules.safety.verdicts.blind", lambda mind, word: False)
-    trial = Trial(0, "exception", "region", False, 14)
+    trial = BehaviourFaultTrial(0, "exception", "region", False, 14)
     run(trial)
     assert any(p.startswith("fine: probe_") for p in trial.problems)
 
 
 def test_every_shipped_rule_reads_words_whose_inputs_are_known() -> None:
     assert shipped_rules()
-    assert inputs("healthy") == {"health"}
-    assert inputs("gap") == {"region"}
-    assert blind(Mind(unknown=frozenset({"region"})), "gap")
-    assert not blind(Mind(unknown=frozenset({"lamp"})), "gap")
+    assert percepts_read("healthy") == {"health"}
+    assert percepts_read("gap") == {"region"}
+    assert inputs_missing(Mind(unknown=frozenset({"region"})), "gap")
+    assert not inputs_missing(Mind(unknown=frozenset({"lamp"})), "gap")
 
 
 def test_what_is_drawn_depends_on_the_seed_alone() -> None:

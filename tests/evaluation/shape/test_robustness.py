@@ -10,22 +10,22 @@ from typer.testing import CliRunner
 
 from tests.percepts.shape.shapes import ZOO
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.commands.eval.app import app
-from visup.evaluation.shape.corrupt import DAMAGES, MASKS, damage, odd_mask
+from visup.commands.eval.catalogue import eval_app
+from visup.evaluation.shape.corrupt import CORRUPTIONS, MASKS, corrupt_file, odd_mask
 from visup.evaluation.shape.robustness import (
     evaluate_robustness,
     sound_database,
     try_file,
     try_mask,
 )
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 
 def test_damaged_files_and_odd_masks_are_refused_answered_or_nothing() -> None:
     figures = evaluate_robustness(files=144, masks=96, seed=11, largest=900)
     assert figures["failures"] == []
-    assert set(figures["items"]) == {*DAMAGES, *MASKS}
+    assert set(figures["items"]) == {*CORRUPTIONS, *MASKS}
     assert figures["total"]["trials"] == 240
     assert figures["items"]["foreign"]["refused"] == 12
     assert figures["items"]["empty"]["nothing"] == 8
@@ -45,10 +45,10 @@ def test_a_table_whose_name_is_no_text_is_refused(tmp_path: Path) -> None:
 def test_a_campaign_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
     sound = sound_database(tmp_path / "sound.db", 0).path.read_bytes()
     assert sound_database(tmp_path / "again.db", 0).path.read_bytes() == sound
-    for kind in DAMAGES:
+    for kind in CORRUPTIONS:
         contents = []
         for _ in range(2):
-            damage(tmp_path / "damaged.db", sound, kind, np.random.default_rng(4))
+            corrupt_file(tmp_path / "damaged.db", sound, kind, np.random.default_rng(4))
             contents.append((tmp_path / "damaged.db").read_bytes())
         assert contents[0] == contents[1] != sound, kind
 
@@ -93,7 +93,7 @@ def test_whole_numbers_are_taken_as_yes_and_no(dtype: str) -> None:
 
 
 def test_the_command_tells_a_table() -> None:
-    result = CliRunner().invoke(app, ["robustness", "--files", "12", "--masks", "12"])
+    result = CliRunner().invoke(eval_app(), ["robustness", "--files", "12", "--masks", "12"])
     assert result.exit_code == 0, result.output
     assert "flipped" in result.output
     assert "refused" in result.output

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape, small_database
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.shape.augment import deformed, multiplied
+from visup.evaluation.shape.augment import augmented, deformed
 from visup.evaluation.shape.scale import evaluate_scale, noisy
-from visup.percepts.shape.database.budget import SEARCH_MS, SHAPE_MS, VIEW_MS
-from visup.percepts.shape.database.database import CANDIDATES, ModelDatabase
-from visup.percepts.shape.index.index import Summaries, ViewIndex
-from visup.percepts.shape.index.sketch import POINTS, sketch, sketch_distances, spectra
-from visup.percepts.shape.matching.similarity import Shape, compare
+from visup.percepts.shape.database.model_database import CANDIDATES, ModelDatabase
+from visup.percepts.shape.database.time_budget import SEARCH_MS, SHAPE_MS, VIEW_MS
+from visup.percepts.shape.index.outline_sketch import POINTS, sketch, sketch_distances, spectra
+from visup.percepts.shape.index.view_index import ViewIndex, ViewSummaries
+from visup.percepts.shape.matching.shape_similarity import Shape, compare_shapes
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:
@@ -53,15 +53,15 @@ def test_a_spectrum_does_not_tell_where_a_sketch_starts(
 @pytest.fixture(scope="module")
 def many(tmp_path_factory: pytest.TempPathFactory) -> ModelDatabase:
     folder = tmp_path_factory.mktemp("scale")
-    return multiplied(small_database(folder / "zoo.db"), folder / "many.db", 800, seed=3)
+    return augmented(small_database(folder / "zoo.db"), folder / "many.db", 800, seed=3)
 
 
 def test_deformed_views_are_the_same_for_a_seed_and_unlike_their_source() -> None:
     source = shape(ZOO["walker"])
     one, again, other = (deformed(source, 3, k) for k in (7, 7, 8))
-    assert compare(one, again).similarity == 1.0
-    assert compare(one, other).similarity < 0.99
-    assert compare(one, source).similarity < 0.99
+    assert compare_shapes(one, again).similarity == 1.0
+    assert compare_shapes(one, other).similarity < 0.99
+    assert compare_shapes(one, source).similarity < 0.99
     assert one.graph.weights.sum() == pytest.approx(1.0, abs=1e-4)
 
 
@@ -78,7 +78,7 @@ def test_the_sieves_keep_what_exhaustive_search_finds(many: ModelDatabase) -> No
 def test_summaries_in_the_file_are_those_of_the_shapes(many: ModelDatabase) -> None:
     shapes = many.shapes[:40]
     rows = many.views.records[:40]
-    fresh = Summaries.of(shapes)
+    fresh = ViewSummaries.of(shapes)
     np.testing.assert_array_equal(rows["root"], fresh.roots)
     # Outlines are stored in half precision.
     assert np.abs(rows["sketch"].astype(int) - fresh.sketches).max() <= 2
@@ -97,7 +97,7 @@ def test_only_candidates_are_ever_read(many: ModelDatabase) -> None:
 
     rows = many.views.records
     shapes = Reads()
-    index = ViewIndex(shapes, summaries=Summaries.read(rows))
+    index = ViewIndex(shapes, summaries=ViewSummaries.read(rows))
     found = index.candidates(shape(ZOO["star"]), None, 20)
     assert asked == set(found.numbers.tolist())
     assert len(asked) == 20

@@ -120,7 +120,7 @@ def test_turning_turns_clockwise() -> None:
 def test_figures_of_plain_solids(tmp_path: Path) -> None:
     """A ball, a rod and a plate are told apart; each figure is where the data's README says."""
     pytest.importorskip("mahotas", reason="the extra visup[eval] is not installed")
-    from visup.evaluation.shape.views import evaluate_views
+    from visup.evaluation.shape.view_recognition import evaluate_views
 
     for name, solid in {
         "ball": trimesh.creation.icosphere(3),

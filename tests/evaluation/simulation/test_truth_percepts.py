@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from visup.agent import Observation
 from visup.agent.model.orientation import orientations, swing_and_roll
+from visup.evaluation.simulation.percepts import Dropouts, PerceptNoise, observations_of
 from visup.evaluation.simulation.truth_masks import Mission, TrueMask, true_mask
-from visup.evaluation.simulation.truth_percepts import Gaps, PerceptNoise, observations_of
 
 CLEAN = PerceptNoise(contour_px=0.0, missing=0.0, wrong=0.0, velocity=0.0, depth=0.0)
 FRAMES, COUPLED = 250, 150
@@ -80,7 +80,7 @@ def test_without_noise_all_is_as_it_is() -> None:
 
 @pytest.mark.parametrize("missing", [0.0, 0.15, 0.5])
 def test_gaps_are_as_frequent_and_as_long_as_asked_for(missing: float) -> None:
-    gaps = Gaps(PerceptNoise(missing=missing, in_bursts=1.0), 0.04, np.random.default_rng(1))
+    gaps = Dropouts(PerceptNoise(missing=missing, in_bursts=1.0), 0.04, np.random.default_rng(1))
     gone = np.array([gaps.missing() for _ in range(40_000)])
     assert gone.mean() == pytest.approx(missing, abs=0.02)
     if missing:

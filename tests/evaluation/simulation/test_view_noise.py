@@ -8,16 +8,16 @@ from scipy.spatial.transform import Rotation
 
 from visup.agent import Pose, Spin
 from visup.agent.model.orientation import orientations, swing_and_roll
-from visup.evaluation.missions.mission_poses import spin_error, view_error
-from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
-from visup.percepts.shape.building.views import half_sphere_directions
+from visup.evaluation.missions.pose_errors import spin_error, view_error
+from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
+from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
 
 def looks(
     noise: ViewNoise, count: int = 600, others: tuple[str, ...] = ("mir",)
 ) -> list[list[float]]:
     """For each look the angles of its hypotheses from the truth, degrees; inf for another model."""
-    told = ToldViews("sat", half_sphere_directions(48), noise, np.random.default_rng(1), others)
+    told = NoisyViews("sat", half_sphere_directions(48), noise, np.random.default_rng(1), others)
     found = []
     for k, true in enumerate(Rotation.random(count, random_state=2).as_matrix()):
         said = told(true, k)

@@ -19,9 +19,9 @@ from tests.percepts.motion.clips import clip, texture
 from visup.agent import Frame, HealthStatus
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.health.camera_faults import EXPECTED, inject
-from visup.evaluation.health.health import evaluate_health, find_sources, plan, statuses
-from visup.percepts.health.image_quality import measure
-from visup.percepts.health.timing import Arrivals
+from visup.evaluation.health.runner import evaluate_health, find_sources, plan, statuses
+from visup.percepts.health.frame_timing import ArrivalMonitor
+from visup.percepts.health.image_quality import measure_quality
 
 START, LENGTH = 20, 50
 OK = HealthStatus.OK
@@ -163,8 +163,8 @@ def test_straight_steps_are_counted_wherever_the_grid_lies(size: int, x: int, y:
     tiles = np.random.default_rng(size).integers(0, 256, (40, 60)).astype(np.uint8)
     board = np.kron(tiles, np.ones((size, size), np.uint8))[y : y + 160, x : x + 240]
     turned = np.asarray(cv2.GaussianBlur(board, (0, 0), 1.2), np.uint8)
-    assert measure(board).steps > 0.01
-    assert measure(turned).steps < 0.001
+    assert measure_quality(board).steps > 0.01
+    assert measure_quality(turned).steps < 0.001
 
 
 @given(st.floats(3.0, 60.0), st.integers(0, 1000))
@@ -172,14 +172,14 @@ def test_straight_steps_are_counted_wherever_the_grid_lies(size: int, x: int, y:
 def test_noise_is_measured(sigma: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     image = np.clip(128 + rng.normal(0, sigma, (96, 160, 3)), 0, 255).astype(np.uint8)
-    assert measure(image).noise == pytest.approx(sigma, rel=0.35, abs=1.0)
+    assert measure_quality(image).noise == pytest.approx(sigma, rel=0.35, abs=1.0)
 
 
 def come(steps: Sequence[int], every: int = 1, rate: float = 25.0) -> list[int]:
     """What is missing after each frame, for given distances between frames."""
-    arrivals = Arrivals(lost=0.2, gap=3, frozen_s=0.5)
+    arrivals = ArrivalMonitor(lost=0.2, gap=3, frozen_s=0.5)
     numbers = np.cumsum([0, *steps]) * every
-    return [arrivals.come(int(n), n / rate, repeated=False) for n in numbers]
+    return [arrivals.arrive(int(n), n / rate, repeated=False) for n in numbers]
 
 
 @given(st.integers(1, 9), st.floats(5.0, 60.0), st.integers(3, 30))

@@ -10,14 +10,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.percepts.motion.features._constraints_jit import strongest, tensors
-from visup.percepts.motion.features._superpixels_jit import weighed
-from visup.percepts.motion.layers._layers_jit import (
-    likelihoods,
+from visup.percepts.motion.features._motion_constraints_jit import (
+    strongest_gradients,
+    structure_tensors,
+)
+from visup.percepts.motion.features._superpixels_jit import bayes_shares
+from visup.percepts.motion.layers._affine_jit import (
+    log_likelihoods,
     median,
-    misfits,
     quantile,
-    reweighted,
+    reweighted_least_squares,
+    squared_misfits,
 )
 from visup.percepts.motion.static_camera._templates_jit import best_shift
 from visup.percepts.motion.static_camera.background_model import (
@@ -25,8 +28,8 @@ from visup.percepts.motion.static_camera.background_model import (
     NOISE,
     RARE,
     SETTLE_S,
-    Picture,
-    learnt,
+    BackgroundModel,
+    update_background,
 )
 
 SHAPE = (13, 17)
@@ -56,10 +59,10 @@ def test_misfits_are_distances_under_the_covariance_of_both(seed: int, slack: fl
     own = matrices(information)
     both = np.linalg.inv(np.linalg.inv(own) + slack**2 * np.eye(2))
     expected = np.einsum("ni,nij,nj->n", error, both, error)
-    found = misfits(xy, moved, information, matrix, bend, slack)
+    found = squared_misfits(xy, moved, information, matrix, bend, slack)
     assert found == pytest.approx(expected, rel=2e-3, abs=1e-3)
     width = np.log(np.trace(both, axis1=1, axis2=2) / np.trace(own, axis1=1, axis2=2))
-    told = likelihoods(xy, moved, information, matrix, bend, slack)
+    told = log_likelihoods(xy, moved, information, matrix, bend, slack)
     assert told == pytest.approx(0.5 * width - 0.5 * expected, rel=2e-3, abs=2e-3)
 
 
@@ -72,7 +75,9 @@ def test_one_round_of_a_fit_solves_the_normal_equations(seed: int) -> None:
     information, hold = some_information(rng, n), np.array([1.0, 2.0, 0.1])
     weight = rng.random(n)
     start = np.zeros((n, 2), np.float32)
-    model, w, _ = reweighted(phi, moved, information, weight, start, hold, 1e-9, 1e6, 1)
+    model, w, _ = reweighted_least_squares(
+        phi, moved, information, weight, start, hold, 1e-9, 1e6, 1
+    )
     normal, right = np.diag(np.tile(hold, 2)), np.zeros(2 * k)
     for f, d, both, share in zip(phi, moved, matrices(information), weight, strict=True):
         rows = np.kron(np.eye(2), f)
@@ -92,21 +97,21 @@ def test_the_picture_learns_pixel_by_pixel_as_it_does_image_by_image(seed: int) 
     seen[rng.random(SHAPE) < 0.2] = 0
     moving, gone = rng.random((2, *SHAPE)) < 0.3
     seconds = float(rng.random()) + 0.01
-    known = Picture(mean, variance, seen, other, other_s)
+    known = BackgroundModel(mean, variance, seen, other, other_s)
     expected = slowly_learnt(known, image, moving, seconds, gone)
-    found = learnt(known, image, moving, seconds, gone)
+    found = update_background(known, image, moving, seconds, gone)
     for f in fields(found):
         assert np.allclose(getattr(found, f.name), getattr(expected, f.name), atol=1e-3), f.name
 
 
 def slowly_learnt(
-    known: Picture,
+    known: BackgroundModel,
     image: NDArray[np.float32],
     moving: NDArray[np.bool_],
     seconds: float,
     gone: NDArray[np.bool_],
-) -> Picture:
-    """What `learnt` says, with whole images."""
+) -> BackgroundModel:
+    """What `update_background` says, with whole images."""
     off = ((image - known.mean) ** 2).sum(axis=2) / (3 * known.variance)
     told = known.seen_s > 0
     fits = (off < FAR**2) & ~moving & told
@@ -123,7 +128,7 @@ def slowly_learnt(
     other = np.where(gone[..., None], image, other)
     enough = np.where(moving, 3 * known.seen_s, np.minimum(known.seen_s, 20.0)) + 0.2
     swap = (other_s > enough) | (gone & told)
-    return Picture(
+    return BackgroundModel(
         np.where(swap[..., None], other, mean),
         np.where(swap, 2 * NOISE**2, variance),
         np.where(swap, other_s, seen),
@@ -164,7 +169,7 @@ def test_a_template_is_found_where_it_costs_least(seed: int, x: int, y: int, ste
 @settings(deadline=None, max_examples=10)
 def test_points_are_the_steepest_of_their_squares(seed: int) -> None:
     gx, gy = np.random.default_rng(seed).normal(size=(2, 24, 33)).astype(np.float32)
-    xs, ys, values = strongest(gx, gy, 8, 3)
+    xs, ys, values = strongest_gradients(gx, gy, 8, 3)
     slope = gx * gx + gy * gy
     counts = np.zeros_like(slope)
     counts[3:-3, 3:-3] = slope[3:-3, 3:-3]
@@ -176,7 +181,9 @@ def test_points_are_the_steepest_of_their_squares(seed: int) -> None:
     expected = [
         [w[y : y + 11, x : x + 11].sum() for w in wide] for x, y in zip(xs, ys, strict=True)
     ]
-    assert tensors(gx, gy, xs, ys, 11) == pytest.approx(np.array(expected), rel=1e-3, abs=1e-3)
+    assert structure_tensors(gx, gy, xs, ys, 11) == pytest.approx(
+        np.array(expected), rel=1e-3, abs=1e-3
+    )
 
 
 def test_where_nothing_can_be_kept_loops_are_compiled_all_the_same() -> None:
@@ -201,7 +208,7 @@ def test_shares_are_priors_times_likelihoods(seed: int, kinds: int) -> None:
     totals = rng.normal(0, 3, (12, kinds)) * (number > 0)[:, None]
     more = (rng.normal(0, 2, (12, kinds)) * (rng.random(12) < 0.5)[:, None]).astype(np.float32)
     prior = rng.dirichlet(np.ones(kinds), 12).astype(np.float32)
-    share, weight = weighed(totals, number, more, prior, 0.03, 5.0)
+    share, weight = bayes_shares(totals, number, more, prior, 0.03, 5.0)
     logs = totals / np.sqrt(np.maximum(number, 1))[:, None] + more
     logs -= logs.max(axis=1, keepdims=True)
     expected = (prior + 0.03) * np.exp(np.maximum(logs, -10))

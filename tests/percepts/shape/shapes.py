@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.index.records import NewView
-from visup.percepts.shape.matching.similarity import Shape, shape_of
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.index.view_records import NewView
+from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 Mask = NDArray[np.bool_]

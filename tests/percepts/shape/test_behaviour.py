@@ -28,8 +28,8 @@ from visup.agent.model.records import (
 )
 from visup.percepts.depth import DepthBehaviour, extents, focal_px
 from visup.percepts.shape.behaviour import ShapeBehaviour, ShapeSettings
-from visup.percepts.shape.database.database import ModelDatabase, Ranking
-from visup.percepts.shape.matching.similarity import Shape
+from visup.percepts.shape.database.model_database import ModelDatabase, Ranking
+from visup.percepts.shape.matching.shape_similarity import Shape
 
 SIZE = (640, 480)
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.video.silence import quiet
+from visup.percepts.video.quiet_decoder import quiet
 
 COUNT = 30
 

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from tests.percepts.video.clips import write_video
 from visup.agent import Frame, Severity
-from visup.percepts.video import Ending, Source, open_source
+from visup.percepts.video import Ending, VideoSource, open_source
 from visup.percepts.video import realtime as module
-from visup.percepts.video.realtime import Newest, Played, in_real_time
-from visup.runs.runner import RunOptions, supervise
-from visup.runs.settings import WatchSettings
+from visup.percepts.video.realtime import LatestFrames, PacedRecording, in_real_time
+from visup.runs.runner import supervise
+from visup.runs.settings import RunOptions, WatchSettings
 
 IMAGE = np.zeros((4, 4, 3), np.uint8)
 
@@ -39,10 +39,12 @@ def frames(times: list[float]) -> Iterator[Frame]:
     return (Frame(k, t, IMAGE) for k, t in enumerate(times))
 
 
-def watched(times: list[float], costs: list[float]) -> tuple[list[tuple[int, float]], Played]:
+def watched(
+    times: list[float], costs: list[float]
+) -> tuple[list[tuple[int, float]], PacedRecording]:
     """Numbers of the frames that were given and when, by a watcher who needs that long for each."""
     clock, given = Clock(), []
-    played = Played(frames(times), "clip", clock=clock, wait=clock.pass_by)
+    played = PacedRecording(frames(times), "clip", clock=clock, wait=clock.pass_by)
     for k, frame in enumerate(played):
         given.append((frame.index, clock.now - 50.0 + times[0]))
         clock.pass_by(costs[k % len(costs)])
@@ -98,7 +100,7 @@ def test_what_was_dropped_long_ago_is_told_no_more() -> None:
     assert list(played.runtime_faults()) == []
 
 
-class Steps(Source):
+class Steps(VideoSource):
     """A live source that delivers a frame each time that it is let."""
 
     def __init__(self, count: int, fault: Exception | None = None) -> None:
@@ -123,7 +125,7 @@ class Steps(Source):
 def test_of_a_live_source_the_newest_frame_waits_to_be_taken() -> None:
     source = Steps(7)
     pace = in_real_time(source, source)
-    assert isinstance(pace, Newest)
+    assert isinstance(pace, LatestFrames)
     for _ in range(5):
         source.let.release()
     while source.at < 5 or pace._slot is None or pace._slot.index < 4:
@@ -140,7 +142,7 @@ def test_of_a_live_source_the_newest_frame_waits_to_be_taken() -> None:
 
 def test_a_fault_of_the_source_is_raised_where_frames_are_asked_for() -> None:
     source = Steps(0, ValueError("broken"))
-    pace = Newest(source, source)
+    pace = LatestFrames(source, source)
     source.let.release()
     with pytest.raises(ValueError, match="broken"):
         next(pace)
@@ -151,7 +153,7 @@ def test_a_source_in_which_the_reader_is_stuck_is_left_alone(
 ) -> None:
     monkeypatch.setattr(module, "PATIENCE_S", 0.05)
     source = Steps(1)
-    Newest(source, source).close()
+    LatestFrames(source, source).close()
     source.close()
     assert source.ended is Ending.STOPPED
     assert not source.released
@@ -163,7 +165,7 @@ import time
 from visup.agent import Contract
 class Slow:
     contract = Contract("slow", gives=("slow",))
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         time.sleep(0.2)
         return []
 """

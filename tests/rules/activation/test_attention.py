@@ -21,8 +21,8 @@ from visup.agent import (
 )
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.evaluation.runtime.soak import scripted
-from visup.percepts.shape.behaviour import _resting
-from visup.rules.activation.attention import Attend
+from visup.percepts.shape.behaviour import _rest_intervals
+from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.reasoners import default_reasoners
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -41,7 +41,9 @@ def asked(belief: ObjectBelief, seconds: float = 3.0, expected: bool = False) ->
     mind = Mind(objects={1: belief}, tasks=(task,))
     found: tuple[Directive, ...] = ()
     for n in range(round(seconds * 10) + 1):
-        outcome = Attend()(replace(mind, time=n / 10), Observation(n, n / 10, (160, 120)))
+        outcome = AttentionReasoner()(
+            replace(mind, time=n / 10), Observation(n, n / 10, (160, 120))
+        )
         mind, found = outcome.mind, outcome.directives
     return list(found)
 
@@ -60,7 +62,10 @@ def test_who_is_known_rests_with_a_reason() -> None:
         replace(KNOWN, candidates=(Candidate("arm", 1.0, 0.6, 0.9),)),
         replace(KNOWN, confirmed=False),
         replace(KNOWN, presence=Presence.LEFT),
-        replace(KNOWN, pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=Spin(9.0, 1.0, (0, 0, 1)))),
+        replace(
+            KNOWN,
+            pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=Spin(9.0, 1.0, (0, 0, 1))),
+        ),
     ],
 )
 def test_who_is_not_settled_or_turns_is_looked_at(belief: ObjectBelief) -> None:
@@ -91,12 +96,12 @@ def test_only_directives_for_the_behaviour_count() -> None:
         Directive("rest", "r", {"behaviour": "lamp", "region": 4, "every_s": 1.0}),
         Directive("ignore", "r", {"bbox": (0, 0, 1, 1)}),
     ]
-    assert _resting(wishes, "shape") == {3: 1.0}
+    assert _rest_intervals(wishes, "shape") == {3: 1.0}
 
 
 def test_attention_is_a_reasoner_like_any_other() -> None:
     rules = default_reasoners()
-    agent = Agent([], Reasoners(rules.update, rules.cogitate, (Attend(),)))
+    agent = Agent([], Reasoners(rules.update, rules.cogitate, (AttentionReasoner(),)))
     last = [agent.reason(seen) for seen in scripted(90)][-1]
     assert last.directives
     assert {d.data["region"] for d in last.directives} <= {1, 2, 3}

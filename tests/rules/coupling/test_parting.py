@@ -12,7 +12,7 @@ from tests.rules.scenes import box_region, reach_of, seen
 from visup.agent import ObjectBelief, Presence, Region, Truth
 from visup.rules.geometry.regions import DIRECTIONS
 from visup.rules.reasoners import default_reasoners
-from visup.rules.relations._kinematics_jit import parting
+from visup.rules.relations._kinematics_jit import separation_speeds
 from visup.rules.relations.kinematics import sightings
 
 Velocity = tuple[float, float]
@@ -28,7 +28,7 @@ def body(id_: int, left: float, velocity: Velocity, sigma: float = 0.5) -> Regio
 def pair(a: Region, b: Region) -> tuple[np.ndarray, np.ndarray]:
     objects = tuple(ObjectBelief(r.id, r, Presence.SEEN, 0.0, 1.0) for r in (a, b))
     support = np.array([reach_of(r)[0] for r in (a, b)])
-    return parting(support, sightings(objects, 1.0), DIRECTIONS)
+    return separation_speeds(support, sightings(objects, 1.0), DIRECTIONS)
 
 
 @settings(max_examples=40, deadline=None)

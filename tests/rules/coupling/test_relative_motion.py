@@ -10,20 +10,27 @@ from scipy.stats import multivariate_normal
 
 from tests.rules.scenes import SIZE, box_region
 from visup.agent import Region
-from visup.rules.coupling.relative_motion import Joint, Kept, Motion, begun, follow, motion
-from visup.rules.geometry._outlines_jit import step_across
+from visup.rules.coupling.relative_motion import (
+    OutlineTemplate,
+    RelativeTrack,
+    RelativeVelocity,
+    begin_relative_track,
+    relative_velocity,
+    update_relative_track,
+)
+from visup.rules.geometry._outlines_jit import icp_step
 
 STILL, MOVING = 2.0, 10.0
 speeds = st.floats(-40.0, 40.0)
 
 
-def at_speed(x: float, y: float, variance: float) -> Motion:
-    return Motion(np.array([x, y]), variance * np.eye(2), 0.3)
+def at_speed(x: float, y: float, variance: float) -> RelativeVelocity:
+    return RelativeVelocity(np.array([x, y]), variance * np.eye(2), 0.3)
 
 
-def joint(path: list[tuple[float, ...]]) -> Joint:
-    nothing = Kept(np.zeros((0, 2)), np.zeros((0, 2)))
-    return Joint(nothing, nothing, 0.0, path=tuple(path))
+def joint(path: list[tuple[float, ...]]) -> RelativeTrack:
+    nothing = OutlineTemplate(np.zeros((0, 2)), np.zeros((0, 2)))
+    return RelativeTrack(nothing, nothing, 0.0, path=tuple(path))
 
 
 def places(speed: float, until: float = 1.0, missing: range = range(0)) -> list[tuple[float, ...]]:
@@ -53,7 +60,7 @@ def test_odds_are_those_of_two_normal_distributions(
 ) -> None:
     xy = together * np.sqrt(xx * yy)
     covariance = np.array([[xx, xy], [xy, yy]])
-    told = Motion(np.array([x, y]), covariance, 0.3).rest_odds(STILL, MOVING)
+    told = RelativeVelocity(np.array([x, y]), covariance, 0.3).rest_odds(STILL, MOVING)
     rest, free = (
         multivariate_normal(cov=covariance + variance * np.eye(2)).logpdf([x, y])
         for variance in (0.5 * STILL**2, MOVING**2)
@@ -70,7 +77,7 @@ def test_a_step_onto_an_outline_is_that_of_weighted_least_squares(seed: int, wid
     across = (off * normals).sum(axis=1)
     weight = 1.0 / np.maximum(np.abs(across), 1.5)
     square = (normals * weight[:, None]).T @ normals
-    known, *found = step_across(normals, off, len(off), 1.5)
+    known, *found = icp_step(normals, off, len(off), 1.5)
     if not known:
         assert np.linalg.cond(square) > 49.0
     else:
@@ -94,14 +101,14 @@ def test_rest_and_motion_are_told_apart() -> None:
 
 @pytest.mark.parametrize("speed", [0.0, 8.0, 25.0])
 def test_the_slope_of_a_path_is_its_speed(speed: float) -> None:
-    found = motion(joint(places(speed)), 0.96, 0.3)
+    found = relative_velocity(joint(places(speed)), 0.96, 0.3)
     assert found is not None
     assert abs(found.velocity[0] - speed) < 3 * np.sqrt(found.covariance[0, 0])
     assert found.span == pytest.approx(0.28, abs=0.05)
 
 
 def test_after_a_gap_the_way_gone_in_it_tells() -> None:
-    found = motion(joint(places(8.0, missing=range(8, 22))), 0.96, 0.3)
+    found = relative_velocity(joint(places(8.0, missing=range(8, 22))), 0.96, 0.3)
     assert found is not None
     assert found.span > 0.6
     assert found.velocity[0] == pytest.approx(8.0, abs=2.0)
@@ -112,13 +119,13 @@ def test_after_a_gap_the_way_gone_in_it_tells() -> None:
 def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
     path = [p for k, p in enumerate(places(0.0)) if k not in missing]
     known = len(path) > 5 and path[-1][0] - path[0][0] >= 0.6 * 0.3
-    found = motion(joint(path), path[-1][0], 0.3) if path else None
+    found = relative_velocity(joint(path), path[-1][0], 0.3) if path else None
     assert (found is not None) == known
     assert found is None or found.span >= 0.6 * 0.3 - 1e-6
 
 
-def by_arrays(path: np.ndarray, now: float, window: float) -> Motion:
-    """`motion` by matrices."""
+def by_arrays(path: np.ndarray, now: float, window: float) -> RelativeVelocity:
+    """`relative_velocity` by matrices."""
     steps = np.diff(path[:, 1:3], axis=0)
     noise = steps.T @ steps / len(steps) + 1e-4 * np.eye(2)
     inside = int((path[:, 0] > now - window - 1e-6).sum())
@@ -129,11 +136,11 @@ def by_arrays(path: np.ndarray, now: float, window: float) -> Motion:
     slope, spread = t @ recent[:, 1:3] / (t @ t), noise / (t @ t)
     flow = recent[np.isfinite(recent[:, 5]), 3:]
     if not len(flow):
-        return Motion(slope, spread, span)
+        return RelativeVelocity(slope, spread, span)
     certain = max(1.0, span / 0.2) / flow[:, 2].mean() * np.eye(2)
     both = np.linalg.inv(np.linalg.inv(spread) + certain)
     mean = np.linalg.solve(spread, slope) + certain @ flow[:, :2].mean(axis=0)
-    return Motion(both @ mean, both, span)
+    return RelativeVelocity(both @ mean, both, span)
 
 
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.sampled_from([0.0, 0.1, 1.0]))
@@ -147,7 +154,7 @@ def test_motion_is_that_of_matrices(seed: int, told: bool, later: float) -> None
         path[:, 3:] = rng.uniform(0.1, 2.0, (count, 3))
         path[rng.random(count) < 0.3, 3:] = np.nan
     now = float(path[-1, 0]) + later
-    found = motion(joint([tuple(p) for p in path.tolist()]), now, 0.3)
+    found = relative_velocity(joint([tuple(p) for p in path.tolist()]), now, 0.3)
     expected = by_arrays(path, now, 0.3)
     assert found is not None
     assert found.span == pytest.approx(expected.span)
@@ -157,7 +164,7 @@ def test_motion_is_that_of_matrices(seed: int, told: bool, later: float) -> None
 
 @pytest.mark.parametrize("count", range(6))
 def test_of_a_few_places_nothing_is_told(count: int) -> None:
-    assert motion(joint(places(8.0)[:count]), count / 25, 0.3) is None
+    assert relative_velocity(joint(places(8.0)[:count]), count / 25, 0.3) is None
 
 
 def test_boxes_that_move_apart_are_followed() -> None:
@@ -170,11 +177,11 @@ def test_boxes_that_move_apart_are_followed() -> None:
         assert second is not None
         return first, second
 
-    known = begun(both(0.0), 0.0, SIZE)
+    known = begin_relative_track(both(0.0), 0.0, SIZE)
     for k in range(1, 20):
-        known = follow(known, both(k / 25), k / 25, SIZE, lasts_s=1.2, anew_s=2.5)
+        known = update_relative_track(known, both(k / 25), k / 25, SIZE, lasts_s=1.2, anew_s=2.5)
     assert known is not None
-    found = motion(known, 19 / 25, 0.3)
+    found = relative_velocity(known, 19 / 25, 0.3)
     assert found is not None
     assert found.velocity[0] == pytest.approx(20.0, abs=1.0)
     assert found.rest_odds(STILL, MOVING) < -5.0

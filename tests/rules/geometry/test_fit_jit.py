@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from visup.rules.geometry._fit_jit import (
     binned,
+    binned_trends,
     common_motion,
-    fitted,
+    fit_motion,
     median,
     quick_trend,
     slope_noise,
-    trends,
     velocities,
 )
 from visup.rules.geometry.regions import DIRECTIONS
@@ -29,7 +29,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 def theil_sen(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Lines through samples as they are, without bins."""
-    return trends(times, values, len(times))
+    return binned_trends(times, values, len(times))
 
 
 def binned_of(times: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
@@ -123,7 +123,7 @@ def test_lines_and_bins_are_those_of_dumb_twins(seed: int, bins: int) -> None:
     assert alone == pytest.approx(by_medians(times, values), nan_ok=True)
     found, expected = binned_of(times, values, bins), by_bins(times, values, bins)
     assert np.allclose(found, expected, equal_nan=True)
-    one = [x[0] for x in trends(times, values[:, None], bins)]
+    one = [x[0] for x in binned_trends(times, values[:, None], bins)]
     assert one == pytest.approx(by_medians(*expected), nan_ok=True)
 
 
@@ -229,7 +229,7 @@ def test_velocities_over_spans_are_those_of_a_dumb_twin(
 
 def test_nothing_is_fitted_before_the_window_is_filled() -> None:
     times = np.arange(5) / 25
-    slope, sigma, motion, spread = fitted(
+    slope, sigma, motion, spread = fit_motion(
         times,
         np.zeros((5, 2, 16)),
         np.ones((5, 2, 16), dtype=bool),

@@ -34,7 +34,7 @@ def apart(first: Floats, second: Floats) -> Floats:
 @given(seeds, seeds, st.floats(0.5, 200.0))
 def test_the_least_distance_is_that_of_all_points(one: int, other: int, bound: float) -> None:
     first, second = ring(one), ring(other)
-    boxes = loops.boxes_of(first), loops.boxes_of(second)
+    boxes = loops.run_boxes(first), loops.run_boxes(second)
     found = loops.least_distance(first, boxes[0], second, boxes[1], bound)
     least = apart(first, second).min()
     assert found == pytest.approx(least if least <= bound else np.inf)
@@ -46,7 +46,7 @@ def test_points_beside_an_outline_are_those_with_a_near_point(
     one: int, other: int, bound: float
 ) -> None:
     first, second = ring(one), ring(other)
-    found = loops.beside(first, second, loops.boxes_of(second), bound)
+    found = loops.near_outline(first, second, loops.run_boxes(second), bound)
     assert (found == (apart(first, second).min(axis=1) < bound)).all()
 
 
@@ -63,7 +63,7 @@ def test_an_outline_reaches_out_of_and_into_a_region_as_its_points_say(
     inside = np.asarray(((at >= 0) & (at < (40, 50))).all(axis=1))
     inside[inside] = mask[at[inside, 1], at[inside, 0]]
     far[inside] *= -1
-    boxes = loops.boxes_of(second)
+    boxes = loops.run_boxes(second)
     found = loops.signed_extent(first, step, second, boxes, mask, 20, 10)
     assert found == pytest.approx((far.min(), far.max()))
 
@@ -73,7 +73,7 @@ def test_an_outline_reaches_out_of_and_into_a_region_as_its_points_say(
 def test_an_outline_reaches_as_far_as_its_furthest_point(seed: int) -> None:
     points = ring(seed, at=30.0)
     support, free = np.empty(16), np.empty(16, dtype=bool)
-    loops.reached(points, DIRECTIONS, 80.0, 70.0, support, free)
+    loops.outline_support(points, DIRECTIONS, 80.0, 70.0, support, free)
     along = points @ DIRECTIONS.T
     assert np.allclose(support, along.max(axis=0))
     clear = np.asarray(((points > 1.5) & (points < np.array([77.5, 67.5]))).all(axis=1))
@@ -90,7 +90,7 @@ def test_evenly_spaced_points_are_interpolated_along_the_outline(seed: int, coun
     along = np.append(0.0, np.cumsum(np.hypot(*np.diff(closed, axis=0).T)))
     at = np.linspace(0.0, along[-1], count, endpoint=False)
     expected = np.stack([np.interp(at, along, closed[:, k]) for k in (0, 1)], axis=1)
-    assert np.allclose(loops.evenly(points, count), expected, atol=1e-6)
+    assert np.allclose(loops.resampled(points, count), expected, atol=1e-6)
 
 
 def by_tree(points: Floats, normals: Floats, target: Floats, least: float) -> Floats | None:
@@ -102,7 +102,7 @@ def by_tree(points: Floats, normals: Floats, target: Floats, least: float) -> Fl
         if found.sum() < least:
             return None
         off = target[nearest[found]] - (points + shift)[found]
-        known, *move = loops.step_across(normals[found], off, len(off), 1.5)
+        known, *move = loops.icp_step(normals[found], off, len(off), 1.5)
         if not known:
             return None
         shift = shift + move
@@ -117,13 +117,13 @@ def test_an_outline_is_laid_upon_another_as_by_search_of_all_points(
     seed: int, dx: float, dy: float
 ) -> None:
     rng = np.random.default_rng(seed)
-    points = loops.evenly(ring(seed), 96) + rng.normal(0.0, 1e-3, (96, 2))
+    points = loops.resampled(ring(seed), 96) + rng.normal(0.0, 1e-3, (96, 2))
     angle = rng.uniform(0.0, 2 * np.pi, 96)
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     target = points[rng.random(96) < 0.9] + (dx, dy)
     expected = by_tree(points, normals, target, 48.0)
-    found, x, y = loops.laid(
-        points, normals, (0.0, 0.0), target, loops.boxes_of(target), (12.0, 48.0, 1.5)
+    found, x, y = loops.register(
+        points, normals, (0.0, 0.0), target, loops.run_boxes(target), (12.0, 48.0, 1.5)
     )
     assert found == (expected is not None)
     assert expected is None or (x, y) == pytest.approx(tuple(expected), abs=1e-6)

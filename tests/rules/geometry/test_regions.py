@@ -15,11 +15,11 @@ from visup.rules.geometry.regions import (
     DIRECTIONS,
     RCC8,
     hull_separation,
-    moved,
     pixels_in,
     shared_pixels,
+    shifted_region,
 )
-from visup.rules.relations._thresholds_jit import hold_sign
+from visup.rules.relations._thresholds_jit import signs_with_hysteresis
 from visup.rules.relations.rcc8 import from_outline_signs, outline_differences, rcc8
 
 some = settings(max_examples=80, deadline=None)
@@ -116,7 +116,7 @@ def test_reach_knows_where_the_border_cuts() -> None:
 def test_moved_moves_all_of_a_region() -> None:
     region = box_region(1, (30, 40, 20, 10))
     assert region is not None
-    there = moved(region, 5.4, -3.0)
+    there = shifted_region(region, 5.4, -3.0)
     assert there.bbox == (35, 37, 20, 10)
     assert there.centroid == (region.centroid[0] + 5, region.centroid[1] - 3)
     assert np.allclose(there.contour - region.contour, [5, -3])
@@ -156,7 +156,7 @@ def test_rcc8_of_outlines_is_that_of_masks(a: tuple[int, ...], b: tuple[int, ...
     one, two = (r for r in regions if r is not None)
     for first, second in ((one, two), (two, one)):
         apart = outline_differences((first, second), (0,))
-        signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
+        signs = signs_with_hysteresis(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
         assert RCC8[from_outline_signs(signs)[0]] == by_masks(first, second, 2)
 
 
@@ -171,5 +171,5 @@ def test_outlines_of_an_l_hold_a_box_in_their_corner_that_their_boxes_do_not() -
     boxes = np.array([hook.bbox, box.bbox], dtype=float)
     assert RCC8[rcc8(boxes)[1, 0]] == "non_tangential_proper_part"
     apart = outline_differences((hook, box), (0,))
-    signs = hold_sign(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
+    signs = signs_with_hysteresis(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
     assert RCC8[from_outline_signs(signs)[0]] == "disconnected"

@@ -11,7 +11,7 @@ from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Region
 from visup.evaluation.reasoning.calibration import Calibration
-from visup.rules.identity.votes import VoteSettings, candidates, unknown
+from visup.rules.identity.votes import VoteSettings, candidates, unknown_probability
 from visup.rules.reasoners import default_reasoners
 
 SET = VoteSettings()
@@ -51,7 +51,7 @@ def test_likelihoods_of_all_names_and_of_none_add_up_to_one(
     tally = tuple(sorted(dict(raw).items(), key=lambda i: (-i[1], i[0])))
     every = VoteSettings(most_candidates=20, least_share=0.0, known_votes=0.0)
     found = candidates(tally, every, stranger)
-    whole = sum(c.confidence for c in found) + unknown(tally, every, stranger)
+    whole = sum(c.confidence for c in found) + unknown_probability(tally, every, stranger)
     # Named or not: an object without candidates keeps the likelihoods of its names to itself.
     assert whole == pytest.approx(1.0) if found else whole <= 1.0 + 1e-9
     assert [c.confidence for c in found] == sorted((c.confidence for c in found), reverse=True)

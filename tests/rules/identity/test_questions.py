@@ -14,7 +14,7 @@ from visup.agent.contract.behaviour import Contract
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.rules.identity.questions import wording
+from visup.rules.identity.questions import question_text
 from visup.rules.reasoners import default_reasoners
 from visup.runs.operator import HumanOperator, parse_answers
 
@@ -140,4 +140,6 @@ def test_lines_that_are_no_answers_are_refused(line: str) -> None:
 
 def test_three_names_are_asked_about_in_words() -> None:
     mind = agent_of(doubtful).mind
-    assert wording(mind, 3, ("a_b", "rms_arm", "c")) == "Is object 3 the a b, the arm or the c?"
+    assert (
+        question_text(mind, 3, ("a_b", "rms_arm", "c")) == "Is object 3 the a b, the arm or the c?"
+    )

@@ -8,15 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from visup.rules.pose.angular_velocity import Rate, SpinSettings, measured_rate, spin_of
-from visup.rules.pose.spin_fit import Turns
+from visup.rules.pose.angular_velocity import (
+    AngularVelocity,
+    SpinSettings,
+    estimate_angular_velocity,
+    spin_of,
+)
+from visup.rules.pose.angular_velocity_fit import OrientationSeries
 
 S = SpinSettings()
 
 
 def turning(
     rate: float, seconds: float, seed: int, noise_deg: float = 0.0, every: float = 0.15
-) -> tuple[Turns, np.ndarray]:
+) -> tuple[OrientationSeries, np.ndarray]:
     """An object that turns evenly about a random axis, and its rotation vector per second."""
     rng = np.random.default_rng(seed)
     axis = rng.normal(size=3)
@@ -25,11 +30,13 @@ def turning(
     turns = Rotation.from_rotvec(np.radians(rate) * times[:, None] * axis)
     noise = Rotation.from_rotvec(np.radians(noise_deg) * rng.normal(size=(len(times), 3)))
     seen = noise * turns * Rotation.random(random_state=seed)
-    return Turns(times, seen.as_matrix()), np.radians(rate) * axis
+    return OrientationSeries(times, seen.as_matrix()), np.radians(rate) * axis
 
 
-def measure(turns: Turns, before: Rate | None = None) -> Rate | None:
-    return measured_rate(turns, float(turns.times[-1]), before, S)
+def measure(
+    turns: OrientationSeries, before: AngularVelocity | None = None
+) -> AngularVelocity | None:
+    return estimate_angular_velocity(turns, float(turns.times[-1]), before, S)
 
 
 @given(st.floats(0.0, 90.0), st.floats(3.0, 30.0), st.integers(0, 1000))
@@ -49,7 +56,7 @@ def test_noise_and_outliers_do_no_harm(rate: float) -> None:
         wrong = rng.random(len(turns.times)) < 0.15
         anywhere = Rotation.random(len(wrong), random_state=seed).as_matrix()
         seen = np.where(wrong[:, None, None], anywhere, turns.orientations)
-        found = measure(Turns(turns.times, seen))
+        found = measure(OrientationSeries(turns.times, seen))
         assert found is not None
         assert np.degrees(np.linalg.norm(found.vector - true)) < 0.15 * rate + 0.3
 
@@ -59,7 +66,9 @@ def test_the_twin_of_a_symmetric_object_turns_alike() -> None:
     half_turn = Rotation.from_rotvec([0, 0, np.pi]).as_matrix()
     later = turns.times[:, None, None] > 8.0
     found = measure(
-        Turns(turns.times, np.where(later, turns.orientations @ half_turn, turns.orientations))
+        OrientationSeries(
+            turns.times, np.where(later, turns.orientations @ half_turn, turns.orientations)
+        )
     )
     assert found is not None
     assert np.degrees(np.linalg.norm(found.vector - true)) < 0.5
@@ -78,7 +87,7 @@ def test_a_still_object_has_a_rate_near_zero_with_a_sigma() -> None:
 
 def test_a_view_that_never_changes_still_leaves_room_for_a_slow_turn() -> None:
     times = np.arange(0.0, 10.0, 0.2)
-    rate = measure(Turns(times, np.broadcast_to(np.eye(3), (len(times), 3, 3))))
+    rate = measure(OrientationSeries(times, np.broadcast_to(np.eye(3), (len(times), 3, 3))))
     assert rate is not None
     spin = spin_of(rate, S)
     assert spin is not None
@@ -95,11 +104,13 @@ def test_a_change_of_rate_is_followed_within_six_seconds(first: float, second: f
     seen = np.concatenate([before.orientations, (after.orientations @ link)[1:]])
     shaken = Rotation.from_rotvec(np.radians(4.0) * rng.normal(size=(len(seen), 3))).as_matrix()
     times = np.concatenate([before.times, before.times[-1] + after.times[1:]])
-    every = Turns(times, shaken @ seen)
+    every = OrientationSeries(times, shaken @ seen)
     rate, found = None, {}
     for now in np.arange(3.0, times[-1], 1.0):
         until = times <= now
-        rate = measured_rate(Turns(times[until], every.orientations[until]), now, rate, S)
+        rate = estimate_angular_velocity(
+            OrientationSeries(times[until], every.orientations[until]), now, rate, S
+        )
         found[float(now)] = rate
     hit = before.times[-1]
     for now, told in found.items():
@@ -115,17 +126,17 @@ def test_a_change_of_rate_is_followed_within_six_seconds(first: float, second: f
 
 def test_too_little_is_unknown() -> None:
     assert measure(turning(5.0, 0.9, 0)[0]) is None
-    one = Turns(np.zeros(1), np.eye(3)[None])
+    one = OrientationSeries(np.zeros(1), np.eye(3)[None])
     assert measure(one) is None
     # Orientations all over the place do not hang together.
-    scattered = Turns(np.arange(12.0), Rotation.random(12, random_state=1).as_matrix())
+    scattered = OrientationSeries(np.arange(12.0), Rotation.random(12, random_state=1).as_matrix())
     assert measure(scattered) is None
 
 
 def test_what_is_too_uncertain_is_not_told() -> None:
-    vague = Rate(np.array([0.1, 0.0, 0.0]), np.eye(3) * 0.1**2, 0.5, 0.0)
+    vague = AngularVelocity(np.array([0.1, 0.0, 0.0]), np.eye(3) * 0.1**2, 0.5, 0.0)
     assert spin_of(vague, S) is None
-    sure = Rate(np.array([0.1, 0.0, 0.0]), np.eye(3) * 0.001**2, 0.5, 0.0)
+    sure = AngularVelocity(np.array([0.1, 0.0, 0.0]), np.eye(3) * 0.001**2, 0.5, 0.0)
     spin = spin_of(sure, S)
     assert spin is not None
     assert spin.axis == pytest.approx((1.0, 0.0, 0.0))
@@ -142,7 +153,7 @@ def test_a_change_is_found_however_long_ago_it_was() -> None:
         noise = 3.0 * np.random.default_rng(6).normal(size=(len(seen), 3))
         times = np.concatenate([before.times, before.times[-1] + after.times[1:]])
         shaken = Rotation.from_rotvec(np.radians(noise)).as_matrix() @ seen
-        found = measure(Turns(times, shaken))
+        found = measure(OrientationSeries(times, shaken))
         assert found is not None
         assert found.since == pytest.approx(before.times[-1], abs=2.0)
         assert np.degrees(np.linalg.norm(found.vector - true)) < 0.2 * 3.0

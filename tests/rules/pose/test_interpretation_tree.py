@@ -17,12 +17,12 @@ from visup.agent import Hypothesis
 from visup.agent.model.orientation import views
 from visup.rules.pose._interpretation_tree_jit import NONE
 from visup.rules.pose.interpretation_tree import (
-    Tree,
+    InterpretationTree,
+    SpinPrior,
     TreeSettings,
-    Turning,
-    grown,
+    empty_tree,
+    extended_tree,
     levels_of,
-    planted,
     rival_gap,
 )
 
@@ -41,7 +41,9 @@ def view_matrix(h: Hypothesis) -> np.ndarray | None:
     return np.asarray(Rotation.from_rotvec([0, 0, h.rotation or 0.0]).as_matrix() @ upright)
 
 
-def turn_cost(a: Hypothesis, b: Hypothesis, dt: float, turning: Turning, s: TreeSettings) -> float:
+def turn_cost(
+    a: Hypothesis, b: Hypothesis, dt: float, turning: SpinPrior, s: TreeSettings
+) -> float:
     one, other = view_matrix(a), view_matrix(b)
     if one is None or other is None:
         return 0.0 if a.view == b.view else s.other_view
@@ -56,7 +58,7 @@ def turn_cost(a: Hypothesis, b: Hypothesis, dt: float, turning: Turning, s: Tree
 
 
 def path_cost(
-    looks: Sequence[Look], chosen: Sequence[int], turning: Turning, s: TreeSettings
+    looks: Sequence[Look], chosen: Sequence[int], turning: SpinPrior, s: TreeSettings
 ) -> float:
     total, last, before = 0.0, None, -inf
     for (time, hypotheses), k in zip(looks, chosen, strict=True):
@@ -74,7 +76,7 @@ def path_cost(
     return total
 
 
-def cheapest(looks: Sequence[Look], turning: Turning, s: TreeSettings) -> list[float]:
+def cheapest(looks: Sequence[Look], turning: SpinPrior, s: TreeSettings) -> list[float]:
     every = product(*(range(-1, len(hs)) for _, hs in looks))
     return sorted(path_cost(looks, chosen, turning, s) for chosen in every)
 
@@ -83,11 +85,11 @@ def ranked(hypotheses: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
     return tuple(sorted(hypotheses, key=lambda h: (-h.similarity, h.view, h.rotation or 0.0)))
 
 
-def grow(looks: Sequence[Look], turning: Turning, s: TreeSettings) -> Tree:
-    tree = planted(s)
+def grow(looks: Sequence[Look], turning: SpinPrior, s: TreeSettings) -> InterpretationTree:
+    tree = empty_tree(s)
     for time, hs in looks:
         level = levels_of(hs, time, s)[hs[0].name] if hs else None
-        tree = grown(tree, level, time, turning, s)
+        tree = extended_tree(tree, level, time, turning, s)
     return tree
 
 
@@ -121,12 +123,14 @@ def random_looks(seed: int, count: int, most: int, loose: bool = True) -> list[L
     return looks
 
 
-turnings = st.sampled_from([Turning(), Turning((0.3, -0.2, 0.5), 0.1), Turning((0, 0, 0), 1.0)])
+turnings = st.sampled_from(
+    [SpinPrior(), SpinPrior((0.3, -0.2, 0.5), 0.1), SpinPrior((0, 0, 0), 1.0)]
+)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 5), turnings)
 @settings(deadline=None, max_examples=60)
-def test_the_cheapest_path_is_that_of_trying_all(seed: int, count: int, turning: Turning) -> None:
+def test_the_cheapest_path_is_that_of_trying_all(seed: int, count: int, turning: SpinPrior) -> None:
     looks = random_looks(seed, count, 3)
     costs = cheapest(looks, turning, WIDE)
     tree = grow(looks, turning, WIDE)
@@ -137,7 +141,7 @@ def test_the_cheapest_path_is_that_of_trying_all(seed: int, count: int, turning:
 
 @given(st.integers(0, 10_000), turnings)
 @settings(deadline=None, max_examples=20)
-def test_what_is_dropped_could_never_have_become_cheapest(seed: int, turning: Turning) -> None:
+def test_what_is_dropped_could_never_have_become_cheapest(seed: int, turning: SpinPrior) -> None:
     """Bounds as shipped: with few hypotheses nothing but hopeless paths is dropped."""
     looks = random_looks(seed, 6, 2)
     s = TreeSettings()
@@ -148,11 +152,11 @@ def test_what_is_dropped_could_never_have_become_cheapest(seed: int, turning: Tu
 @settings(deadline=None, max_examples=8)
 def test_memory_is_bounded_whatever_is_hypothesised(seed: int) -> None:
     s = TreeSettings()
-    tree = planted(s)
+    tree = empty_tree(s)
     for time, hs in random_looks(seed, 300, 12):
         level = levels_of(hs, time, s)[hs[0].name] if hs else None
         assert level is None or len(level.views) <= s.most_hypotheses
-        tree = grown(tree, level, time, Turning(), s)
+        tree = extended_tree(tree, level, time, SpinPrior(), s)
         assert len(tree.cost) <= s.most_paths
         assert tree.path.shape == (len(tree.cost), s.lag)
         assert tree.cost.min() == 0.0
@@ -170,7 +174,7 @@ def steady(views: Sequence[int], similarity: float = 0.8, every: float = 0.2) ->
 
 def test_a_wrong_hypothesis_now_and_then_does_not_change_the_view() -> None:
     s = TreeSettings()
-    tree = grow(steady([0, 0, 0, 1, 0, 0, 2, 0, 0]), Turning(), s)
+    tree = grow(steady([0, 0, 0, 1, 0, 0, 2, 0, 0]), SpinPrior(), s)
     assert tree.view[tree.best] == 0
     assert tree.path[tree.best].tolist()[-9:] == [0, 0, 0, NONE, 0, 0, NONE, 0, 0]
     assert tree.since[tree.best] == 0.0
@@ -178,15 +182,17 @@ def test_a_wrong_hypothesis_now_and_then_does_not_change_the_view() -> None:
 
 
 def test_an_object_that_did_turn_is_believed_after_a_while() -> None:
-    tree = grow(steady([0, 0, 0, 0, 1, 1, 1, 1, 1, 1]), Turning(), TreeSettings())
+    tree = grow(steady([0, 0, 0, 0, 1, 1, 1, 1, 1, 1]), SpinPrior(), TreeSettings())
     assert tree.view[tree.best] == 1
     assert tree.since[tree.best] == pytest.approx(4 * 0.2)
 
 
 def test_looks_in_quick_succession_count_no_more_than_slow_ones() -> None:
     s = TreeSettings()
-    slow = grow(steady([0, 1, 0, 1, 0], every=0.2), Turning(), s).total
-    quick = grow(steady([0] * 5 + [1] * 5 + [0] * 5 + [1] * 5 + [0] * 5, every=0.04), Turning(), s)
+    slow = grow(steady([0, 1, 0, 1, 0], every=0.2), SpinPrior(), s).total
+    quick = grow(
+        steady([0] * 5 + [1] * 5 + [0] * 5 + [1] * 5 + [0] * 5, every=0.04), SpinPrior(), s
+    )
     assert quick.total == pytest.approx(slow, rel=0.25)
 
 
@@ -201,8 +207,8 @@ def test_a_quick_turn_is_followed_when_the_spin_is_believed() -> None:
         x, y, z = direction.tolist()
         told = Hypothesis(1, "m", k, 0.8, float(roll), direction=(x, y, z))
         looks.append((0.6 * k, (told,)))
-    assert grow(looks, Turning((0.0, radians(120), 0.0), 0.09), s).total < 0.01
-    assert grow(looks, Turning(sigma=0.2), s).total > 11 * s.wrong / 2
+    assert grow(looks, SpinPrior((0.0, radians(120), 0.0), 0.09), s).total < 0.01
+    assert grow(looks, SpinPrior(sigma=0.2), s).total > 11 * s.wrong / 2
 
 
 def test_the_other_side_of_a_symmetric_object_is_kept_as_a_rival() -> None:
@@ -217,10 +223,10 @@ def test_the_other_side_of_a_symmetric_object_is_kept_as_a_rival() -> None:
         )
         for k in range(4)
     ]
-    tree = grow(twins, Turning(), s)
+    tree = grow(twins, SpinPrior(), s)
     assert tree.view[tree.best] == 0
     assert 0 < rival_gap(tree, s) < 1
-    assert rival_gap(grow(steady([0, 0, 0, 0]), Turning(), s), s) == s.jump
+    assert rival_gap(grow(steady([0, 0, 0, 0]), SpinPrior(), s), s) == s.jump
 
 
 def test_between_two_views_lies_what_both_tell() -> None:

@@ -27,9 +27,9 @@ from visup.agent import (
     Report,
     ReportState,
 )
-from visup.evaluation.simulation.view_noise import ToldViews, ViewNoise
-from visup.percepts.shape.building.views import half_sphere_directions
-from visup.rules.pose.reasoner import BelievePose, PoseSettings, pose_support, tracks
+from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
+from visup.percepts.shape.building.mesh_views import half_sphere_directions
+from visup.rules.pose.reasoner import PoseReasoner, PoseSettings, pose_support, pose_tracks
 from visup.rules.presence.association import OWNERS
 
 REGION = Region(
@@ -56,7 +56,7 @@ def believed(
     times: Floats, told: Callable[[int], Said], mind: Mind | None = None
 ) -> Iterator[tuple[Mind, Pose | None]]:
     """Minds and poses after each look."""
-    mind, think = mind or one_object(), BelievePose()
+    mind, think = mind or one_object(), PoseReasoner()
     for k, time in enumerate(times.tolist()):
         mind = think(replace(mind, time=time), observation(told(k), time)).mind
         yield mind, mind.objects[1].pose
@@ -73,7 +73,7 @@ def spinning(rate: float, seconds: float, seed: int, every: float = 0.12) -> tup
 def told_views(orientations: Floats, seed: int, views: int = 48) -> Callable[[int], Said]:
     rng = np.random.default_rng(seed)
     directions = half_sphere_directions(views)
-    told = ToldViews("sat", directions, ViewNoise(), rng, others=("horse", "mir"))
+    told = NoisyViews("sat", directions, ViewNoise(), rng, others=("horse", "mir"))
     return lambda k: told(orientations[k], 1)
 
 
@@ -130,7 +130,7 @@ def test_the_direction_is_nearer_than_the_best_hypothesis_tells() -> None:
     assert np.mean(poses) < 0.6 * np.mean(raw)
 
 
-def hearing(told: ToldViews, orientations: Floats) -> Callable[[int], Said]:
+def hearing(told: NoisyViews, orientations: Floats) -> Callable[[int], Said]:
     return lambda k: told(orientations[k], 1)
 
 
@@ -144,7 +144,7 @@ def test_confidence_promises_no_more_than_it_holds() -> None:
     for seed, twin in enumerate([0.05, 0.3, 0.45, 0.5]):
         times, true = spinning((0.0, 4.0)[seed % 2], 14.0, seed)
         noise = ViewNoise(twin=twin, wrong=0.4)
-        told = ToldViews("sat", half_sphere_directions(48), noise, np.random.default_rng(seed))
+        told = NoisyViews("sat", half_sphere_directions(48), noise, np.random.default_rng(seed))
         for k, (_, pose) in enumerate(believed(times, hearing(told, true))):
             if pose is not None and times[k] > 1.0:
                 told_sure.append(pose.confidence)
@@ -161,7 +161,7 @@ def test_a_model_whose_views_do_not_hang_together_loses_support() -> None:
     """The wrong model is the most similar at every look, but each time from another side."""
     times, true = spinning(3.0, 10.0, 1)
     rng = np.random.default_rng(0)
-    right = ToldViews(
+    right = NoisyViews(
         "sat", half_sphere_directions(48), ViewNoise(missing=0.0, wrong=0.0, similarity=0.78), rng
     )
 
@@ -182,7 +182,7 @@ def test_nothing_said_is_nothing_known() -> None:
     times = np.arange(0.0, 3.0, 0.1)
     *_, (mind, pose) = believed(times, lambda k: ())
     assert pose is None
-    assert not tracks(mind)
+    assert not pose_tracks(mind)
     assert pose_support(mind, 1, "sat") == 1.0
 
 
@@ -206,7 +206,7 @@ def test_a_hypothesis_told_again_is_no_new_look() -> None:
     times = np.arange(0.0, 4.0, 0.04)
     said = (Hypothesis(1, "sat", 0, 0.8, 0.1, direction=(1.0, 0.0, 0.0)),)
     *_, (mind, pose) = believed(times, lambda k: said)
-    assert len(tracks(mind)[1].levels) == 1
+    assert len(pose_tracks(mind)[1].levels) == 1
     assert pose is not None
     assert pose.direction == pytest.approx((1.0, 0.0, 0.0))
 
@@ -224,7 +224,7 @@ def test_whatever_the_budget_nobody_waits_longer_than_it_takes_to_serve_all(
     count: int, most: int, seed: int
 ) -> None:
     rng, mind = np.random.default_rng(seed), many_objects(count)
-    think = BelievePose(PoseSettings(most_looks=most, every_s=0.0))
+    think = PoseReasoner(PoseSettings(most_looks=most, every_s=0.0))
     served: list[set[int]] = []
     for k in range(30):
         said = tuple(
@@ -233,7 +233,7 @@ def test_whatever_the_budget_nobody_waits_longer_than_it_takes_to_serve_all(
         )
         time = 0.04 * k
         mind = think(replace(mind, time=time), observation(said, time)).mind
-        served.append({i for i, t in tracks(mind).items() if t.time == time})
+        served.append({i for i, t in pose_tracks(mind).items() if t.time == time})
     rounds = -(-count // most)
     assert all(len(ids) == min(count, most) for ids in served)
     for k in range(30 - rounds + 1):
@@ -258,7 +258,7 @@ def test_memory_does_not_grow() -> None:
 
 
 def tracks_of(mind: Mind) -> list[object]:
-    track = tracks(mind)[1]
+    track = pose_tracks(mind)[1]
     levels = [dict(level) for level in track.levels]
     return [dict(track.trees), levels, dict(track.strain), track.settled, track.said]
 

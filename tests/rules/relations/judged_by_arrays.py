@@ -9,7 +9,7 @@ from visup.rules.geometry.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN
 from visup.rules.geometry.pairs import pairs
 from visup.rules.relations.direction import AT_PLACE
 from visup.rules.relations.distance import LIMITS
-from visup.rules.relations.kinematics import Measured
+from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.rcc8 import CONVERSE, DC, EC, EQ, NTPP, NTPPI, PO, TPP, TPPI
 from visup.rules.relations.thresholds import Limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
@@ -132,7 +132,7 @@ def touches(gap: Floats, depth: Floats, before: Array) -> Array:
     return np.where(np.isnan(gap), UNKNOWN, code)
 
 
-def together(now: Measured, before: Array) -> Array:
+def together(now: Kinematics, before: Array) -> Array:
     """(P,) by relative speeds of 2 px/s, 4 in halves, half as much more and 0.7 while it goes on."""
     i, j = pairs(len(now.speed))
     held = before == 1

@@ -9,8 +9,8 @@ from tests.rules.runs import Thought, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Relation, Truth
 from visup.rules.reasoners import default_reasoners
-from visup.rules.relations._reasoner_jit import trend, with_depth
-from visup.rules.relations.reasoner import measured
+from visup.rules.relations._pair_states_jit import classify_trend, combined_trend
+from visup.rules.relations.reasoner import kinematics
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
 
 Place = Callable[[float], float]
@@ -166,14 +166,14 @@ def test_time_runs_out_of_a_bounded_memory() -> None:
     run = thoughts(two_boxes(lambda t: 100, lambda t: 300, 8.0, fps=100.0))
     kept = run[-1].mind.memory["rules.relations"]
     assert len(kept.history.times) <= 65
-    assert measured(run[-1].mind).pair("gap", 1, 2) == pytest.approx(120.0, abs=2.0)
+    assert kinematics(run[-1].mind).pair("gap", 1, 2) == pytest.approx(120.0, abs=2.0)
 
 
 def test_trend_thresholds_have_hysteresis() -> None:
     before = [KEEPING, CONVERGING, CONVERGING, DIVERGING, KEEPING]
     rates = [-1.2, -1.2, -0.5, 1.2, np.nan]
     wanted = [
-        trend(rate, 0.1, was, was, (1.6, 0.8), (3.0, 2.0))
+        classify_trend(rate, 0.1, was, was, (1.6, 0.8), (3.0, 2.0))
         for rate, was in zip(rates, before, strict=True)
     ]
     assert wanted == [KEEPING, CONVERGING, KEEPING, DIVERGING, -1]
@@ -182,7 +182,10 @@ def test_trend_thresholds_have_hysteresis() -> None:
 def test_a_trend_that_waits_is_not_taken_back_by_one_wide_deviation() -> None:
     def found(rate: float, sigma: float) -> list[int]:
         limits = (1.6, 0.8), (3.0, 2.0)
-        return [trend(rate, sigma, KEEPING, pending, *limits) for pending in (KEEPING, DIVERGING)]
+        return [
+            classify_trend(rate, sigma, KEEPING, pending, *limits)
+            for pending in (KEEPING, DIVERGING)
+        ]
 
     for sigma, expected in (
         (1.0, [DIVERGING, DIVERGING]),
@@ -196,5 +199,5 @@ def test_a_trend_that_waits_is_not_taken_back_by_one_wide_deviation() -> None:
 def test_depth_joins_the_image() -> None:
     image = [CONVERGING, CONVERGING, KEEPING, KEEPING, DIVERGING, -1]
     depth = [-1, DIVERGING, CONVERGING, -1, CONVERGING, CONVERGING]
-    joined = [with_depth(i, d) for i, d in zip(image, depth, strict=True)]
+    joined = [combined_trend(i, d) for i, d in zip(image, depth, strict=True)]
     assert joined == [CONVERGING, -1, CONVERGING, KEEPING, -1, -1]

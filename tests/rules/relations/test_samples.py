@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.agent.storage.checkpoint import frozen, thawed
+from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.rules.geometry.regions import FAN
-from visup.rules.relations.samples import ROOM, History, extended, without
+from visup.rules.relations.samples import ROOM, SampleWindow, extended, without_oldest
 
 Row = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -22,12 +22,12 @@ def row(time: float) -> Row:
     )
 
 
-def empty() -> History:
+def empty() -> SampleWindow:
     blank = np.zeros((0, 1, FAN))
-    return History((1,), np.zeros(0), blank, blank > 0, np.zeros((0, 1, 1)), np.zeros((0, 1)))
+    return SampleWindow((1,), np.zeros(0), blank, blank > 0, np.zeros((0, 1, 1)), np.zeros((0, 1)))
 
 
-def holds(history: History, times: list[float]) -> bool:
+def holds(history: SampleWindow, times: list[float]) -> bool:
     """Whether a history is what a plain list of its samples would be."""
     rows = [row(t) for t in times]
     wanted = [np.array([r[k] for r in rows]) for k in range(5)]
@@ -57,9 +57,9 @@ def test_histories_that_branch_and_forget_stay_as_plain_lists(
             time = 1000.0 + number
             made.append((extended(history, row(time)), [*known, time]))
         elif what == "drop":
-            made.append((without(history, min(2, len(known))), known[2:]))
+            made.append((without_oldest(history, min(2, len(known))), known[2:]))
         else:
-            made.append((thawed(frozen(history)), known))
+            made.append((load_state(dump_state(history)), known))
     assert all(holds(history, known) for history, known in made)
 
 
@@ -67,7 +67,7 @@ def test_minds_in_a_row_share_the_memory_of_their_samples() -> None:
     """A hundred kept histories of a window of 30 samples take less than a tenth of their length."""
     history, kept = empty(), []
     for t in range(150):
-        history = extended(without(history, max(0, len(history.times) - 29)), row(float(t)))
+        history = extended(without_oldest(history, max(0, len(history.times) - 29)), row(float(t)))
         kept.append(history)
     memory = {id(h.support.base): h.support.base for h in kept[50:]}
     assert all(m is not None for m in memory.values())

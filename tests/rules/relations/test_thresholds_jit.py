@@ -10,13 +10,13 @@ from visup.rules.geometry.hysteresis import Codes, Floats
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import DIRECTIONS
 from visup.rules.relations import _kinematics_jit as measure_loops
-from visup.rules.relations import _reasoner_jit as relation_loops
+from visup.rules.relations import _pair_states_jit as relation_loops
 from visup.rules.relations import _thresholds_jit as judge_loops
 from visup.rules.relations.direction import CONVERSE as OPPOSITE
-from visup.rules.relations.kinematics import Measured
+from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.rcc8 import CONVERSE, from_outline_signs, from_signs
 from visup.rules.relations.reasoner import ROWS
-from visup.rules.relations.thresholds import JUDGED, JudgeSettings, limits
+from visup.rules.relations.thresholds import BOX_ROWS, ThresholdSettings, limits
 
 some = settings(max_examples=80, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
@@ -50,9 +50,9 @@ def test_boxes_are_judged_as_by_arrays(seed: int, m: int) -> None:
     before = np.concatenate(
         [codes(rng, 2, 8, p), codes(rng, 8, 1, p), codes(rng, 3, 1, p), codes(rng, 2, 4, p)]
     )
-    bounds = limits(JudgeSettings(), 800.0)
-    found = np.empty((JUDGED, p), dtype=np.int8)
-    judge_loops.judged(before, boxes, velocities, spread, bounds, found)
+    bounds = limits(ThresholdSettings(), 800.0)
+    found = np.empty((BOX_ROWS, p), dtype=np.int8)
+    judge_loops.classify_boxes(before, boxes, velocities, spread, bounds, found)
     expected = twin.judged(before, boxes, velocities, spread, bounds)
     assert (found == expected).all()
     apart = twin.differences(boxes)
@@ -65,7 +65,7 @@ def test_boxes_are_judged_as_by_arrays(seed: int, m: int) -> None:
 def test_signs_are_those_of_arrays(seed: int) -> None:
     rng = np.random.default_rng(seed)
     values, before = holed(rng, rng.normal(0.0, 2.0, (3, 20))), codes(rng, 2, 3, 20)
-    found = judge_loops.hold_sign(values, before, 2.0, 1.0)
+    found = judge_loops.signs_with_hysteresis(values, before, 2.0, 1.0)
     assert (found == twin.signs(values, before, 2.0, 1.0)).all()
     sigma = rng.uniform(0.1, 1.0, 20)
     moving = judge_loops.moving_signs(values[0], sigma, before[0], (1.0, 0.5, 3.0, 2.0))
@@ -82,7 +82,7 @@ def test_rcc8_follows_from_signs_case_by_case(seed: int) -> None:
     assert (from_outline_signs(outlines) == twin.outlines_rcc8_of(outlines)).all()
 
 
-def measured(rng: np.random.Generator, m: int) -> Measured:
+def measured(rng: np.random.Generator, m: int) -> Kinematics:
     """Quantities as they may come out of `measure.py`."""
     tables = holed(rng, rng.normal(0.0, 3.0, (5, m, m)))
     tables = np.ascontiguousarray(np.triu(tables, 1) + np.triu(tables, 1).transpose(0, 2, 1))
@@ -90,7 +90,7 @@ def measured(rng: np.random.Generator, m: int) -> Measured:
     motion = holed(rng, rng.normal(0.0, 6.0, (3, m, 2)) * rng.choice([0.2, 1.0]) + 9.0)
     tables[3] = np.hypot(*(motion[0][:, None] - motion[0]).transpose(2, 0, 1))
     speed, depth = np.hypot(*motion[0].T), holed(rng, rng.uniform(5.0, 8.0, m))
-    return Measured(tuple(range(m)), tables, motion, speed, depth, 0.5, 0.5)
+    return Kinematics(tuple(range(m)), tables, motion, speed, depth, 0.5, 0.5)
 
 
 @some
@@ -103,7 +103,7 @@ def test_trend_touch_and_moving_together_are_those_of_arrays(seed: int, m: int) 
     marks = rng.choice([0, 0, 1, 2, 3], p).astype(np.int8)
     found = np.concatenate([np.zeros((3, p), dtype=np.int8), depth[None]])
     bounds = (1.6, 0.8), (3.0, 2.0), (3.0, 5.0, 0.2, 0.25), (2.0, 4.0, 1.5, 0.7)
-    relation_loops.wanted(
+    relation_loops.classify_motion(
         state, pending, now.tables, now.motion, now.speed, now.depth, gap, marks, bounds, found
     )
     i, j = pairs(m)
@@ -123,7 +123,7 @@ def test_what_is_told_is_what_is_believed_with_its_converse(seed: int, m: int) -
     now, p = measured(rng, m), m * (m - 1) // 2
     state, rcc8 = codes(rng, 2, ROWS, p), codes(rng, 7, 2, p)
     since, turned = rng.uniform(0.0, 9.0, (ROWS, p)), rng.uniform(0.0, 9.0, (2, p))
-    told, moments, numbers = relation_loops.told(
+    told, moments, numbers = relation_loops.relation_rows(
         state, since, rcc8, turned, now.tables, now.depth, CONVERSE, OPPOSITE, (9.5, 0.8, 0.5)
     )
     i, j = pairs(m)
@@ -160,7 +160,7 @@ def test_places_and_outlines_follow_what_moves_and_smooth_what_shakes(seed: int,
         steady = np.abs(value - before) <= jump
         return np.asarray(np.where(steady, before + 0.4 * (value - before), value))
 
-    found = relation_loops.places(boxes, gap, seen, now.tables, (0.4, 3.0, 2.0, 0.3, 1.5))
+    found = relation_loops.smoothed_boxes(boxes, gap, seen, now.tables, (0.4, 3.0, 2.0, 0.3, 1.5))
     wanted = np.where(seen[:, :1] > 0.3, np.nan, seen[:, 4:])
     i, j = pairs(m)
     gaps = smooth(gap, now.gap[i, j], 2.0)
@@ -169,7 +169,9 @@ def test_places_and_outlines_follow_what_moves_and_smooth_what_shakes(seed: int,
     assert found[2].tolist() == np.flatnonzero(gaps <= 1.5).tolist()
     before, apart = holed(rng, rng.uniform(30.0, 41.0, (3, p))), rng.normal(35.0, 3.0, (3, p))
     asked = found[2]
-    level = relation_loops.outlines(before, gaps, asked, apart[:, asked].copy(), (0.4, 2.0, 40.0))
+    level = relation_loops.smoothed_outlines(
+        before, gaps, asked, apart[:, asked].copy(), (0.4, 2.0, 40.0)
+    )
     value = np.where(np.isnan(gaps), np.nan, np.full((3, p), 40.0))
     value[:, asked] = apart[:, asked]
     assert np.allclose(level, smooth(before, value, 2.0), equal_nan=True)
@@ -185,7 +187,7 @@ def test_quantities_of_pairs_are_those_of_arrays(seed: int, m: int) -> None:
     seen = rng.normal(0.0, 9.0, (m, 8))
     seen[:, 0] = rng.choice([0.0, 1.0], m)
     seen[:, 3] = rng.uniform(0.1, 1.0, m)
-    found, speed = measure_loops.tables(
+    found, speed = measure_loops.pair_tables(
         gaps, slope, sigma, velocity, support, seen, DIRECTIONS, (4.0, 3.0, 4.0, 0.75)
     )
     reach = support[:, None] + support[:, (np.arange(16) + 8) % 16]
@@ -195,7 +197,7 @@ def test_quantities_of_pairs_are_those_of_arrays(seed: int, m: int) -> None:
     sure = (parting > np.maximum(3.0, 4.0 * spread)) & (gaps <= 4.0) & (slope < parting)
     rate = np.where(sure, parting, slope)
     rate[np.maximum(seen[i, 0], seen[j, 0]) > 0.75] = np.nan
-    now = Measured(tuple(range(m)), found, np.zeros((3, m, 2)), speed)
+    now = Kinematics(tuple(range(m)), found, np.zeros((3, m, 2)), speed)
     assert np.allclose(now.gap[i, j], gaps, equal_nan=True)
     assert np.allclose(now.rate[i, j], rate, equal_nan=True)
     assert np.allclose(now.rate_sigma[i, j], np.where(sure, spread, sigma), equal_nan=True)
@@ -217,8 +219,8 @@ def test_only_near_pairs_are_asked_and_a_moment_out_of_sight_keeps_the_last_gap(
     seen[3, 0] = 0.2
     apart, before = np.full((4, 4), 7.0), np.full((4, 4), 33.0)
     apart[1, 2] = np.nan
-    gaps, asked = measure_loops.near_pairs(seen, apart, before, 5.0, 0.3)
+    gaps, asked = measure_loops.hull_gaps(seen, apart, before, 5.0, 0.3)
     assert asked.tolist() == [0]
     assert np.array_equal(gaps, [7.0, 7.0, 33.0, np.nan, 33.0, 33.0], equal_nan=True)
     seen[3, 0] = 0.4
-    assert np.isnan(measure_loops.near_pairs(seen, apart, before, 5.0, 0.3)[0][[2, 4, 5]]).all()
+    assert np.isnan(measure_loops.hull_gaps(seen, apart, before, 5.0, 0.3)[0][[2, 4, 5]]).all()

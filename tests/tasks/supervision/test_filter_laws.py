@@ -18,7 +18,7 @@ from visup.evaluation.reasoning.filter_laws import (
 )
 from visup.tasks import load_task, parse_task
 from visup.tasks.actions.actions import known_actions
-from visup.tasks.actions.vocabulary import vocabulary
+from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
@@ -58,7 +58,7 @@ MIXED = (
 
 
 def model_of(task: Task) -> MonitoredPhases:
-    words = vocabulary(task, known_actions())
+    words = task_vocabulary(task, known_actions())
     return MonitoredPhases(task, words.meanings, DEFAULT_SETTINGS, words.looks)
 
 

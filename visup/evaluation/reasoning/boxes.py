@@ -19,12 +19,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from visup.rules.geometry._fit_jit import slope_noise, trends
-from visup.rules.geometry.ema import smoothed
-from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Latch, step, unknown_latch
-from visup.rules.geometry.pairs import carried, pairs
+from visup.rules.geometry._fit_jit import binned_trends, slope_noise
+from visup.rules.geometry.ema import exponential_mean
+from visup.rules.geometry.hysteresis import UNKNOWN, Codes, HysteresisState, advance, unknown_states
+from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import RCC8, Floats
-from visup.rules.relations._thresholds_jit import box_gaps, judged, moving_signs
+from visup.rules.relations._thresholds_jit import box_gaps, classify_boxes, moving_signs
 from visup.rules.relations.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.relations.direction import DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
@@ -32,17 +32,17 @@ from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import CONVERSE, from_signs
 from visup.rules.relations.thresholds import (
     AWAY,
+    BOX_ROWS,
     DIRECTION,
     DISTANCE,
-    JUDGED,
     ORDER,
     SIDE,
-    JudgeSettings,
+    ThresholdSettings,
     least_durations,
     limits,
 )
 
-APPROACH = JUDGED
+APPROACH = BOX_ROWS
 APPROACH_NAMES = ("converging", "keeping_distance", "diverging")
 
 
@@ -61,7 +61,7 @@ class BoxSettings:
             must exceed 5 deviations of the noise and 3 of its own fit.
     """
 
-    judge: JudgeSettings = field(default_factory=JudgeSettings)
+    judge: ThresholdSettings = field(default_factory=ThresholdSettings)
     diagonal: float = 800.0
     window_s: float = 1.5
     samples: int = 64
@@ -91,7 +91,7 @@ class Boxes:
     times: tuple[float, ...] = ()
     samples: tuple[Floats, ...] = ()
     smooth: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    latch: Latch = field(default_factory=lambda: unknown_latch((JUDGED + 1, 0), 0.0))
+    latch: HysteresisState = field(default_factory=lambda: unknown_states((BOX_ROWS + 1, 0), 0.0))
     gap: Floats = field(default_factory=lambda: np.zeros(0))
     rate: Floats = field(default_factory=lambda: np.zeros(0))
     rate_sigma: Floats = field(default_factory=lambda: np.zeros(0))
@@ -161,7 +161,7 @@ def watch_boxes(
     m, p = len(ids), len(pairs(len(ids))[0])
     boxes = np.ascontiguousarray(boxes, dtype=float)
     gap = box_gaps(boxes)
-    smooth = smoothed(kept.smooth, boxes, now - kept.time, 6.0 * s.judge.noise_px)
+    smooth = exponential_mean(kept.smooth, boxes, now - kept.time, 6.0 * s.judge.noise_px)
     places = boxes[:, :2] + 0.5 * boxes[:, 2:]
     times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
     seconds = np.array(times)
@@ -172,11 +172,11 @@ def watch_boxes(
     spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
     judge, state = s.judge, kept.latch.state
     bounds = limits(judge, s.diagonal)
-    codes = np.empty((JUDGED + 1, p), dtype=np.int8)
-    judged(state, smooth, velocity, spread, bounds, codes)
+    codes = np.empty((BOX_ROWS + 1, p), dtype=np.int8)
+    classify_boxes(state, smooth, velocity, spread, bounds, codes)
     rate, rate_sigma = slope[:p], np.maximum(np.sqrt(2.0) * noise, s.fit_share * sigma[:p])
     codes[APPROACH] = moving_signs(rate, rate_sigma, state[APPROACH], bounds[-4:])
-    latch = step(kept.latch, codes, now, _lasts(judge))
+    latch = advance(kept.latch, codes, now, _lasts(judge))
     return Boxes(ids, now, times, samples, smooth, latch, gap, rate, rate_sigma, velocity)
 
 
@@ -184,7 +184,7 @@ DEFAULT = BoxSettings()
 
 
 @lru_cache(maxsize=8)
-def _lasts(judge: JudgeSettings) -> Floats:
+def _lasts(judge: ThresholdSettings) -> Floats:
     return np.append(least_durations(judge), [[judge.motion_minimum_s]], axis=0)
 
 
@@ -206,12 +206,12 @@ def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats
     if len(times) < 6 or times[-1] - times[0] < 0.6 * s.window_s:
         unknown = np.full(samples.shape[1], np.nan)
         return unknown, unknown
-    return trends(times, samples, s.bins)
+    return binned_trends(times, samples, s.bins)
 
 
 def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
     """The same of other objects: what is new has no samples and no states."""
-    rows, numbers = carried(before.ids, ids)
+    rows, numbers = reindexing(before.ids, ids)
     p, m = len(before.gap), len(before.ids)
     at = np.concatenate(
         [numbers, np.where(rows < 0, -1, p + rows), np.where(rows < 0, -1, p + m + rows)]

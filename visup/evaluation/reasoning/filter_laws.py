@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from visup.agent import Relation, Truth
 from visup.evaluation.oracles import oracle
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.stage_hmm import ActionStatus
 from visup.tasks.automaton.task_filter import TaskFilter
@@ -82,7 +82,7 @@ def drawn_distance(seed: int) -> Distance:
     rng = random.Random(seed)
     task = read(recognition_tasks.text_of(recognition_tasks.Draw(rng).rules()))
     keys = recognition_tasks.KEYS
-    actions = {k: Meaning(k, (k,), contrary=(f"not {k}",), text=k) for k in keys}
+    actions = {k: ActionDefinition(k, (k,), contrary=(f"not {k}",), text=k) for k in keys}
     spells = {k: drawn_spells(rng) for k in keys}
     times = [FRAME_S * i for i in range(STEPS)]
     recorded = [(now, _seen_at(now, spells)) for now in times]

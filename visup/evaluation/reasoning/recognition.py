@@ -127,7 +127,7 @@ def evidence(seen: Mapping[str, tuple[str, float]]) -> dict[ActionKey, ActionEvi
 
 
 @dataclass(frozen=True)
-class Played:
+class SimulatedRun:
     """One way in which a task truly went, and what was seen of it.
 
     Attributes:
@@ -139,9 +139,9 @@ class Played:
     seen: tuple[Mapping[ActionKey, ActionEvidence], ...]
 
 
-def play(
+def simulate_run(
     task: Task, rng: random.Random, mean_s: float, wrong: float = WRONG, most: int = 10**6
-) -> Played:
+) -> SimulatedRun:
     """Let a task run its course: stages in a legal order, each as long as chance has it.
 
     Args:
@@ -164,7 +164,7 @@ def play(
             stages.append(step.stage)
             seen.append({k: _verdict(k == (step.action, step.actors), rng, wrong) for k in keys})
         node = rng.choice(automaton.transitions(node)).target
-    return Played(tuple(stages), tuple(seen))
+    return SimulatedRun(tuple(stages), tuple(seen))
 
 
 SURE = {s: ActionEvidence(s) for s in ActionStatus}
@@ -180,7 +180,7 @@ def _verdict(going: bool, rng: random.Random, wrong: float) -> ActionEvidence:
 
 
 @dataclass(frozen=True)
-class Followed:
+class TrackingResult:
     """How well one task was followed.
 
     Attributes:
@@ -200,19 +200,19 @@ class Followed:
     dropped_truth: int
 
 
-def follow(stages: int, seed: int, mean_s: float) -> Followed:
+def follow(stages: int, seed: int, mean_s: float) -> TrackingResult:
     """Follow a random task of so many stages and compare with the truth, and with no pruning."""
     rng = random.Random(seed)
     task = read(recognition_tasks.large_task(stages, rng))
-    played = play(task, rng, mean_s)
+    played = simulate_run(task, rng, mean_s)
     pruned, whole = hidden_filter(task), hidden_filter(task, most=10**9, least=0.0)
     told = list(_beliefs(pruned, played))
     said = [pruned.ranking(b) for b in told]
     # Without pruning every place is worked out at every step, which takes a while.
-    some = Played(played.stages[:UNPRUNED_STEPS], played.seen[:UNPRUNED_STEPS])
+    some = SimulatedRun(played.stages[:UNPRUNED_STEPS], played.seen[:UNPRUNED_STEPS])
     exact = [whole.ranking(b)[0][0] for b in _beliefs(whole, some)]
     count = len(said)
-    return Followed(
+    return TrackingResult(
         right=sum(r[0][0] == s for r, s in zip(said, played.stages, strict=True)) / count,
         steps=count,
         kept=statistics.fmean(len(b.hypotheses) for b in told),
@@ -222,7 +222,7 @@ def follow(stages: int, seed: int, mean_s: float) -> Followed:
     )
 
 
-def _beliefs(recogniser: HiddenFilter, played: Played) -> Iterator[HiddenPosterior]:
+def _beliefs(recogniser: HiddenFilter, played: SimulatedRun) -> Iterator[HiddenPosterior]:
     belief = recogniser.start()
     for i, seen in enumerate(played.seen):
         belief = recogniser.step(belief, seen, FRAME_S if i else 0.0)
@@ -236,7 +236,7 @@ def speed(stages: int, seed: int = 0, steps: int = 2_000) -> float:
     """
     rng = random.Random(seed)
     task = read(recognition_tasks.large_task(stages, rng))
-    seen = play(task, rng, 4.0, most=steps).seen[:steps]
+    seen = simulate_run(task, rng, 4.0, most=steps).seen[:steps]
     recogniser = hidden_filter(task)
     begin = time.process_time()
     belief = recogniser.start()

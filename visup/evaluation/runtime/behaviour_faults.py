@@ -26,13 +26,13 @@ import numpy as np
 from visup.agent import Contract, Depth, Health, HealthStatus, Hypothesis
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.model.records import BROKEN, ReportState
+from visup.agent.model.records import FAULT_STATES, ReportState
 from visup.agent.model.step import Step
-from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, Misbehaving
+from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.predicates.inputs_missing import inputs
-from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
+from visup.rules.predicates.inputs_missing import percepts_read
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.reasoners import default_reasoners
 from visup.testing import LabelledFrame, Scripted, crossing
 
@@ -46,7 +46,7 @@ ARGUMENTS = {"relation": "converging", "kind": "region", "name": "disc", "zone":
 
 
 @dataclass(slots=True)
-class Trial:
+class BehaviourFaultTrial:
     """One fault and what came of it.
 
     Attributes:
@@ -107,16 +107,18 @@ def evaluate_faults(
     }
 
 
-def draw(number: int, seed: int) -> Trial:
+def draw(number: int, seed: int) -> BehaviourFaultTrial:
     """What is tried: kinds of fault go round, the rest is drawn."""
     rng = np.random.default_rng([seed, number])
     names = list(FAULTS)
     fault = names[number % len(names)]
     isolated = fault in DEADLY or bool(rng.random() < 0.4)
-    return Trial(number, fault, str(rng.choice(KINDS)), isolated, int(rng.integers(2, 24)))
+    return BehaviourFaultTrial(
+        number, fault, str(rng.choice(KINDS)), isolated, int(rng.integers(2, 24))
+    )
 
 
-def run(trial: Trial) -> None:
+def run(trial: BehaviourFaultTrial) -> None:
     """Run one trial and note what came of it."""
     rng = np.random.default_rng([trial.number, trial.at])
     contract = Contract(
@@ -127,7 +129,7 @@ def run(trial: Trial) -> None:
         memory_mb=ALLOWED_MB,
     )
     lasts = int(rng.integers(1, 5))
-    culprit = Misbehaving(
+    culprit = FaultyBehaviour(
         contract, _truth()[trial.kind], trial.fault, trial.at, lasts, 1.5 * BUDGET_S
     )
     others = [_honest(kind) for kind in KINDS if kind != trial.kind]
@@ -147,7 +149,7 @@ def run(trial: Trial) -> None:
         agent.close()
 
 
-def _watch(trial: Trial, agent: Agent) -> None:
+def _watch(trial: BehaviourFaultTrial, agent: Agent) -> None:
     for shot in _shots():
         begin = time.perf_counter()
         step = agent.step(shot.frame)
@@ -159,9 +161,9 @@ def _watch(trial: Trial, agent: Agent) -> None:
     trial.recovered = _report(step).state is ReportState.RAN
 
 
-def _judge(trial: Trial, step: Step) -> None:
+def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
     """Look for what is taken for known in one step although it is unknown."""
-    broken = _report(step).state in BROKEN
+    broken = _report(step).state in FAULT_STATES
     if broken and (trial.kind not in step.mind.unknown or step.observation.observed(trial.kind)):
         trial.problems.append(f"unknown: '{trial.kind}' counts as observed")
     if broken and not _told(step):
@@ -173,7 +175,7 @@ def _judge(trial: Trial, step: Step) -> None:
             return  # no rule was read in this step
         word = alert.kind.removeprefix(PROBE).rpartition("_")[0]
         fresh = alert.updated == step.time
-        if alert.kind.startswith(PROBE) and fresh and unknown & inputs(word):
+        if alert.kind.startswith(PROBE) and fresh and unknown & percepts_read(word):
             trial.problems.append(f"fine: {alert.kind} holds while {sorted(unknown)} is unknown")
     for alert in step.alerts:
         if alert.closed is not None and unknown.intersection(alert.needs):
@@ -182,7 +184,7 @@ def _judge(trial: Trial, step: Step) -> None:
 
 def _told(step: Step) -> bool:
     open_now = any(a.kind == "behaviour_failed" and a.key == "culprit" for a in step.mind.alerts)
-    return open_now and _report(step).state in BROKEN
+    return open_now and _report(step).state in FAULT_STATES
 
 
 def _report(step: Step) -> Any:
@@ -193,7 +195,7 @@ def _report(step: Step) -> Any:
 def probes() -> tuple[Rule, ...]:
     """Two rules for each word: one is true when the word is, the other when its negation is."""
     lines = []
-    for name, word in WORDS.items():
+    for name, word in PREDICATES.items():
         lines += _pair(name, word.takes, "{call}", "not {call}")
     for name, quantity in QUANTITIES.items():
         one = f"1 {quantity.unit}"
@@ -242,7 +244,7 @@ def _honest(kind: str) -> Scripted:
     return Scripted(f"true_{kind}", (kind,), lambda frame: list(truth[frame.index]))
 
 
-def _figures(trials: Sequence[Trial]) -> dict[str, Any]:
+def _figures(trials: Sequence[BehaviourFaultTrial]) -> dict[str, Any]:
     wrong = Counter(what for t in trials for what in {p.partition(":")[0] for p in t.problems})
     return {
         "trials": len(trials),

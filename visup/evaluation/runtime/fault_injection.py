@@ -23,10 +23,10 @@ NAP_S = 30.0
 """How long a behaviour sleeps that hangs in a call that nothing interrupts."""
 
 Honest = list[Percept]
-Fault = Callable[["Misbehaving", Frame, Honest], Any]
+Fault = Callable[["FaultyBehaviour", Frame, Honest], Any]
 
 
-class Misbehaving:
+class FaultyBehaviour:
     """A behaviour that reports what is true, except for a while.
 
     Args:
@@ -54,7 +54,9 @@ class Misbehaving:
         self.pause_s = pause_s
         self.kept: list[Any] = []
 
-    def perceive(self, frame: Frame, seen: Observation, directives: Sequence[Directive]) -> Any:
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Any:
         """What is true of the frame, or what comes of the fault."""
         honest = [self.contract.percept(frame, v) for v in self.truth[frame.index]]
         return FAULTS[self.fault](self, frame, honest) if frame.index in self.span else honest
@@ -66,32 +68,32 @@ class _UnreadableError(Exception):
 
 
 def _raise(fault: BaseException) -> Fault:
-    def misbehave(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+    def misbehave(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
         raise fault
 
     return misbehave
 
 
-def _recurse(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _recurse(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     return _recurse(self, frame, honest)
 
 
-def _spin(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _spin(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     while True:
         pass
 
 
-def _sleep(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _sleep(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     time.sleep(NAP_S)
     return honest
 
 
-def _slow(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _slow(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     time.sleep(self.pause_s)
     return honest
 
 
-def _stubborn(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _stubborn(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     """Hangs, and swallows whatever asks it to stop, for a while."""
     until = time.monotonic() + 4 * self.pause_s
     while time.monotonic() < until:
@@ -102,28 +104,28 @@ def _stubborn(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
     return honest
 
 
-def _leak(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _leak(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     self.kept.append(np.ones(LEAK_MB * 2**20, np.uint8))
     return honest
 
 
-def _write(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _write(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     frame.image[:] = 0
     return honest
 
 
-def _endless(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _endless(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     return itertools.cycle(honest or [self.contract.percept(frame, 0.0)])
 
 
-def _endless_lines(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _endless_lines(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
     """A generator that never yields."""
     while True:
         yield from ()
 
 
-def _percepts(change: Callable[[Misbehaving, Frame, Percept], Any]) -> Fault:
-    def misbehave(self: Misbehaving, frame: Frame, honest: Honest) -> Any:
+def _percepts(change: Callable[[FaultyBehaviour, Frame, Percept], Any]) -> Fault:
+    def misbehave(self: FaultyBehaviour, frame: Frame, honest: Honest) -> Any:
         some = honest or [Percept(self.contract.gives[0], 0.0, frame.time, self.contract.name)]
         return [change(self, frame, p) for p in some]
 
@@ -137,7 +139,7 @@ NUMBERS = ("centroid", "similarity", "depth")
 def _number(value: float) -> Fault:
     """A number that is none, in whatever kind of value."""
 
-    def change(self: Misbehaving, frame: Frame, p: Percept) -> Percept:
+    def change(self: FaultyBehaviour, frame: Frame, p: Percept) -> Percept:
         for name in NUMBERS:
             if hasattr(p.value, name):
                 bad: Any = (value, value) if name == "centroid" else value
@@ -149,21 +151,21 @@ def _number(value: float) -> Fault:
     return _percepts(change)
 
 
-def _shape(self: Misbehaving, frame: Frame, p: Percept) -> Percept:
+def _shape(self: FaultyBehaviour, frame: Frame, p: Percept) -> Percept:
     """Wrong shape of a mask, or the wrong type where there is none."""
     if hasattr(p.value, "mask"):
         return replace(p, value=replace(p.value, mask=p.value.mask[:-1]))
     return replace(p, value=np.full((2, 2), np.nan))
 
 
-def _outside(self: Misbehaving, frame: Frame, p: Percept) -> Percept:
+def _outside(self: FaultyBehaviour, frame: Frame, p: Percept) -> Percept:
     if hasattr(p.value, "bbox"):
         x, y, w, h = p.value.bbox
         return replace(p, value=replace(p.value, bbox=(x + 10_000, y, w, h)))
     return replace(p, confidence=1e9)
 
 
-def _unhashable(self: Misbehaving, frame: Frame, p: Percept) -> Percept:
+def _unhashable(self: FaultyBehaviour, frame: Frame, p: Percept) -> Percept:
     kind: Any = ["region"]
     return replace(p, kind=kind)
 

@@ -23,8 +23,8 @@ from rich.console import Console
 from visup.agent.model.errors import OutputError, SettingsError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text
 from visup.runs.resume import interrupted_run
-from visup.runs.runner import RunOptions, supervise
-from visup.runs.settings import WatchSettings
+from visup.runs.runner import Audience, supervise
+from visup.runs.settings import RunOptions, WatchSettings
 from visup.terminal.narrator import Narrator
 
 KILLED_AGAIN = 0.25
@@ -65,7 +65,7 @@ def evaluate_resume(
     if not hasattr(os, "fork"):
         raise SettingsError("runs can only be killed where processes can be forked")
     rng = np.random.default_rng(seed)
-    tally: dict[str, _Tally] = {"with states": _Tally(), "without": _Tally()}
+    tally: dict[str, _ResumeCounts] = {"with states": _ResumeCounts(), "without": _ResumeCounts()}
     failures: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
         place = Path(scratch)
@@ -110,7 +110,7 @@ def crossing(path: Path, seed: int) -> Path:
     return path
 
 
-class _Tally:
+class _ResumeCounts:
     def __init__(self) -> None:
         self.kills = self.early = self.resumed = self.equal = self.lost = 0
         self.seconds: list[float] = []
@@ -128,7 +128,7 @@ def _trial(
     whole_s: float,
     expected: object,
     rng: np.random.Generator,
-    tally: _Tally,
+    tally: _ResumeCounts,
 ) -> Sequence[str]:
     """Kill one run and go on with it to its end; what is wrong with it."""
     tally.kills += 1
@@ -184,7 +184,8 @@ def _supervise(
 ) -> None:
     past = interrupted_run(folder) if resume else None
     options = RunOptions(video=False, report=False, state_every_s=every)
-    supervise(settings, folder, observers=[Narrator(console, True)], options=options, past=past)
+    audience = Audience([Narrator(console, True)])
+    supervise(settings, folder, audience=audience, options=options, past=past)
 
 
 def _forked(folder: Path, run: Callable[[Console], None]) -> int:

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.index.records import NewView, View
-from visup.percepts.shape.matching.similarity import Shape
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.index.view_records import ModelView, NewView
+from visup.percepts.shape.matching.shape_similarity import Shape
 from visup.percepts.shape.shocks.shock_graph import ShockGraph, frozen_graph
-from visup.percepts.shape.silhouette.areas import area_map, painted
+from visup.percepts.shape.silhouette.area_overlap import area_map, paint_outline
 from visup.percepts.shape.silhouette.silhouette import polygon_moments
 
 STRENGTH = 0.18
@@ -25,7 +25,7 @@ _WAVES = 3
 Warp = Callable[[NDArray[np.floating]], NDArray[np.float64]]
 
 
-def multiplied(
+def augmented(
     database: ModelDatabase,
     path: Path,
     views: int,
@@ -56,7 +56,7 @@ def multiplied(
     return ModelDatabase.create(path, every())
 
 
-def _new(view: View, shape: Shape) -> NewView:
+def _new(view: ModelView, shape: Shape) -> NewView:
     return NewView(view.name, view.direction, view.area, shape, view.also, view.smoothing)
 
 
@@ -79,7 +79,11 @@ def deformed(shape: Shape, seed: int, number: int) -> Shape:
     outline = ((contour - centre) / unit).astype(np.float32)
     graph = _swollen(shape.graph, warp, centre, unit, rng)
     return Shape(
-        outline, graph, area_map(painted(outline, _PIXELS, _HALF) > 0.6), shape.cut, shape.border
+        outline,
+        graph,
+        area_map(paint_outline(outline, _PIXELS, _HALF) > 0.6),
+        shape.cut,
+        shape.border,
     )
 
 

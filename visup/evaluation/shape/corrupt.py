@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.index.records import NODE, VIEW
+from visup.percepts.shape.index.view_records import NODE, VIEW
 
 Random = np.random.Generator
 Mask = NDArray[np.generic]
@@ -28,19 +28,19 @@ LARGE = 8192
 _NUMBERS = (0.0, -1.0, 1e9, -1e30, np.nan, np.inf, -np.inf)
 
 
-def damage(path: Path, sound: bytes, kind: str, rng: Random) -> None:
+def corrupt_file(path: Path, sound: bytes, kind: str, rng: Random) -> None:
     """Write a damaged copy of a sound database file.
 
     Args:
         path: Where; whatever stands there is replaced.
         sound: The sound file.
-        kind: A key of `DAMAGES`.
+        kind: A key of `CORRUPTIONS`.
         rng: Of everything that is drawn.
     """
     if path.is_dir():
         path.rmdir()
     path.write_bytes(sound)
-    DAMAGES[kind](path, sound, rng)
+    CORRUPTIONS[kind](path, sound, rng)
 
 
 def _flipped(path: Path, sound: bytes, rng: Random) -> None:
@@ -216,7 +216,7 @@ def _run(path: Path, *commands: str) -> None:
         file.commit()
 
 
-DAMAGES: dict[str, Callable[[Path, bytes, Random], None]] = {
+CORRUPTIONS: dict[str, Callable[[Path, bytes, Random], None]] = {
     "flipped": _flipped,
     "header": _header,
     "truncated": _truncated,

@@ -18,10 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import VisupError
-from visup.evaluation.shape.corrupt import DAMAGES, HARMLESS, LARGE, MASKS, damage, odd_mask
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.index.records import NewView
-from visup.percepts.shape.matching.similarity import shape_of
+from visup.evaluation.shape.corrupt import (
+    CORRUPTIONS,
+    HARMLESS,
+    LARGE,
+    MASKS,
+    corrupt_file,
+    odd_mask,
+)
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.index.view_records import NewView
+from visup.percepts.shape.matching.shape_similarity import shape_of
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 FILES = 2000
@@ -37,11 +44,11 @@ _VIEWS = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CorruptionOutcome:
     """What came of a trial.
 
     Attributes:
-        kind: A key of `DAMAGES` or `MASKS`.
+        kind: A key of `CORRUPTIONS` or `MASKS`.
         number: Within the campaign.
         what: 'refused', 'answered', 'nothing', or what went wrong.
         seconds: Time of the processor that it took.
@@ -80,7 +87,7 @@ def evaluate_robustness(
         `failed` (counts) and `worst_s`; `failures` lists what failed: kind, number, what, seconds.
     """
     tell = progress or (lambda _: None)
-    outcomes: list[Outcome] = []
+    outcomes: list[CorruptionOutcome] = []
     with tempfile.TemporaryDirectory() as scratch:
         database = sound_database(Path(scratch) / "sound.db", seed)
         for number in range(files):
@@ -127,11 +134,11 @@ def _drawn(rng: np.random.Generator) -> NDArray[np.bool_]:
     return canvas > 0
 
 
-def try_file(sound: ModelDatabase, path: Path, number: int, seed: int) -> Outcome:
+def try_file(sound: ModelDatabase, path: Path, number: int, seed: int) -> CorruptionOutcome:
     """Damage a file and use it: open it, read every shape, ask it for a shape that it holds."""
-    kinds = tuple(DAMAGES)
+    kinds = tuple(CORRUPTIONS)
     kind = kinds[number % len(kinds)]
-    damage(path, sound.path.read_bytes(), kind, np.random.default_rng([seed, 2, number]))
+    corrupt_file(path, sound.path.read_bytes(), kind, np.random.default_rng([seed, 2, number]))
     asked = sound.shapes[number % len(sound.shapes)]
     begin = time.process_time()
     try:
@@ -146,10 +153,12 @@ def try_file(sound: ModelDatabase, path: Path, number: int, seed: int) -> Outcom
         what = "refused"
     except Exception as fault:  # anything else is what the campaign looks for
         what = f"{type(fault).__name__}: {fault}"
-    return Outcome(kind, number, what, time.process_time() - begin)
+    return CorruptionOutcome(kind, number, what, time.process_time() - begin)
 
 
-def try_mask(database: ModelDatabase, number: int, seed: int, largest: int = LARGE) -> Outcome:
+def try_mask(
+    database: ModelDatabase, number: int, seed: int, largest: int = LARGE
+) -> CorruptionOutcome:
     """Ask for a mask that no camera gives."""
     rng = np.random.default_rng([seed, 3, number])
     kinds = tuple(MASKS)
@@ -165,7 +174,7 @@ def try_mask(database: ModelDatabase, number: int, seed: int, largest: int = LAR
         what = "refused"
     except Exception as fault:  # anything else is what the campaign looks for
         what = f"{type(fault).__name__}: {fault}"
-    return Outcome(kind, number, what, time.process_time() - begin)
+    return CorruptionOutcome(kind, number, what, time.process_time() - begin)
 
 
 def _size(rng: np.random.Generator) -> tuple[int, int]:
@@ -174,7 +183,7 @@ def _size(rng: np.random.Generator) -> tuple[int, int]:
     return max(1, int(height)), max(1, int(width))
 
 
-def _counted(outcomes: list[Outcome]) -> dict[str, Any]:
+def _counted(outcomes: list[CorruptionOutcome]) -> dict[str, Any]:
     counts = {w: sum(o.what == w for o in outcomes) for w in ("refused", "answered", "nothing")}
     failed = sum(o.failed for o in outcomes)
     worst = max((o.seconds for o in outcomes), default=0.0)

@@ -1,6 +1,6 @@
 """How a model database does when it grows: opening, answering, memory, and what the index loses.
 
-Views of meshes are multiplied by deformation (`multiply.py`); each size is measured in a process of its
+Views of meshes are multiplied by deformation (`augment.py`); each size is measured in a process of its
 own, so that its memory is that of the database. What is lost is told against exhaustive search.
 """
 
@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.shape.augment import multiplied
+from visup.evaluation.shape.augment import augmented
 from visup.percepts.shape.building.build import build_database
-from visup.percepts.shape.building.views import load_mesh, render_views, sphere_directions
-from visup.percepts.shape.database.database import ModelDatabase
+from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
+from visup.percepts.shape.database.model_database import ModelDatabase
 
 VIEWS_OF_A_MESH = 16
 SIZES = (1, 10)
@@ -82,7 +82,7 @@ def evaluate_scale(
         counts = [len(base.views) * k for k in SIZES]
         for views in (*counts, *([most] if most > counts[-1] else [])):
             path = Path(scratch) / f"{views}.db"
-            multiplied(base, path, views, seed, lambda n, of=views: tell(f"{n} of {of} views"))  # type: ignore[misc]
+            augmented(base, path, views, seed, lambda n, of=views: tell(f"{n} of {of} views"))  # type: ignore[misc]
             tell(f"queries among {views} views")
             items[f"{views} views"] = _probed(path, masks, exhaustive=views in counts)
             path.unlink()
@@ -122,7 +122,7 @@ def _probed(path: Path, masks: Path, *, exhaustive: bool) -> dict[str, Any]:
 def probe(path: Path, masks: Sequence[NDArray[np.bool_]], *, exhaustive: bool) -> dict[str, Any]:
     """Figures of one database; see `evaluate_scale`."""
     # What is imported when it is first needed is no part of opening or answering.
-    from visup.percepts.shape.matching.similarity import shape_of
+    from visup.percepts.shape.matching.shape_similarity import shape_of
     from visup.percepts.shape.silhouette.silhouette import normalise
 
     shapes = [shape_of(s) for m in masks if (s := normalise(m)) is not None]

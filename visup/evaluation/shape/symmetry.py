@@ -46,7 +46,7 @@ def silhouette_symmetries(mesh: Any, seed: int = 0) -> NDArray[np.float64]:
         (S, 3, 3) float64 proper rotations of direction vectors, mesh frame; the identity is first.
     """
     points = _surface(mesh, seed)
-    looks = _Looks(points)
+    looks = _SurfaceComparison(points)
     axes = np.vstack([np.eye(3), np.linalg.eigh(points.T @ points)[1].T])
     moves = [m for axis in axes for m in _symmetries_of(axis, axes, looks)]
     # Point reflection mirrors the silhouette: with a reflection it gives a proper rotation.
@@ -80,7 +80,7 @@ def _surface(mesh: Any, seed: int) -> NDArray[np.float64]:
     return np.asarray(spots / np.linalg.norm(spots, axis=1).max())
 
 
-class _Looks:
+class _SurfaceComparison:
     """Whether a surface looks the same after a move."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
@@ -99,7 +99,7 @@ class _Looks:
 
 
 def _symmetries_of(
-    axis: NDArray[np.float64], axes: NDArray[np.float64], looks: _Looks
+    axis: NDArray[np.float64], axes: NDArray[np.float64], looks: _SurfaceComparison
 ) -> list[NDArray[np.float64]]:
     """Turns about an axis, and reflections in planes that hold it or stand upright on it."""
     round_about = all(looks.same(_turn(axis, d)) for d in _ODD_DEG)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from visup.percepts.shape.building.views import render_views
+from visup.percepts.shape.building.mesh_views import render_views
 
 CONDITIONS = ("clean", "noise", "cut", "both")
 """Names of the conditions."""

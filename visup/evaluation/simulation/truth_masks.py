@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Region
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.missions.mission_files import read_json
-from visup.rules.coupling.relative_motion import Target, kept_outline, laid_upon
+from visup.evaluation.missions.files import read_json
+from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
 from visup.rules.geometry.regions import outline
 
 MARGIN = 8
@@ -59,7 +59,7 @@ class Mission:
     """
 
     name: str
-    told: Mapping[str, Any]
+    description: Mapping[str, Any]
     truth: Mapping[str, Any]
     masks: tuple[Mapping[str, TrueMask], ...]
 
@@ -135,8 +135,8 @@ def _region(mask: TrueMask, size: tuple[int, int]) -> Region:
 def _velocity(
     old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
 ) -> tuple[float, float] | None:
-    kept = kept_outline(old, others, size)
-    laid = None if kept is None else laid_upon(kept, Target.of(outline(new)))
+    kept = outline_template(old, others, size)
+    laid = None if kept is None else registered(kept, TargetOutline.of(outline(new)))
     return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
 
 

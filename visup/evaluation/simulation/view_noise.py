@@ -45,7 +45,7 @@ class ViewNoise:
     top: int = 3
 
 
-class ToldViews:
+class NoisyViews:
     """Hypotheses for one object, look by look.
 
     Args:

@@ -1,1 +1,4 @@
-"""imaging."""
+"""Images from scenes: rays are cast from the camera, shaded, put before a background and exposed.
+
+Read `renderer` (the frame loop), `raycast` (which face a ray meets), `texture`, `background`, `sensor`.
+"""

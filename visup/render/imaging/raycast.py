@@ -53,7 +53,7 @@ class Hits:
     distance: Floats
 
 
-class Caster:
+class RayCaster:
     """All bodies of a frame, ready for rays.
 
     Args:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from visup.agent.model.errors import SettingsError
 from visup.render.imaging import background as sky
-from visup.render.imaging.raycast import Body, Caster, Hits
+from visup.render.imaging.raycast import Body, Hits, RayCaster
 from visup.render.imaging.sensor import expose
 from visup.render.imaging.texture import pattern
 from visup.render.meshes import arm as arm_model
@@ -37,7 +37,7 @@ SUBRAYS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class RenderedFrame:
     """A rendered frame.
 
     Attributes:
@@ -74,7 +74,7 @@ def pixel_rays(camera: Camera, at: NDArray[np.float64] | None = None) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class CameraView:
     """How the scene is seen at a time.
 
     Attributes:
@@ -109,7 +109,7 @@ class Renderer:
         self._rays: tuple[float, Floats] | None = None
         self._sky: tuple[object, Floats] | None = None
 
-    def picture(self, index: int) -> Picture:
+    def picture(self, index: int) -> RenderedFrame:
         """Render one frame.
 
         Args:
@@ -120,7 +120,7 @@ class Renderer:
         """
         view = self.view(index)
         bodies = self.bodies(view.time, view.pose)
-        caster = Caster(bodies)
+        caster = RayCaster(bodies)
         width, height = view.camera.size
         inside = self._window(bodies, view)
         hits = _spread(caster.from_pinhole(view.rays[inside]), inside)
@@ -129,7 +129,7 @@ class Renderer:
         self._smooth_edges(radiance, caster, hits, behind, view)
         sensor = self.scenario.sensor.at(view.time)
         image = expose(radiance.reshape(height, width, 3), sensor, self.scenario.seed, index)
-        return Picture(
+        return RenderedFrame(
             index,
             image,
             self._labels(bodies, hits),
@@ -142,16 +142,18 @@ class Renderer:
         view = self.view(index)
         bodies = self.bodies(view.time, view.pose)
         inside = self._window(bodies, view)
-        return self._labels(bodies, _spread(Caster(bodies).from_pinhole(view.rays[inside]), inside))
+        return self._labels(
+            bodies, _spread(RayCaster(bodies).from_pinhole(view.rays[inside]), inside)
+        )
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> CameraView:
         """How the scene is seen in a frame."""
         time = index / self.scenario.camera.fps
         camera = self.scenario.camera.at(time)
         if self._rays is None or self._rays[0] != camera.fov_vertical_deg:
             self._rays = (camera.fov_vertical_deg, pixel_rays(camera))
         light = self.scenario.light.at(time)
-        return View(time, camera, self.camera_pose(time), light, self._rays[1])
+        return CameraView(time, camera, self.camera_pose(time), light, self._rays[1])
 
     def _labels(self, bodies: list[Body], hits: Hits) -> NDArray[np.uint8]:
         """(H, W): the label of what each ray met."""
@@ -217,7 +219,7 @@ class Renderer:
     def _arm_solid(self, item: SceneObject, time: float) -> Solid:
         return _coloured(arm_model.arm_solid(self._joints(item, time)), item)
 
-    def _window(self, bodies: list[Body], view: View) -> NDArray[np.bool_]:
+    def _window(self, bodies: list[Body], view: CameraView) -> NDArray[np.bool_]:
         """(H * W,): the pixels inside the boxes that the bodies project to."""
         width, height = view.camera.size
         window = np.zeros((height, width), bool)
@@ -226,18 +228,18 @@ class Renderer:
             window[y0:y1, x0:x1] = True
         return window.ravel()
 
-    def _amodal(self, bodies: list[Body], view: View) -> dict[str, int]:
+    def _amodal(self, bodies: list[Body], view: CameraView) -> dict[str, int]:
         """Pixels of each labelled object were it alone."""
         counts = {}
         for body in bodies:
             if not body.label:
                 continue
             window = self._window([body], view)
-            hits = Caster([body]).from_pinhole(view.rays[window])
+            hits = RayCaster([body]).from_pinhole(view.rays[window])
             counts[body.name] = int(np.count_nonzero(hits.body >= 0))
         return counts
 
-    def _background(self, view: View) -> Floats:
+    def _background(self, view: CameraView) -> Floats:
         """(H, W, 3) radiance; kept from frame to frame while nothing of it changes."""
         settings = self.scenario.background
         moving = isinstance(settings, Earth) and settings.turn_deg_per_s != 0
@@ -247,7 +249,7 @@ class Renderer:
             self._sky = (key, self._draw_background(view))
         return self._sky[1]
 
-    def _draw_background(self, view: View) -> Floats:
+    def _draw_background(self, view: CameraView) -> Floats:
         settings, rotation = self.scenario.background, view.pose[:3, :3]
         width, height = view.camera.size
         if isinstance(settings, Panorama):
@@ -260,13 +262,13 @@ class Renderer:
             drawn.reshape(-1, 3)[met] = light[met] * np.float32(view.light.strength)
         return drawn
 
-    def _looking(self, view: View) -> Floats:
+    def _looking(self, view: CameraView) -> Floats:
         """(H * W, 3) unit directions through the pixels, world."""
         rays = view.rays @ view.pose[:3, :3].T.astype(np.float32)
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
     def _shade(
-        self, caster: Caster, hits: Hits, rays: Floats, behind: Floats, view: View
+        self, caster: RayCaster, hits: Hits, rays: Floats, behind: Floats, view: CameraView
     ) -> Floats:
         """(N, 3) radiance along rays from the pinhole, BGR."""
         radiance = behind.copy()
@@ -288,7 +290,7 @@ class Renderer:
         radiance[met] = albedo[:, ::-1] * strength[:, None]
         return radiance
 
-    def _grain(self, caster: Caster, body: NDArray[np.int32], points: Floats) -> Floats:
+    def _grain(self, caster: RayCaster, body: NDArray[np.int32], points: Floats) -> Floats:
         """(N,) factors of reflectance at points on bodies, by the textures of these."""
         factor = np.ones(len(points), np.float32)
         for number, placed in enumerate(caster.bodies):
@@ -302,7 +304,7 @@ class Renderer:
         return factor
 
     def _smooth_edges(
-        self, radiance: Floats, caster: Caster, hits: Hits, behind: Floats, view: View
+        self, radiance: Floats, caster: RayCaster, hits: Hits, behind: Floats, view: CameraView
     ) -> None:
         """Replace pixels on edges by the mean over a grid of rays within them."""
         width, height = view.camera.size

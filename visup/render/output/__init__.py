@@ -1,1 +1,4 @@
-"""output."""
+"""What rendering writes: mission folders with ground truth, the demo clip and its model database.
+
+Read `truth` (what is true of a frame and of a mission), `writer` (the folder), `demo_clip`, `demo_models`.
+"""

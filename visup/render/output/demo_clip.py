@@ -12,7 +12,7 @@ from pathlib import Path
 
 from visup.render.imaging.renderer import Renderer
 from visup.render.output.truth import frame_truth, mission, mission_truth
-from visup.render.output.writer import VideoWriter
+from visup.render.output.writer import ClipWriter
 from visup.render.scenario.library import shipped_scenario
 
 CLIP, RECORD = "sts87.mp4", "sts87.json"
@@ -30,7 +30,7 @@ def write_demo_clip(folder: Path, progress: Callable[[int, int], None] | None = 
     renderer = Renderer(scenario)
     labels = {o.name: o.label for o in scenario.labelled}
     frames = []
-    with VideoWriter(folder / CLIP, scenario.camera.fps, scenario.camera.size) as video:
+    with ClipWriter(folder / CLIP, scenario.camera.fps, scenario.camera.size) as video:
         for index in range(scenario.frame_count):
             picture = renderer.picture(index)
             video.write(picture.image)

@@ -18,9 +18,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from visup.percepts.shape.building.build import rendered, silhouette_views
-from visup.percepts.shape.building.views import half_sphere_directions
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.index.records import NewView
+from visup.percepts.shape.building.mesh_views import half_sphere_directions
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.index.view_records import NewView
 from visup.render.imaging.renderer import Renderer
 from visup.render.meshes.distractors import THINGS
 from visup.render.meshes.spacecraft import mesh

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from visup.render.imaging.renderer import Picture, Renderer
+from visup.render.imaging.renderer import RenderedFrame, Renderer
 from visup.render.scenario.scenario import Scenario
 from visup.render.scenario.trajectories import Matrix
 
@@ -19,7 +19,7 @@ HIDDEN, SHOWN = 0.20, 0.50
 """It is occluded when less than the first share of it is visible, and back when more than the second."""
 
 
-def frame_truth(picture: Picture, labels: Mapping[str, int]) -> dict[str, Any]:
+def frame_truth(picture: RenderedFrame, labels: Mapping[str, int]) -> dict[str, Any]:
     """What is true of one frame.
 
     Args:

@@ -20,7 +20,7 @@ CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".webm": "VP90"}
 """Container -> codec that OpenCV writes and reads everywhere."""
 
 
-class VideoWriter:
+class ClipWriter:
     """A video file that grows frame by frame; a context manager.
 
     Args:
@@ -41,7 +41,7 @@ class VideoWriter:
         if not self._writer.isOpened():
             raise OutputError("the video cannot be written", where=str(path))
 
-    def __enter__(self) -> VideoWriter:
+    def __enter__(self) -> ClipWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -78,7 +78,7 @@ def write_mission(
     labels = {o.name: o.label for o in scenario.labelled}
     _make_folder(out)
     frames = []
-    with VideoWriter(out / f"video{container}", scenario.camera.fps, scenario.camera.size) as video:
+    with ClipWriter(out / f"video{container}", scenario.camera.fps, scenario.camera.size) as video:
         for index in range(scenario.frame_count):
             picture = renderer.picture(index)
             video.write(picture.image)

@@ -25,7 +25,7 @@ Direction = Annotated[Vector, AfterValidator(_not_zero)]
 Seconds = Annotated[float, Field(ge=0)]
 
 
-class Strict(BaseModel):
+class ScenarioModel(BaseModel):
     """Settings that cannot be changed, and know of no other keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -39,7 +39,7 @@ def rising(keys: tuple[Any, ...]) -> tuple[Any, ...]:
     return keys
 
 
-class CameraKey(Strict):
+class CameraKey(ScenarioModel):
     """Where the camera is at a time, and the point it looks at."""
 
     at_s: Seconds = 0.0
@@ -57,7 +57,7 @@ class CameraKey(Strict):
         return self
 
 
-class Shake(Strict):
+class Shake(ScenarioModel):
     """An unsteady hand."""
 
     amplitude_deg: Annotated[float, Field(ge=0, le=5)]
@@ -70,28 +70,28 @@ Exposure = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0)]
 
 
-class ZoomKey(Strict):
+class ZoomKey(ScenarioModel):
     """The vertical field of view at a time."""
 
     at_s: Seconds = 0.0
     fov_vertical_deg: FieldOfView
 
 
-class LightKey(Strict):
+class LightKey(ScenarioModel):
     """How strong the light is at a time."""
 
     at_s: Seconds = 0.0
     strength: Share
 
 
-class ExposureKey(Strict):
+class ExposureKey(ScenarioModel):
     """How much the sensor makes of the light at a time."""
 
     at_s: Seconds = 0.0
     exposure: Exposure
 
 
-class Camera(Strict):
+class Camera(ScenarioModel):
     """The camera and its track."""
 
     size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = (
@@ -115,7 +115,7 @@ class Camera(Strict):
         return float(self.size[1] / 2 / np.tan(np.radians(self.fov_vertical_deg) / 2))
 
 
-class Light(Strict):
+class Light(ScenarioModel):
     """One distant sun, and the weak light of the Earth."""
 
     sun: Direction
@@ -129,7 +129,7 @@ class Light(Strict):
         return _at(self, self.track, "strength", time)
 
 
-class Stars(Strict):
+class Stars(ScenarioModel):
     """Stars that stand still in the world."""
 
     kind: Literal["stars"] = "stars"
@@ -138,7 +138,7 @@ class Stars(Strict):
     seed: int = 0
 
 
-class Earth(Strict):
+class Earth(ScenarioModel):
     """A cloudy Earth with its limb before the stars; `light.earth` says where it is."""
 
     kind: Literal["earth"]
@@ -151,7 +151,7 @@ class Earth(Strict):
     seed: int = 0
 
 
-class Panorama(Strict):
+class Panorama(ScenarioModel):
     """A patterned surface far away on all sides; its pattern blends two colours."""
 
     kind: Literal["panorama"]
@@ -160,7 +160,7 @@ class Panorama(Strict):
     seed: int = 0
 
 
-class Texture(Strict):
+class Texture(ScenarioModel):
     """A pattern that goes through a body, as grain goes through wood."""
 
     contrast: Annotated[float, Field(ge=0, le=1)] = 0.5
@@ -168,7 +168,7 @@ class Texture(Strict):
     seed: int = 0
 
 
-class Sensor(Strict):
+class Sensor(ScenarioModel):
     """What the camera makes of the light."""
 
     exposure: Exposure = 1.0

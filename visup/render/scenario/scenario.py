@@ -11,24 +11,24 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
-from visup.agent.model.errors import ManyErrors, Place, SettingsError, VisupError
+from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.render.scenario.optics import (
     Camera,
     Direction,
     Earth,
     Light,
     Panorama,
+    ScenarioModel,
     Seconds,
     Sensor,
     Stars,
-    Strict,
     Texture,
     Vector,
     rising,
 )
 
 
-class PoseKey(Strict):
+class PoseKey(ScenarioModel):
     """Where an object is at a time; at most one way to give its orientation, none for unturned."""
 
     at_s: Seconds = 0.0
@@ -45,7 +45,7 @@ class PoseKey(Strict):
         return self
 
 
-class TipKey(Strict):
+class TipKey(ScenarioModel):
     """Where the tip of an arm is at a time, and the way its end effector points (world)."""
 
     at_s: Seconds = 0.0
@@ -53,14 +53,14 @@ class TipKey(Strict):
     direction: Direction
 
 
-class JointKey(Strict):
+class JointKey(ScenarioModel):
     """The six joint angles of an arm at a time, degrees, from the shoulder to the tip."""
 
     at_s: Seconds = 0.0
     angles_deg: tuple[float, float, float, float, float, float]
 
 
-class Spin(Strict):
+class SteadyRotation(ScenarioModel):
     """A steady turn about an axis of the world, from a time on, added to the track."""
 
     axis: Direction
@@ -71,14 +71,14 @@ class Spin(Strict):
 Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(rising)]
 
 
-class Attachment(Strict):
+class Attachment(ScenarioModel):
     """From a time on the object moves as if bolted to another (the tip, when that is an arm)."""
 
     to: str
     from_s: Seconds
 
 
-class SceneObject(Strict):
+class SceneObject(ScenarioModel):
     """Something in the scene: a rigid body on a track, or an arm led by its tip or its joints.
 
     Objects with label 0 are scenery: they are seen but belong to the background.
@@ -94,7 +94,7 @@ class SceneObject(Strict):
     scale: Annotated[float, Field(gt=0)] = 1.0
     smooth: bool = False
     track: Keys
-    spin: tuple[Spin, ...] = ()
+    spin: tuple[SteadyRotation, ...] = ()
     attach: Attachment | None = None
     tip: Annotated[tuple[TipKey, ...], AfterValidator(rising)] = ()
     joints: Annotated[tuple[JointKey, ...], AfterValidator(rising)] = ()
@@ -115,7 +115,7 @@ class SceneObject(Strict):
         return self
 
 
-class StageTruth(Strict):
+class StageTruth(ScenarioModel):
     """A stage that a supervisor should see, and how it goes."""
 
     stage: str
@@ -124,7 +124,7 @@ class StageTruth(Strict):
     outcome: Literal["complete", "failing", "unsafe"]
 
 
-class AlertTruth(Strict):
+class AlertTruth(ScenarioModel):
     """An alert that a supervisor should raise."""
 
     kind: str
@@ -132,7 +132,7 @@ class AlertTruth(Strict):
     objects: tuple[str, ...] = ()
 
 
-class CouplingTruth(Strict):
+class CouplingTruth(ScenarioModel):
     """Two objects take hold of each other, or let go."""
 
     kind: Literal["coupled", "decoupled"]
@@ -140,7 +140,7 @@ class CouplingTruth(Strict):
     at_s: Seconds
 
 
-class Truth(Strict):
+class ScenarioTruth(ScenarioModel):
     """What is meant by the scene; the geometry gives the rest."""
 
     verdict: Literal["succeeded", "failed", "interrupted", "in_progress"] = "in_progress"
@@ -150,7 +150,7 @@ class Truth(Strict):
     spin_of: str | None = None
 
 
-class Scenario(Strict):
+class Scenario(ScenarioModel):
     """A whole scenario file."""
 
     name: Annotated[str, Field(pattern=r"^[\w-]+$")]
@@ -162,7 +162,7 @@ class Scenario(Strict):
     background: Annotated[Stars | Earth | Panorama, Field(discriminator="kind")] = Stars()
     sensor: Sensor = Sensor()
     object: Annotated[tuple[SceneObject, ...], Field(min_length=1)]
-    truth: Truth = Truth()
+    truth: ScenarioTruth = ScenarioTruth()
 
     @property
     def frame_count(self) -> int:
@@ -243,7 +243,7 @@ def parse_scenario(text: str, name: str = "scenario") -> Scenario:
         return Scenario.model_validate(data)
     except ValidationError as error:
         faults: list[VisupError] = [_fault(e, name, text) for e in _root_faults(error)]
-        raise (faults[0] if len(faults) == 1 else ManyErrors(faults)) from error
+        raise (faults[0] if len(faults) == 1 else ErrorGroup(faults)) from error
 
 
 def _beside(scenario: Scenario, folder: Path) -> Scenario:
@@ -284,7 +284,7 @@ def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
     )
 
 
-def _place(name: str, text: str, steps: list[Any]) -> Place | None:
+def _place(name: str, text: str, steps: list[Any]) -> SourceLocation | None:
     """The line where a key stands, when its word occurs only once in the file."""
     keys = [s for s in steps if isinstance(s, str)]
     if not keys:
@@ -298,4 +298,4 @@ def _place(name: str, text: str, steps: list[Any]) -> Place | None:
     if len(found) != 1:
         return None
     number, line = found[0]
-    return Place(name, number, line.index(key) + 1, line, len(key))
+    return SourceLocation(name, number, line.index(key) + 1, line, len(key))

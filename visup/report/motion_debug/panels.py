@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
-from visup.percepts.motion.features.constraints import Constraints
+from visup.percepts.motion.features.motion_constraints import Constraints
 from visup.percepts.motion.features.settings import MotionSettings
-from visup.percepts.motion.layers.discovery import slack_of
-from visup.percepts.motion.layers.layers import distances
-from visup.percepts.motion.tracks.scene import Measured
-from visup.percepts.motion.tracks.trace import Looked
-from visup.percepts.motion.tracks.tracking import Track
+from visup.percepts.motion.layers.affine import distances
+from visup.percepts.motion.layers.layer_discovery import layer_slack
+from visup.percepts.motion.tracks.measurements import BaselineMotion
+from visup.percepts.motion.tracks.trace import SegmentationTrace
+from visup.percepts.motion.tracks.track import Track
 from visup.report.image_text import ink, shade, write
 from visup.report.motion_debug.marks import (
     INK,
@@ -67,29 +67,29 @@ class Canvas:
         return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
 
 
-def draw_motion(frame: Frame, looked: Looked | None, regions: Sequence[Region]) -> Image:
+def draw_motion(frame: Frame, trace: SegmentationTrace | None, regions: Sequence[Region]) -> Image:
     """Four panels that show how a frame was understood.
 
     Args:
         frame: The frame.
-        looked: The segmenter's workings after it; None where it had nothing to compare with yet.
+        trace: The segmenter's workings after it; None where it had nothing to compare with yet.
         regions: What was reported of it.
 
     Returns:
         (H, W, 3) uint8 BGR; the size depends on that of the frame only.
     """
-    canvas = _canvas(frame, looked)
+    canvas = _canvas(frame, trace)
     panels = [
-        _constraints(canvas, looked),
-        _layers(canvas, looked),
-        _labels(canvas, looked),
-        _regions(canvas, looked, regions, frame),
+        _constraints(canvas, trace),
+        _layers(canvas, trace),
+        _labels(canvas, trace),
+        _regions(canvas, trace, regions, frame),
     ]
     rows = [np.hstack([*_gap(panels[i : i + 2])]) for i in (0, 2)]
-    return np.vstack([rows[0], rows[1], _footer(rows[0].shape[1], frame, looked, regions)])
+    return np.vstack([rows[0], rows[1], _footer(rows[0].shape[1], frame, trace, regions)])
 
 
-def _canvas(frame: Frame, looked: Looked | None) -> Canvas:
+def _canvas(frame: Frame, trace: SegmentationTrace | None) -> Canvas:
     image = frame.image
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
@@ -98,7 +98,7 @@ def _canvas(frame: Frame, looked: Looked | None) -> Canvas:
     size = max(16, round(width * grow)), max(16, round(height * grow))
     way = cv2.INTER_AREA if grow < 1 else cv2.INTER_CUBIC
     shown = np.asarray(cv2.resize(image, size, interpolation=way), np.uint8)
-    scale = looked.scene.image.scale if looked is not None else 1.0
+    scale = trace.scene.image.scale if trace is not None else 1.0
     return Canvas(shown, size[0] / (width * scale), scale)
 
 
@@ -116,50 +116,50 @@ def colour_of(track: Track) -> Rgb:
     return object_colour(track.id) if track.id > 0 else CANDIDATE
 
 
-def best_measured(looked: Looked) -> tuple[NDArray[np.bool_], ...]:
+def best_measured(trace: SegmentationTrace) -> tuple[NDArray[np.bool_], ...]:
     """For each baseline, which constraints are shown: each point on its longest one."""
-    taken = np.zeros(len(looked.scene.points), dtype=bool)
+    taken = np.zeros(len(trace.scene.points), dtype=bool)
     out = []
-    for m in reversed(looked.scene.measured):
+    for m in reversed(trace.scene.measured):
         fresh = ~taken[m.constraints.index]
         taken[m.constraints.index] = True
         out.append(fresh)
     return tuple(reversed(out))
 
 
-def explained_by(looked: Looked, m: Measured) -> NDArray[np.int64]:
+def explained_by(trace: SegmentationTrace, m: BaselineMotion) -> NDArray[np.int64]:
     """Which layer explains each constraint of a baseline best.
 
     Args:
-        looked: The segmenter's workings.
+        trace: The segmenter's workings.
         m: One baseline of them.
 
     Returns:
         (N,) int64: 0 for the background, k for the k-th track, -1 where none does. A track explains
         only what is in it or beside it.
     """
-    c, cells = m.constraints, looked.scene.cells
+    c, cells = m.constraints, trace.scene.cells
     best, layer = m.background.distances(c), np.zeros(len(c), np.int64)
-    at = looked.scene.cell_of(c)
-    for k, t in enumerate(looked.tracks, 1):
-        near = cells.reach((t.share > 0.3)[:, None], 1)[at, 0]
-        parts = [distances(p, c, slack_of(p, t.centre)) for p in t.predicted(c.lag, c.span_s)]
+    at = trace.scene.cell_of(c)
+    for k, t in enumerate(trace.tracks, 1):
+        near = cells.dilated((t.share > 0.3)[:, None], 1)[at, 0]
+        parts = [distances(p, c, layer_slack(p, t.centre)) for p in t.predicted(c.lag, c.span_s)]
         off = np.min(parts, axis=0) if parts else np.full(len(c), np.inf)
         better = near & (off < best)
         best, layer = np.where(better, off, best), np.where(better, k, layer)
     return np.where(best > OUTLIER_PX2, -1, layer)
 
 
-def _constraints(canvas: Canvas, looked: Looked | None) -> Image:
+def _constraints(canvas: Canvas, trace: SegmentationTrace | None) -> Image:
     out = canvas.ground(0.5)
     title = f"1 constraints, as motion in {ARROW_S:g} s"
     legend = [("background", BACKGROUND[0]), ("candidate", CANDIDATE), ("outlier", OUTLIER)]
     legend.append(("bar: open along an edge", UNKNOWN))
-    if looked is not None:
+    if trace is not None:
         colours = {-1: OUTLIER, 0: BACKGROUND[0]}
-        colours |= {k: colour_of(t) for k, t in enumerate(looked.tracks, 1)}
-        for m, shown in zip(looked.scene.measured, best_measured(looked), strict=True):
-            layer = explained_by(looked, m)
+        colours |= {k: colour_of(t) for k, t in enumerate(trace.tracks, 1)}
+        for m, shown in zip(trace.scene.measured, best_measured(trace), strict=True):
+            layer = explained_by(trace, m)
             # What moves by itself is drawn last, over the rest.
             for i in sorted(np.flatnonzero(shown), key=lambda i: layer[i] != 0):
                 _constraint(out, m.constraints, int(i), colours[int(layer[i])], canvas.factor)
@@ -180,26 +180,26 @@ def _constraint(image: Image, c: Constraints, i: int, colour: Rgb, factor: float
     arrow(image, at, c.moved[i] / c.span_s * ARROW_S * factor, colour, longest=22.0)
 
 
-def velocities(looked: Looked) -> tuple[Floats, NDArray[np.int64]]:
+def velocities(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.int64]]:
     """The velocity of each superpixel by the layer that has it.
 
     Args:
-        looked: The segmenter's workings.
+        trace: The segmenter's workings.
 
     Returns:
         (count, 2) float32 working pixels per second, and (count,) the layer: 0 for background, k for
         the k-th track.
     """
-    scene, centre = looked.scene, looked.scene.cells.centre
+    scene, centre = trace.scene, trace.scene.cells.centre
     last = scene.measured[-1]
     layer = np.zeros(scene.cells.count, np.int64)
     models = last.background.models
-    prior = last.background.ground.log_prior(centre, len(models))
+    prior = last.background.prevalence.log_prior(centre, len(models))
     # Where nothing tells them apart it is the last one, which follows the camera.
     which = len(models) - 1 - prior[::-1].argmax(axis=0)
     ways = np.stack([m.at(centre) for m in models]) / last.constraints.span_s
     out = ways[which, np.arange(len(centre))]
-    for k, t in enumerate(looked.tracks, 1):
+    for k, t in enumerate(trace.tracks, 1):
         mine = t.share > 0.5
         rate = t.best_rate()
         if rate is not None and mine.any():
@@ -208,38 +208,38 @@ def velocities(looked: Looked) -> tuple[Floats, NDArray[np.int64]]:
     return np.asarray(out, np.float32), layer
 
 
-def _layers(canvas: Canvas, looked: Looked | None) -> Image:
+def _layers(canvas: Canvas, trace: SegmentationTrace | None) -> Image:
     out = canvas.ground(0.55)
-    if looked is not None:
-        speed, layer = velocities(looked)
-        tint = flow_colours(speed / canvas.scale)[_enlarged(looked, canvas)]
-        opacity = np.where(layer > 0, 0.6, 0.25).astype(np.float32)[_enlarged(looked, canvas)]
+    if trace is not None:
+        speed, layer = velocities(trace)
+        tint = flow_colours(speed / canvas.scale)[_enlarged(trace, canvas)]
+        opacity = np.where(layer > 0, 0.6, 0.25).astype(np.float32)[_enlarged(trace, canvas)]
         out = (out + opacity[..., None] * (tint - out)).astype(np.uint8)
-        _grid_of_arrows(out, looked, speed, layer, canvas.factor)
-        _numbers(out, looked, canvas.factor)
-        lines_of_text(out, layer_rows(looked))
+        _grid_of_arrows(out, trace, speed, layer, canvas.factor)
+        _numbers(out, trace, canvas.factor)
+        lines_of_text(out, layer_rows(trace))
     wheel(out, (out.shape[1] - 30, 30), 22)
     return _with_heading(out, "2 layers, colour by direction and log speed", [])
 
 
 def _grid_of_arrows(
-    image: Image, looked: Looked, speed: Floats, layer: NDArray[np.int64], factor: float
+    image: Image, trace: SegmentationTrace, speed: Floats, layer: NDArray[np.int64], factor: float
 ) -> None:
-    labels = looked.scene.cells.labels
+    labels = trace.scene.cells.labels
     step = max(1, round(26 / factor))
     for y in range(step // 2, labels.shape[0], step):
         for x in range(step // 2, labels.shape[1], step):
             cell = labels[y, x]
             k = int(layer[cell])
-            colour = colour_of(looked.tracks[k - 1]) if k else (200, 206, 214)
+            colour = colour_of(trace.tracks[k - 1]) if k else (200, 206, 214)
             at = np.array([x + 0.5, y + 0.5], np.float32) * factor
             arrow(image, at, speed[cell] * ARROW_S * factor, colour, 2 if k else 1, 24.0)
 
 
-def _numbers(image: Image, looked: Looked, factor: float) -> None:
+def _numbers(image: Image, trace: SegmentationTrace, factor: float) -> None:
     """The number of each layer in its middle."""
-    for t in looked.tracks:
-        if t.seen == looked.scene.time:
+    for t in trace.tracks:
+        if t.last_seen == trace.scene.time:
             text = str(t.key)
             width = ink(text, 12).shape[1] + 6
             x, y = (round(v * factor) for v in t.centre)
@@ -247,13 +247,13 @@ def _numbers(image: Image, looked: Looked, factor: float) -> None:
             write(image, text, (x - width // 2 + 3, y - 8), 12, WHITE)
 
 
-def layer_rows(looked: Looked) -> list[tuple[str, Rgb]]:
+def layer_rows(trace: SegmentationTrace) -> list[tuple[str, Rgb]]:
     """A line for each layer: what it is, how fast, how sure, how well supported.
 
     Returns:
         Words and colour, the background first.
     """
-    scene, scale = looked.scene, looked.scene.image.scale
+    scene, scale = trace.scene, trace.scene.image.scale
     last = scene.measured[-1]
     middle = np.array([[scene.image.shape[1] / 2, scene.image.shape[0] / 2]], np.float32)
     rows = []
@@ -264,8 +264,8 @@ def layer_rows(looked: Looked) -> list[tuple[str, Rgb]]:
         backed = f", {_support(model.support)}" if model.support else ""
         words = f"{name}{sure}: {vx:+.1f} {vy:+.1f} px/s{backed}"
         rows.append((words, BACKGROUND[min(i, 1)]))
-    support = {t.key: sum(m.support for m in t.motions) for t in looked.tracks}
-    first = sorted(looked.tracks, key=lambda t: (t.id == 0, t.id or -support[t.key]))
+    support = {t.key: sum(m.support for m in t.motions) for t in trace.tracks}
+    first = sorted(trace.tracks, key=lambda t: (t.id == 0, t.id or -support[t.key]))
     rows += [(_track_words(t, support[t.key], scene.time, scale), colour_of(t)) for t in first]
     left = len(rows) - MOST_ROWS
     return rows if left <= 0 else [*rows[:MOST_ROWS], (f"and {left} more", UNKNOWN)]
@@ -278,7 +278,7 @@ def _track_words(t: Track, support: float, now: float, scale: float) -> str:
         return f"{name}: motion unknown"
     vx, vy = rate.velocity(t.centre) / scale
     parts = f", {len(t.motions)} parts" if len(t.motions) > 1 else ""
-    seen = "" if t.seen == now else f", not seen for {now - t.seen:.1f} s"
+    seen = "" if t.last_seen == now else f", not seen for {now - t.last_seen:.1f} s"
     sigma = rate.sigma / scale
     digits = 1 if sigma >= 0.1 else 2
     speed = f"{vx:+.{digits}f} {vy:+.{digits}f} ± {sigma:.{digits}f} px/s"
@@ -289,35 +289,35 @@ def _support(weight: float) -> str:
     return f"support {weight:.0f}"
 
 
-def _enlarged(looked: Looked, canvas: Canvas) -> NDArray[np.int32]:
+def _enlarged(trace: SegmentationTrace, canvas: Canvas) -> NDArray[np.int32]:
     """The numbers of superpixels at the size of a panel, (H, W)."""
     height, width = canvas.image.shape[:2]
-    labels = cv2.resize(looked.scene.cells.labels, (width, height), interpolation=cv2.INTER_NEAREST)
+    labels = cv2.resize(trace.scene.cells.labels, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(labels, np.int32)
 
 
-def label_colours(looked: Looked) -> tuple[Floats, NDArray[np.bool_]]:
+def label_colours(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.bool_]]:
     """The colour of each superpixel, mixed from its labels, and where it is uncertain.
 
     Args:
-        looked: The segmenter's workings.
+        trace: The segmenter's workings.
 
     Returns:
         (count, 3) float32 BGR, black for background; (count,) bool.
     """
-    tracks = {t.key: t for t in looked.tracks}
-    layers = [colour_of(tracks[key]) if key in tracks else CANDIDATE for key in looked.keys]
+    tracks = {t.key: t for t in trace.tracks}
+    layers = [colour_of(tracks[key]) if key in tracks else CANDIDATE for key in trace.keys]
     colours = np.array([(0, 0, 0), *layers, UNKNOWN], np.float32)[:, ::-1]
-    share = looked.posterior
+    share = trace.posterior
     return np.asarray(share @ colours, np.float32), np.asarray(share.max(axis=1) < SURE)
 
 
-def _labels(canvas: Canvas, looked: Looked | None) -> Image:
+def _labels(canvas: Canvas, trace: SegmentationTrace | None) -> Image:
     out = canvas.ground(0.6)
-    if looked is not None:
-        cells = _enlarged(looked, canvas)
-        colours, unsure = label_colours(looked)
-        belief = (1 - looked.posterior[:, 0]).astype(np.float32)
+    if trace is not None:
+        cells = _enlarged(trace, canvas)
+        colours, unsure = label_colours(trace)
+        belief = (1 - trace.posterior[:, 0]).astype(np.float32)
         out = (out + 0.75 * (colours[cells] - belief[cells][..., None] * out)).astype(np.uint8)
         out[unsure[cells] & hatched(out.shape[:2])] = 255
         edge = (cells != np.roll(cells, 1, 0)) | (cells != np.roll(cells, 1, 1))
@@ -327,7 +327,7 @@ def _labels(canvas: Canvas, looked: Looked | None) -> Image:
 
 
 def _regions(
-    canvas: Canvas, looked: Looked | None, regions: Sequence[Region], frame: Frame
+    canvas: Canvas, trace: SegmentationTrace | None, regions: Sequence[Region], frame: Frame
 ) -> Image:
     out = canvas.image.copy()
     grow = out.shape[1] / frame.size[0]
@@ -342,7 +342,7 @@ def _regions(
         arrow(out, at, along, WHITE, 2, 160.0)
         _tag(out, region, grow)
     remembered = (
-        [] if looked is None else [t for t in looked.tracks if t.id and t.seen < frame.time]
+        [] if trace is None else [t for t in trace.tracks if t.id and t.last_seen < frame.time]
     )
     rows = [(f"{t.id} remembered, not seen", object_colour(t.id)) for t in remembered]
     lines_of_text(out, rows[:MOST_ROWS])
@@ -362,15 +362,17 @@ def _tag(image: Image, region: Region, grow: float) -> None:
     write(image, text, (left + 9, top + 2), 13, WHITE)
 
 
-def _footer(width: int, frame: Frame, looked: Looked | None, regions: Sequence[Region]) -> Image:
+def _footer(
+    width: int, frame: Frame, trace: SegmentationTrace | None, regions: Sequence[Region]
+) -> Image:
     """Time, and what was measured."""
     strip = np.zeros((26, width, 3), np.uint8)
     strip[:] = INK[::-1]
     words = [f"frame {frame.index}, {frame.time:.2f} s", f"regions: {len(regions)}"]
-    if looked is not None:
-        confirmed = sum(t.id > 0 for t in looked.tracks)
-        words.append(f"tracks: {confirmed}, candidates: {len(looked.tracks) - confirmed}")
-        over = [m.constraints for m in looked.scene.measured]
+    if trace is not None:
+        confirmed = sum(t.id > 0 for t in trace.tracks)
+        words.append(f"tracks: {confirmed}, candidates: {len(trace.tracks) - confirmed}")
+        over = [m.constraints for m in trace.scene.measured]
         words += [f"{len(c)} constraints over {c.span_s:.2f} s" for c in over]
     write(strip, "   |   ".join(words), (8, 5), 13, (205, 212, 222))
     return strip

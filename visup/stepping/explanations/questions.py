@@ -13,7 +13,7 @@ from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import why_not as whynot
 from visup.stepping.explanations.evidence import Why
-from visup.stepping.explanations.why import Reasons
+from visup.stepping.explanations.why import ReasonFinder
 
 ABOUT = ("alert", "object", "identity", "relation", "rule", "stage", "verdict")
 """What reasons can be asked for, by the first word."""
@@ -27,7 +27,7 @@ _PRESENCE = {
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ParsedQuestion:
     """A question taken apart.
 
     Attributes:
@@ -41,7 +41,7 @@ class Asked:
     ids: tuple[int, ...]
 
 
-def why(reasons: Reasons, text: str) -> Why:
+def why(reasons: ReasonFinder, text: str) -> Why:
     """The answer to `why TEXT`.
 
     Raises:
@@ -81,21 +81,21 @@ def why_not(mind: Mind, reasoners: Sequence[Reasoner], text: str) -> Why:
     return answers[asked.about]()
 
 
-def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> Asked:
+def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestion:
     """`alert 2`, `relation touching 1 2`, `touching(1, 2)`, `captured`, ..."""
     words = re.findall(r"[^\s,()?]+", text)
     ids = tuple(int(w) for w in words if w.isdecimal())
     names = [w for w in words if not w.isdecimal()]
     about = names[0] if names else ""
     if about in known:
-        return _complete(Asked(about, names[1] if len(names) > 1 else "", ids), text)
+        return _complete(ParsedQuestion(about, names[1] if len(names) > 1 else "", ids), text)
     for kind, table in (
         ("stage", stage_names(mind)),
         ("rule", rule_names(mind)),
         ("relation", RELATION_NAMES),
     ):
         if about in table:
-            return Asked(kind, about, ids)
+            return ParsedQuestion(kind, about, ids)
     tables = (*known, *stage_names(mind), *rule_names(mind), *RELATION_NAMES)
     close = get_close_matches(about, tables, 1, 0.6)
     raise SettingsError(
@@ -105,13 +105,13 @@ def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> Asked:
     )
 
 
-def _complete(asked: Asked, text: str) -> Asked:
+def _complete(asked: ParsedQuestion, text: str) -> ParsedQuestion:
     if asked.about in ("relation", "rule", "stage") and not asked.name:
         raise SettingsError(f"'{text}' names no {asked.about}", expected=f"{asked.about} NAME ...")
     return asked
 
 
-def _one(asked: Asked, mind: Mind) -> int:
+def _one(asked: ParsedQuestion, mind: Mind) -> int:
     """The number that is asked about; where there is only one alert or object, that one."""
     if asked.ids:
         return asked.ids[0]
@@ -122,7 +122,7 @@ def _one(asked: Asked, mind: Mind) -> int:
     raise SettingsError(f"which {asked.about}?", expected=numbers)
 
 
-def _two(asked: Asked) -> tuple[int, int]:
+def _two(asked: ParsedQuestion) -> tuple[int, int]:
     if len(asked.ids) != 2:
         raise SettingsError(
             f"'{asked.about}' is about two objects", expected="such as: coupled 1 2"

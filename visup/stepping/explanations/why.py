@@ -22,17 +22,22 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.errors import SettingsError
-from visup.rules.coupling.coupling import COUPLING
+from visup.rules.coupling.reasoner import COUPLING
 from visup.rules.safety.queries import explain
-from visup.rules.safety.reasoner import kept
+from visup.rules.safety.reasoner import rule_memory
 from visup.rules.wording.sentences import short
-from visup.stepping.explanations.evidence import Why, because, of_region, told
+from visup.stepping.explanations.evidence import (
+    Why,
+    explanation_tree,
+    percept_reason,
+    region_percepts,
+)
 
 LOOK_BACK = 250
 """How many steps back the latest percepts that name an object are looked for."""
 
 
-class Course(Protocol):
+class RunTimeline(Protocol):
     """What reasons are looked up in: a stepper."""
 
     @property
@@ -48,7 +53,7 @@ class Course(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Reasons:
+class ReasonFinder:
     """Gives reasons as they were after one step.
 
     Attributes:
@@ -57,15 +62,15 @@ class Reasons:
         mind: What was believed after it.
     """
 
-    course: Course
+    course: RunTimeline
     number: int
     mind: Mind
 
-    def after(self, number: int) -> Reasons:
+    def after(self, number: int) -> ReasonFinder:
         """The reasons as they were after another step."""
         if number == self.number:
             return self
-        return Reasons(self.course, number, self.course.mind_at(number))
+        return ReasonFinder(self.course, number, self.course.mind_at(number))
 
     def of(self, what: object) -> Why:
         """Why something is so.
@@ -88,7 +93,7 @@ class Reasons:
                 return self.verdict(what.task)
             case StageBelief():
                 return self.stage(what.stage)
-        raise SettingsError(f"why of a {type(what).__name__} cannot be told")
+        raise SettingsError(f"a {type(what).__name__} cannot be explained")
 
     def alert(self, alert_id: int) -> Why:
         """Why an alert was opened, and why it stays open; those that are over are found too."""
@@ -112,7 +117,7 @@ class Reasons:
 
     def _cause(self, kind: str, event: Event) -> Why:
         """Why a concern of some kind held after this step."""
-        if kind in {rule.name for rule in kept(self.mind).rules}:
+        if kind in {rule.name for rule in rule_memory(self.mind).rules}:
             return self.rule(kind, event.objects)
         stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
         if kind == "stage_failing":
@@ -141,7 +146,7 @@ class Reasons:
         orders = list(permutations(objects))
         found = [explain(self.mind, name, *ids) for ids in orders[: 6 if len(objects) < 4 else 1]]
         best = next((e for e in found if e.verdict is Truth.TRUE), found[0])
-        reason = because(best)
+        reason = explanation_tree(best)
         return Why(
             reason.text,
             (*reason.parts, *self._objects(objects)),
@@ -185,11 +190,11 @@ class Reasons:
             "they last converged at": getattr(pending, "converged_at", None),
             "apart since": getattr(pending, "apart_since", None),
         }
-        told = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        dated = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
         if pending is not None:
-            told.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
+            dated.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
         return (
-            *told,
+            *dated,
             *(
                 self.relation(n, (low, high), deep=False)
                 for n in self._judged("touching", low, high)
@@ -228,7 +233,7 @@ class Reasons:
         number = self._step_of(b.last_seen)
         for back in range(number, max(self.course.begin, number - LOOK_BACK), -1):
             seen = self.course.observation_at(back)
-            found = of_region(seen, b.region.id, names=True)
+            found = region_percepts(seen, b.region.id, names=True)
             named = tuple(w for w in found if w.percept and w.percept.kind != "region")
             if named:
                 return named
@@ -240,7 +245,7 @@ class Reasons:
         seen = self.course.observation_at(self._step_of(b.last_seen))
         who = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
         text = f"{who}, first seen at {b.first_seen:.2f} s, was last seen at {b.last_seen:.2f} s"
-        return Why(text, of_region(seen, b.region.id))
+        return Why(text, region_percepts(seen, b.region.id))
 
     def _objects(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
         return tuple(self.object(i) for i in objects if i in self.mind.objects)
@@ -342,7 +347,10 @@ class Reasons:
             ()
             if event.objects
             else tuple(
-                told(p, seen) for r in seen.reports for p in r.percepts if p.kind == event.kind
+                percept_reason(p, seen)
+                for r in seen.reports
+                for p in r.percepts
+                if p.kind == event.kind
             )
         )
         return (*self._objects(event.objects), *other)

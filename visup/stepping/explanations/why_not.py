@@ -7,16 +7,16 @@ from typing import Any, TypeVar
 
 from visup.agent import Mind, ObjectBelief, Presence, Reasoner, Status, TaskBelief, Truth
 from visup.agent.model.errors import SettingsError
-from visup.rules.coupling.coupling import COUPLING, Couple, CouplingSettings
-from visup.rules.identity.votes import VOTES, Ballot, Ballots, Votes
-from visup.rules.presence.lifecycle import SeePresence
-from visup.rules.presence.sightings import Track, at_border, tracks
+from visup.rules.coupling.reasoner import COUPLING, CouplingReasoner, CouplingSettings
+from visup.rules.identity.votes import VOTES, IdentityReasoner, ObjectVotes, VoteMemory
+from visup.rules.presence.object_tracks import ObjectTrack, at_border, presence_memory
+from visup.rules.presence.reasoner import PresenceReasoner
 from visup.rules.presence.step_context import PresenceSettings
-from visup.rules.safety.explain import Explanation
-from visup.rules.safety.queries import choices, explain, rule_named, values_of
-from visup.rules.safety.reasoner import kept
+from visup.rules.safety.explain import RuleExplanation
+from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
+from visup.rules.safety.reasoner import rule_memory
 from visup.rules.wording.sentences import short
-from visup.stepping.explanations.evidence import Why, because
+from visup.stepping.explanations.evidence import Why, explanation_tree
 
 Kind = TypeVar("Kind")
 
@@ -38,26 +38,28 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     """
     found = [explain(mind, name, *ids)] if ids else _each(mind, name)
     if not found:
-        count = len(rule_named(values_of(mind), name).variables)
+        count = len(rule_named(evaluation_of(mind), name).variables)
         return Why(f"{name} is about {count} object(s), and so many are not in view")
     nearest = max(found, key=lambda e: (e.verdict is Truth.TRUE, *e.parts[0].interval))
     if nearest.verdict is Truth.TRUE:
-        return Why(f"{nearest.text} is true", (because(nearest),))
+        return Why(f"{nearest.text} is true", (explanation_tree(nearest),))
     when, *unless = nearest.parts
     parts = [
-        Why(f"suspended: {u.line()}", (because(u),)) for u in unless if u.verdict is Truth.TRUE
+        Why(f"suspended: {u.line()}", (explanation_tree(u),))
+        for u in unless
+        if u.verdict is Truth.TRUE
     ]
     if when.verdict is not Truth.TRUE:
         parts.append(Why(when.line(), tuple(_unmet(when))))
     return Why(nearest.line(), tuple(parts), mind.frame_index, mind.time)
 
 
-def _each(mind: Mind, name: str) -> list[Explanation]:
-    values = values_of(mind)
-    return [explain(mind, name, *ids) for ids in choices(values, rule_named(values, name))]
+def _each(mind: Mind, name: str) -> list[RuleExplanation]:
+    values = evaluation_of(mind)
+    return [explain(mind, name, *ids) for ids in object_choices(values, rule_named(values, name))]
 
 
-def _unmet(node: Explanation) -> Iterator[Why]:
+def _unmet(node: RuleExplanation) -> Iterator[Why]:
     """What keeps a formula from being true: its parts that are not; a comparison with its quantities."""
     for part in node.parts:
         if part.verdict is None:
@@ -108,11 +110,11 @@ def entry_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Wh
     belief, track = _tracked(mind, object_id)
     if belief.confirmed:
         return Why(f"object {object_id} has entered; first seen at {belief.first_seen:.2f} s")
-    presence = _first(reasoners, SeePresence)
+    presence = _first(reasoners, PresenceReasoner)
     s = presence.settings if presence else PresenceSettings()
     parts = []
     if track is not None:
-        start = tracks(mind).start or 0.0
+        start = presence_memory(mind).start or 0.0
         early = track.coherent_since - start <= s.start_s
         near = at_border(track.region, mind.frame_size)
         needed = s.entry_s if early or near else s.entry_inside_s
@@ -136,7 +138,7 @@ def presence_unmet(
     belief, track = _tracked(mind, object_id)
     if belief.presence is wanted:
         return Why(f"object {object_id} is {wanted.value}")
-    presence = _first(reasoners, SeePresence)
+    presence = _first(reasoners, PresenceReasoner)
     s = presence.settings if presence else PresenceSettings()
     parts = [Why(f"it is {belief.presence.value}, last seen at {belief.last_seen:.2f} s")]
     missing = mind.time - belief.last_seen
@@ -154,9 +156,9 @@ def presence_unmet(
 def identity_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Why:
     """Why an object was not identified."""
     belief = _belief(mind, object_id)
-    ballots: Any = mind.memory.get(VOTES, Ballots(mind.time))
-    ballot: Ballot = ballots.of.get(object_id, Ballot())
-    s = (_first(reasoners, Votes) or Votes()).settings
+    ballots: Any = mind.memory.get(VOTES, VoteMemory(mind.time))
+    ballot: ObjectVotes = ballots.of.get(object_id, ObjectVotes())
+    s = (_first(reasoners, IdentityReasoner) or IdentityReasoner()).settings
     if ballot.told is not None and ballot.told == belief.name:
         return Why(f"object {object_id} was identified as {ballot.told}")
     parts = []
@@ -183,7 +185,7 @@ def coupling_unmet(mind: Mind, a: int, b: int, reasoners: Sequence[Reasoner]) ->
         _belief(mind, object_id)
     if mind.coupled(low, high):
         return Why(f"objects {low} and {high} are coupled")
-    couple = _first(reasoners, Couple)
+    couple = _first(reasoners, CouplingReasoner)
     s = couple.settings if couple else CouplingSettings()
     pending: Any = mind.memory.get(COUPLING, {}).get((low, high))
     parts = []
@@ -225,7 +227,7 @@ def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
         if alert.kind == kind and (not objects or set(alert.objects) == set(objects)):
             return Why(f"alert {alert.id} is open since {alert.opened:.2f} s: {alert.cause}")
     why = rule_unmet(mind, kind, objects)
-    cooling = kept(mind).cooling.items()
+    cooling = rule_memory(mind).cooling.items()
     resting = [
         Why(f"it rests for objects {sorted(who)} until {until:.2f} s")
         for (rule, who), until in cooling
@@ -248,8 +250,8 @@ def _belief(mind: Mind, object_id: int) -> ObjectBelief:
     return mind.objects[object_id]
 
 
-def _tracked(mind: Mind, object_id: int) -> tuple[ObjectBelief, Track | None]:
-    return _belief(mind, object_id), tracks(mind).of.get(object_id)
+def _tracked(mind: Mind, object_id: int) -> tuple[ObjectBelief, ObjectTrack | None]:
+    return _belief(mind, object_id), presence_memory(mind).of.get(object_id)
 
 
 def _first(reasoners: Sequence[Reasoner], kind: type[Kind]) -> Kind | None:

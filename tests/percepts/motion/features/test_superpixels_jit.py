@@ -8,16 +8,16 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from visup.agent import Frame
-from visup.percepts.motion.features._partition_jit import borders, flooded, linked
-from visup.percepts.motion.features._superpixels_jit import brought
-from visup.percepts.motion.features.image import prepare
+from visup.percepts.motion.features._partition_jit import cell_borders, csr_links, watershed
+from visup.percepts.motion.features._superpixels_jit import carry_shares
 from visup.percepts.motion.features.superpixels import Superpixels, _edges, superpixels
+from visup.percepts.motion.features.work_image import prepare_image
 
 
 def cells_of(seed: int) -> Superpixels:
     rng = np.random.default_rng(seed)
     image = np.kron(rng.integers(0, 256, (6, 8, 3)), np.ones((12, 12, 1))).astype(np.uint8)
-    return superpixels(prepare(Frame(0, 0.0, image), 512), 8, 8.0)
+    return superpixels(prepare_image(Frame(0, 0.0, image), 512), 8, 8.0)
 
 
 @given(st.integers(0, 99), st.booleans())
@@ -75,7 +75,7 @@ def test_shares_come_with_every_nth_pixel_of_a_cell(seed: int, shift: int, every
     shares = np.random.default_rng(seed).random((old.count, 3)).astype(np.float32)
     flow = np.zeros((*old.labels.shape, 2), np.float32)
     flow[..., 0] = shift + 0.3
-    found = brought(old.labels, new.labels, flow, shares, new.area, every)
+    found = carry_shares(old.labels, new.labels, flow, shares, new.area, every)
     width = old.labels.shape[1]
     for k in range(new.count):
         ys, xs = np.nonzero(new.labels == k)
@@ -94,7 +94,7 @@ def test_reach_is_that_many_steps_along_links(seed: int, kinds: int, steps: int)
     near = members
     for _ in range(steps):
         near = (cells.link @ near.astype(float) > 0) | near
-    assert np.array_equal(cells.reach(members, steps), near)
+    assert np.array_equal(cells.dilated(members, steps), near)
 
 
 @given(st.integers(0, 99))
@@ -108,7 +108,7 @@ def test_borders_are_counted_pixel_by_pixel(seed: int) -> None:
                 if v < 7 and u < 11 and labels[v, u] != labels[y, x]:
                     a, b = sorted((int(labels[y, x]), int(labels[v, u])))
                     slow[a, b] = slow.get((a, b), 0) + 1
-    found = [tuple(map(int, row)) for row in zip(*borders(labels, 9), strict=True)]
+    found = [tuple(map(int, row)) for row in zip(*cell_borders(labels, 9), strict=True)]
     assert found == [(*pair, n) for pair, n in sorted(slow.items())]
 
 
@@ -122,7 +122,7 @@ def test_the_watershed_is_that_of_opencv(seed: int, seeds: int, levels: int) -> 
         y, x = rng.integers(0, 17), rng.integers(0, 21)
         marks[y : y + 2, x : x + 2] = k
     expected = cv2.watershed(tone, marks.copy())
-    flooded(*_edges(tone), marks)
+    watershed(*_edges(tone), marks)
     assert np.array_equal(marks, expected)
 
 
@@ -133,7 +133,7 @@ def test_linked_pairs_are_a_symmetric_matrix(seed: int) -> None:
     count = 9
     i, j = np.nonzero(np.triu(rng.random((count, count)) < 0.4, 1))
     values = rng.random(len(i)).astype(np.float32)
-    ends, columns, data = linked(i.astype(np.int32), j.astype(np.int32), values, count)
+    ends, columns, data = csr_links(i.astype(np.int32), j.astype(np.int32), values, count)
     both = np.concatenate([i, j]), np.concatenate([j, i])
     expected = sparse.coo_matrix((np.tile(values, 2), both), shape=(count, count)).tocsr()
     assert np.array_equal(ends, expected.indptr)

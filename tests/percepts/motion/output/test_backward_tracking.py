@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
-from visup.percepts.motion.output.backward_tracking import HORIZON_S, LookBack
+from visup.percepts.motion.output.backward_tracking import HORIZON_S, BackwardTracker
 
 FPS = 25
 TEXTURE = np.random.default_rng(3).integers(60, 255, (10, 10)).repeat(8, 0).repeat(8, 1)
@@ -37,7 +37,7 @@ def region(x: float, id_: int = 1) -> Region:
 
 @pytest.mark.parametrize("moves_at", [10, 60, 200])
 def test_what_rested_first_was_in_view_from_the_start(moves_at: int) -> None:
-    back = LookBack()
+    back = BackwardTracker()
     for i in range(moves_at + 15):
         back.step(frame(i, 100 + max(0, i - moves_at)), ())
     i, x = moves_at + 15, 115.0
@@ -47,7 +47,7 @@ def test_what_rested_first_was_in_view_from_the_start(moves_at: int) -> None:
 
 @pytest.mark.parametrize("speed", [1, 3, 6])
 def test_what_comes_over_the_border_was_not_in_view_before(speed: int) -> None:
-    back, comes = LookBack(), 40
+    back, comes = BackwardTracker(), 40
     told_at = comes + 90 // speed
     for i in range(told_at):
         back.step(frame(i, speed * (i - comes) - 80 if i >= comes else None), ())
@@ -59,7 +59,7 @@ def test_what_comes_over_the_border_was_not_in_view_before(speed: int) -> None:
 
 
 def test_what_turns_up_within_the_image_was_not_in_view_before() -> None:
-    back = LookBack()
+    back = BackwardTracker()
     for i in range(50):
         back.step(frame(i, None), ())
     for i in range(50, 60):
@@ -69,7 +69,7 @@ def test_what_turns_up_within_the_image_was_not_in_view_before() -> None:
 
 
 def test_it_is_looked_back_once_and_the_answer_stays() -> None:
-    back = LookBack()
+    back = BackwardTracker()
     first = back.step(frame(0, 100), [region(100)])
     later = back.step(frame(30, 130), [region(130), region(130, 2)])
     assert [r.visible_since for r in first] == [0.0]
@@ -78,7 +78,7 @@ def test_it_is_looked_back_once_and_the_answer_stays() -> None:
 
 
 def test_a_plain_region_has_no_past_and_another_size_begins_anew() -> None:
-    back = LookBack()
+    back = BackwardTracker()
     back.step(frame(0, None), ())
     (plain,) = back.step(Frame(1, 0.04, np.zeros((240, 320, 3), np.uint8)), [region(100)])
     assert plain.visible_since == 0.04
@@ -89,7 +89,7 @@ def test_a_plain_region_has_no_past_and_another_size_begins_anew() -> None:
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.floats(0.02, 3.0), min_size=1, max_size=300))
 def test_the_past_that_is_kept_is_bounded_and_thins_out(steps: list[float]) -> None:
-    back, now = LookBack(), 0.0
+    back, now = BackwardTracker(), 0.0
     image = np.zeros((8, 8, 3), np.uint8)
     for k, step in enumerate(steps):
         now += step

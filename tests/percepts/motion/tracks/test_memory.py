@@ -6,7 +6,7 @@ import pytest
 from tests.percepts.motion.clips import FPS, Shot, clip, texture
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.tracks.tracking import PATH_S
+from visup.percepts.motion.tracks.track_prediction import PATH_S
 
 PERIOD = 25
 
@@ -33,16 +33,16 @@ def test_what_is_kept_is_bounded_by_what_lives(camera: float) -> None:
     tracks = segmenter._tracks
     keys = {t.key for t in tracks}
     lags = max(segmenter.settings.lags_s) * 1.1 * FPS + 2
-    assert segmenter._born > len(tracks) + 3  # enough has come and gone
+    assert segmenter._last_key > len(tracks) + 3  # enough has come and gone
     assert len(segmenter._history) <= lags
     assert len(segmenter._camera) <= lags
     for t in tracks:
-        assert {*t.apart, *t.alike} <= keys
+        assert {*t.separate_s, *t.merge_votes} <= keys
         assert len(t.path) <= PATH_S * FPS + 2
         assert all(len(m.rates) <= lags for m in t.motions)
-    telling = segmenter._resting._telling
-    living = set(telling._last)
-    newest = max(telling._last.values())
-    assert all(newest - last <= segmenter.settings.memory_s for last in telling._last.values())
-    assert {*telling._alias, *telling._old} <= living
-    assert telling._shown <= living | set(telling._alias.values())
+    fusion = segmenter._static._fusion
+    living = set(fusion._last)
+    newest = max(fusion._last.values())
+    assert all(newest - last <= segmenter.settings.memory_s for last in fusion._last.values())
+    assert {*fusion._alias, *fusion._old} <= living
+    assert fusion._shown <= living | set(fusion._alias.values())

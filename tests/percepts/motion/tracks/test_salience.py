@@ -9,36 +9,38 @@ import pytest
 
 from tests.percepts.motion.clips import FPS, SIZE, texture
 from visup.agent import Frame
-from visup.percepts.motion.features.constraints import find_points
-from visup.percepts.motion.features.constraints import track as follow
-from visup.percepts.motion.features.image import prepare
+from visup.percepts.motion.features.motion_constraints import find_points
+from visup.percepts.motion.features.motion_constraints import track_points as follow
 from visup.percepts.motion.features.superpixels import superpixels
-from visup.percepts.motion.layers.camera_model import Background, bare_ground
-from visup.percepts.motion.layers.layers import Affine
+from visup.percepts.motion.features.work_image import prepare_image
+from visup.percepts.motion.layers.affine import Affine
+from visup.percepts.motion.layers.background_motion import BackgroundMotion, empty_prevalence
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.tracks.salience import foot_of, is_salient
-from visup.percepts.motion.tracks.scene import Measured, Scene
-from visup.percepts.motion.tracks.tracking import Track
+from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
+from visup.percepts.motion.tracks.salience import foot_point, is_salient
+from visup.percepts.motion.tracks.track import Track
 
 WIDE = texture(1, SIZE)
 
 
-def scene(time: float = 0.0) -> Scene:
-    image = prepare(Frame(0, time, np.repeat(WIDE[..., None], 3, axis=2)), 512)
+def scene(time: float = 0.0) -> FrameMeasurements:
+    image = prepare_image(Frame(0, time, np.repeat(WIDE[..., None], 3, axis=2)), 512)
     cells = superpixels(image, 8, 8.0)
     owner = np.zeros(cells.count, np.int64)
-    return Scene(image, find_points(image, 8, 1.0), cells, owner, 1 / FPS, ())
+    return FrameMeasurements(image, find_points(image, 8, 1.0), cells, owner, 1 / FPS, ())
 
 
-def still(at: Scene) -> Measured:
+def still(at: FrameMeasurements) -> BaselineMotion:
     """Nothing has moved, over one frame."""
     c = follow(at.points, at.points.xy, at.image, at.image, 1, 1.0)
     rest = (Affine(np.zeros((2, 3))),)
-    return Measured(c, Background(rest, 1.0, None, bare_ground(at.image.shape), True))
+    return BaselineMotion(
+        c, BackgroundMotion(rest, 1.0, None, empty_prevalence(at.image.shape), True)
+    )
 
 
 def track(
-    at: Scene, gone: float, way: float, explained: dict[int, float], width: int = 40
+    at: FrameMeasurements, gone: float, way: float, explained: dict[int, float], width: int = 40
 ) -> Track:
     """A track over the columns up to a width, beside the left border but not beyond a cell of it."""
     x, y = at.cells.centre.T
@@ -46,7 +48,9 @@ def track(
     if width >= SIZE[1]:
         share = (y > 60).astype(np.float32)
     rest = MappingProxyType(explained)
-    return Track(1, 0, 0.0, 0.0, share, gone=(gone, 0.0), way=way, explained=rest)
+    return Track(
+        1, 0, 0.0, 0.0, share, displacement=(gone, 0.0), path_length=way, background_fit=rest
+    )
 
 
 @pytest.mark.parametrize(
@@ -93,7 +97,7 @@ def test_a_longer_baseline_must_bear_out_the_way(
     at = replace(at, measured=(still(at),))
     t = track(at, 10.0, way, {1: 0.1})
     inside = np.where(at.cells.centre[:, 0] > 12, t.share, 0).astype(np.float32)
-    t = replace(t, share=inside, borne=MappingProxyType(borne))
+    t = replace(t, share=inside, long_baseline_course=MappingProxyType(borne))
     assert is_salient(t, at, at_once=at_once) is salient
 
 
@@ -150,9 +154,9 @@ def test_what_stands_on_the_ground_is_no_object_however_much_parallax_it_has(
 def test_the_foot_is_the_lowest_part_and_unknown_where_the_image_cuts_it() -> None:
     cells = scene().cells
     x, y = cells.centre.T
-    found = foot_of((np.abs(x - 60) < 20) & (y > 30) & (y < 80), cells)
+    found = foot_point((np.abs(x - 60) < 20) & (y > 30) & (y < 80), cells)
     assert found is not None
     assert found[0] == pytest.approx(60, abs=8)
     assert found[1] == pytest.approx(80, abs=10)
-    assert foot_of(y > 30, cells) is None
-    assert foot_of(y < 0, cells) is None
+    assert foot_point(y > 30, cells) is None
+    assert foot_point(y < 0, cells) is None

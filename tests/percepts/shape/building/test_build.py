@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import ZOO, flower, small_database
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.percepts.shape.building import build, parts
+from visup.percepts.shape.building import build, build_parts
 from visup.percepts.shape.building.build import (
     build_database,
     building_folder,
@@ -20,16 +20,21 @@ from visup.percepts.shape.building.build import (
     read_silhouettes,
     silhouette_views,
 )
-from visup.percepts.shape.building.parts import parts_of
-from visup.percepts.shape.building.views import (
+from visup.percepts.shape.building.build_parts import parts_of
+from visup.percepts.shape.building.mesh_views import (
     half_sphere_directions,
     load_mesh,
     render_views,
     sphere_directions,
 )
-from visup.percepts.shape.database.database import ModelDatabase
-from visup.percepts.shape.database.directions import frequencies, merged, neighbours, outline_gap
-from visup.percepts.shape.index.records import NewView
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.database.view_directions import (
+    frequencies,
+    merge_symmetric,
+    neighbours,
+    outline_gap,
+)
+from visup.percepts.shape.index.view_records import NewView
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 trimesh = pytest.importorskip("trimesh", reason="views of meshes need the extra 'render'")
@@ -76,7 +81,7 @@ def test_a_database_is_built_alike_by_one_process_or_two(tmp_path: Path) -> None
 def test_a_build_that_was_killed_goes_on_where_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parts, "VIEWS_OF_A_PART", 3)
+    monkeypatch.setattr(build_parts, "VIEWS_OF_A_PART", 3)
     meshes = [box(tmp_path / "a.ply"), box(tmp_path / "b.ply", (1, 1, 4))]
     whole = build_database(tmp_path / "whole.db", meshes, views=5)
     target = tmp_path / "killed.db"
@@ -128,7 +133,7 @@ def test_symmetric_views_are_merged_with_the_direction_that_shows_them(tmp_path:
     # Across a plane of symmetry the silhouette is mirrored: unmirrored it is seen from the opposite.
     across = toward * (-1, 1, 1)
     other = np.array([0.8, -0.36, 0.48])
-    views = merged(build.rendered(tmp_path / "box.ply", np.stack([toward, across, other])))
+    views = merge_symmetric(build.rendered(tmp_path / "box.ply", np.stack([toward, across, other])))
     assert [v.direction for v in views] == [tuple(toward), tuple(other)]
     assert views[0].also == (tuple(-across),)
     seen = render_views(mesh, np.stack([toward, -across]))

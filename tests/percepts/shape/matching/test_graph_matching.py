@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import ZOO, shape
-from visup.percepts.shape.index.index import ViewIndex
-from visup.percepts.shape.matching.graph_matching import BREAK, WEIGHTS, correspond, match
-from visup.percepts.shape.matching.similarity import compare
-from visup.percepts.shape.shocks.signature import adjacency, descendants, signatures
+from visup.percepts.shape.index.view_index import ViewIndex
+from visup.percepts.shape.matching.graph_matching import BREAK, WEIGHTS, correspond, match_graphs
+from visup.percepts.shape.matching.shape_similarity import compare_shapes
+from visup.percepts.shape.shocks.topological_signature import adjacency, descendants, signatures
 
 PATH = np.array([[0, 1], [1, 2]], dtype=np.int16)
 FAN = np.array([[0, 1], [0, 2], [0, 3]], dtype=np.int16)
@@ -123,14 +123,14 @@ def test_a_match_that_crosses_the_hierarchy_is_worth_less() -> None:
 
 def test_a_graph_corresponds_to_itself_node_by_node() -> None:
     graph = shape(ZOO["walker"]).graph
-    assert all(u == v for u, v, _ in match(graph, graph).pairs)
+    assert all(u == v for u, v, _ in match_graphs(graph, graph).pairs)
 
 
 def test_the_index_bounds_what_matching_finds() -> None:
     shapes = [shape(m) for m in ZOO.values()]
     for query in shapes:
         bounds, _ = ViewIndex(shapes).bounds(query.graph, np.arange(len(shapes)))
-        found = [match(query.graph, s.graph).similarity for s in shapes]
+        found = [match_graphs(query.graph, s.graph).similarity for s in shapes]
         assert (bounds >= np.array(found) - 1e-5).all()
 
 
@@ -144,7 +144,7 @@ def test_the_index_finds_the_same_shape_first() -> None:
 @pytest.mark.parametrize("quarters", [0, 1, 2, 3])
 def test_rotation_in_the_plane_is_found(quarters: int) -> None:
     mask = ZOO["walker"]
-    turn = compare(shape(np.rot90(mask, -quarters)), shape(mask)).rotation
+    turn = compare_shapes(shape(np.rot90(mask, -quarters)), shape(mask)).rotation
     assert turn is not None
     # rot90 by -1 turns the picture clockwise, which is from x towards y with y down.
     off = (turn - quarters * np.pi / 2 + np.pi) % (2 * np.pi) - np.pi

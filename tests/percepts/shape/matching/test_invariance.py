@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape
-from visup.percepts.shape.matching.graph_matching import match
-from visup.percepts.shape.matching.similarity import compare
+from visup.percepts.shape.matching.graph_matching import match_graphs
+from visup.percepts.shape.matching.shape_similarity import compare_shapes
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 FEW = settings(max_examples=12, deadline=None)
@@ -31,7 +31,7 @@ def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
 @FEW
 @given(LIMBS, st.floats(0, 2 * np.pi))
 def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float) -> None:
-    likeness = compare(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
+    likeness = compare_shapes(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
     assert likeness.of_outlines > 0.93
     # Where limbs are alike, noise decides which hangs below which; the graph bears it.
     assert likeness.of_graphs > 0.8
@@ -41,7 +41,7 @@ def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float)
 @FEW
 @given(FLOWERS, st.floats(30, 200))
 def test_scale_hardly_changes_a_shape(lobes: Lobes, size: float) -> None:
-    likeness = compare(shape(flower(lobes, size=60)), shape(flower(lobes, size=size)))
+    likeness = compare_shapes(shape(flower(lobes, size=60)), shape(flower(lobes, size=size)))
     assert likeness.similarity > 0.8
 
 
@@ -49,24 +49,24 @@ def test_scale_hardly_changes_a_shape(lobes: Lobes, size: float) -> None:
 @given(FLOWERS)
 def test_a_shape_looks_like_its_mirror_image(lobes: Lobes) -> None:
     mask = flower(lobes)
-    assert compare(shape(mask), shape(mask[:, ::-1])).similarity > 0.85
+    assert compare_shapes(shape(mask), shape(mask[:, ::-1])).similarity > 0.85
 
 
 @FEW
 @given(FLOWERS, LIMBS)
 def test_similarity_is_symmetric_and_a_share(lobes: Lobes, angles: tuple[float, ...]) -> None:
     a, b = shape(flower(lobes)), shape(limbs(angles))
-    assert compare(a, b).similarity == compare(b, a).similarity
-    assert 0.0 <= compare(a, b).similarity <= 1.0
-    assert match(a.graph, b.graph).similarity == match(b.graph, a.graph).similarity
+    assert compare_shapes(a, b).similarity == compare_shapes(b, a).similarity
+    assert 0.0 <= compare_shapes(a, b).similarity <= 1.0
+    assert match_graphs(a.graph, b.graph).similarity == match_graphs(b.graph, a.graph).similarity
 
 
 @pytest.mark.parametrize("name", sorted(ZOO))
 def test_a_shape_is_like_itself_fully_and_like_others_less(name: str) -> None:
     own = shape(ZOO[name])
-    assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
+    assert compare_shapes(own, own).similarity == pytest.approx(1.0, abs=1e-6)
     for other in sorted(set(ZOO) - {name}):
-        assert compare(own, shape(ZOO[other])).similarity < 0.75
+        assert compare_shapes(own, shape(ZOO[other])).similarity < 0.75
 
 
 def test_growing_damage_lowers_the_similarity() -> None:
@@ -77,7 +77,7 @@ def test_growing_damage_lowers_the_similarity() -> None:
         damaged = whole.copy()
         rows = np.flatnonzero(whole.any(axis=1))
         damaged[rows[0] : rows[0] + int(share * len(rows))] = False
-        found.append(compare(own, shape(damaged)))
+        found.append(compare_shapes(own, shape(damaged)))
     for similarities in ([f.similarity for f in found], [f.of_graphs for f in found]):
         assert similarities == sorted(similarities, reverse=True)
         assert similarities[-1] < similarities[0] - 0.1
@@ -88,7 +88,7 @@ def test_holes_and_islands_do_not_matter() -> None:
     clean = shape(mask)
     mask[130:136, 130:136] = False
     mask[2:6, 2:6] = True
-    seen = compare(clean, shape(mask))
+    seen = compare_shapes(clean, shape(mask))
     assert seen.of_graphs == pytest.approx(1.0, abs=1e-6)
     assert seen.of_outlines == pytest.approx(1.0, abs=1e-6)
     # The map of the area shows them, for what they are: a thousandth of it, to the eighth power.
@@ -128,7 +128,7 @@ def test_odd_masks_have_a_shape_or_none_and_never_fail(mask: np.ndarray) -> None
         own = shape(mask)
         assert np.isfinite(own.contour).all()
         assert own.graph.weights.sum() == pytest.approx(1.0, abs=1e-4)
-        assert compare(own, own).similarity == pytest.approx(1.0, abs=1e-6)
+        assert compare_shapes(own, own).similarity == pytest.approx(1.0, abs=1e-6)
 
 
 @settings(max_examples=15, deadline=None)
@@ -137,12 +137,12 @@ def test_a_mirror_image_is_told_apart_on_request(turn: float) -> None:
     """A body with limbs to one side only is not its mirror image, however it is turned."""
     angles = (0.3, 1.2, 2.9)
     own, image = shape(limbs(angles)), shape(limbs(angles, turn=turn)[:, ::-1])
-    either, strict = compare(own, image), compare(own, image, mirror=False)
+    either, strict = compare_shapes(own, image), compare_shapes(own, image, mirror=False)
     assert either.mirrored
     assert not strict.mirrored
     assert either.similarity > 0.9
     assert strict.similarity < either.similarity - 0.1
-    again = compare(own, shape(limbs(angles, turn=turn)), mirror=False)
+    again = compare_shapes(own, shape(limbs(angles, turn=turn)), mirror=False)
     assert again.similarity > 0.9
 
 

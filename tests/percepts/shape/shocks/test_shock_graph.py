@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from tests.percepts.shape.shapes import FLOWERS, LIMBS, flower, limbs, shape
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
-from visup.percepts.shape.shocks.shocks import Kind
+from visup.percepts.shape.shocks.shock_labels import ShockKind
 from visup.percepts.shape.shocks.skeleton import skeletonise
 
 Y, X = np.mgrid[-80:81, -80:81]
@@ -22,33 +22,33 @@ BONE = (np.hypot(abs(X) - 50, Y) < 22) | ((abs(X) < 50) & (abs(Y) < 8))
 CLOVER = np.hypot(X, Y) < 35 + 25 * np.cos(3 * np.arctan2(Y, X))
 
 KINDS = [
-    ("disc", DISC, {Kind.SEED: 1}),
-    ("ellipse", ELLIPSE, {Kind.SEED: 1, Kind.PROTRUSION: 2}),
-    ("rectangle", RECTANGLE, {Kind.BEND: 1, Kind.PROTRUSION: 4}),
-    ("peanut", PEANUT, {Kind.SEED: 2, Kind.PROTRUSION: 2, Kind.NECK: 1}),
-    ("bone", BONE, {Kind.SEED: 2, Kind.PROTRUSION: 2, Kind.BEND: 1}),
+    ("disc", DISC, {ShockKind.SEED: 1}),
+    ("ellipse", ELLIPSE, {ShockKind.SEED: 1, ShockKind.PROTRUSION: 2}),
+    ("rectangle", RECTANGLE, {ShockKind.BEND: 1, ShockKind.PROTRUSION: 4}),
+    ("peanut", PEANUT, {ShockKind.SEED: 2, ShockKind.PROTRUSION: 2, ShockKind.NECK: 1}),
+    ("bone", BONE, {ShockKind.SEED: 2, ShockKind.PROTRUSION: 2, ShockKind.BEND: 1}),
 ]
 
 
 @pytest.mark.parametrize(("name", "mask", "kinds"), KINDS, ids=[k[0] for k in KINDS])
 def test_simple_shapes_have_the_shocks_of_the_paper(
-    name: str, mask: np.ndarray, kinds: dict[Kind, int]
+    name: str, mask: np.ndarray, kinds: dict[ShockKind, int]
 ) -> None:
     found = shape(mask).graph.kinds[1:].tolist()
-    assert {Kind(k): found.count(k) for k in set(found)} == kinds
+    assert {ShockKind(k): found.count(k) for k in set(found)} == kinds
 
 
 def assert_grammar(graph: ShockGraph) -> None:
     parents = [graph.edges[graph.edges[:, 1] == n, 0].tolist() for n in range(len(graph))]
-    assert graph.kinds[0] == Kind.ROOT
+    assert graph.kinds[0] == ShockKind.ROOT
     assert not parents[0]
     for node in range(1, len(graph)):
         children = graph.edges[graph.edges[:, 0] == node, 1]
         assert parents[node], "every shock hangs below something"
         assert max(parents[node]) < node, "parents come before children"
-        if graph.kinds[node] == Kind.SEED:
+        if graph.kinds[node] == ShockKind.SEED:
             assert parents[node] == [0]
-        if graph.kinds[node] == Kind.NECK:
+        if graph.kinds[node] == ShockKind.NECK:
             assert not len(children)
             assert len(parents[node]) == 2
         assert len(parents[node]) <= 2

@@ -1,0 +1,109 @@
+"""Whether frames come as they should: gaps in their numbers or times, repeats in their place."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+WINDOW_S = 1.0
+MOST = 128
+ENOUGH = 6  # intervals before anything is said of what is usual
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """One frame's arrival.
+
+    Attributes:
+        time: Seconds.
+        step: Frames since the one before, by number.
+        wait: Seconds since the one before.
+        repeated: Its image is that of the one before.
+        stale: How many frames before this one only repeated another, if this one is new.
+    """
+
+    time: float
+    step: int
+    wait: float
+    repeated: bool
+    stale: int
+
+
+class ArrivalMonitor:
+    """The last seconds of arrivals.
+
+    Args:
+        lost: Share of frames that must be missing within a second; twice that for repeats.
+        gap: Frames missing in a row that are told at once.
+        frozen_s: Repeats that go on for this long are another fault, seconds.
+    """
+
+    def __init__(self, lost: float, gap: int, frozen_s: float) -> None:
+        self._lost, self._gap, self._frozen_s = lost, gap, frozen_s
+        self._recent: deque[Arrival] = deque(maxlen=MOST)
+        self._steps: deque[int] = deque(maxlen=MOST)
+        self._waits: deque[float] = deque(maxlen=MOST)
+        self._repeats: deque[bool] = deque(maxlen=MOST)
+        self._run = 0
+        self._run_s = 0.0
+        self._last: tuple[int, float] | None = None
+
+    def arrive(self, index: int, time: float, repeated: bool | None) -> int:
+        """Take in a frame.
+
+        Args:
+            index: Its number.
+            time: Seconds.
+            repeated: Whether its image is that of the frame before; None when a fault of the
+                image leaves that untold.
+
+        Returns:
+            How many frames are missing of late, when that is too many; else 0.
+        """
+        last, self._last = self._last, (index, time)
+        if last is None:
+            return 0
+        stale = self._stale(repeated, time - last[1])
+        new = Arrival(time, index - last[0], time - last[1], repeated is True, stale)
+        self._recent.append(new)
+        past = []
+        while time - self._recent[0].time >= WINDOW_S:
+            past.append(self._recent.popleft().repeated)
+        missing = self._missing()
+        if not missing:
+            self._repeats.extend(past)
+            self._steps.append(new.step)
+            self._waits.append(new.wait)
+        if len(self._repeats) < ENOUGH:
+            # Until the window has filled, the first frames are all that tells of habits.
+            self._repeats.append(new.repeated)
+        return missing
+
+    def _stale(self, repeated: bool | None, wait: float) -> int:
+        """Length of the run of repeats that ends with this frame."""
+        if repeated is None:
+            self._run, self._run_s = 0, 0.0
+            return 0
+        run, lasted = self._run, self._run_s
+        self._run, self._run_s = (run + 1, lasted + wait) if repeated else (0, 0.0)
+        return 0 if repeated or lasted >= self._frozen_s else run
+
+    def _missing(self) -> int:
+        if len(self._waits) < ENOUGH:
+            return 0
+        step = max(1.0, float(np.median(self._steps)))
+        wait = float(np.quantile(self._waits, 0.75))
+        # Many cameras repeat frames always, for want of light or to fill a rate.
+        habit = float(np.mean(self._repeats)) > 0.04
+        gaps = [max(a.step / step, a.wait / wait) - 1.0 for a in self._recent]
+        total = sum(g for g in gaps if g > 0.6)
+        stale = 0 if habit else sum(a.stale for a in self._recent)
+        due = WINDOW_S / wait
+        if max(gaps, default=0.0) > self._gap - 0.4:
+            return round(total)
+        # Numbers do not lie; an image may repeat another for a frame or two by chance.
+        sure = total >= max(3.0, self._lost * due)
+        told = sure or total + stale >= max(3.0, 2.0 * self._lost * due)
+        return round(total + stale) if told else 0

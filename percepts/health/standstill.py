@@ -1,0 +1,197 @@
+"""How parts of the image change with time: which stand still at once, which were covered.
+
+A scene never stops, and is never covered, from one frame to the next in many places at once; a
+camera that freezes does, and so does a cover. What follows slowly is left alone.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+CELL = 10  # pixels of the small image along a cell
+LAG_S = 0.2  # slow motion is seen over this time
+AFTER_S = 0.42  # how long what is new must have stood
+KEPT_S = 1.0
+MOST = 48  # looks that are kept, whatever the frame rate
+FEWEST = 3  # looks before the change
+JUMP = 1.0  # grey levels; keyframes of codecs stir a dark scene by less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellChange:
+    """One frame as cells see it.
+
+    Attributes:
+        time: Seconds.
+        small: (h, w) float32, the small image.
+        change: (rows, columns) float32, mean change of each cell since the frame before.
+        slow: The same over `LAG_S`.
+        texture: (rows, columns) float32, standard deviation within each cell.
+    """
+
+    time: float
+    small: Floats
+    change: Floats
+    slow: Floats
+    texture: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standstill:
+    """Where the image stands still since a moment.
+
+    Attributes:
+        whole: The whole image stands, as frozen; else a part is covered.
+        cells: (rows, columns) bool.
+        small: The small image as it stands.
+        since: Seconds.
+    """
+
+    whole: bool
+    cells: Mask
+    small: Floats
+    since: float
+
+
+class StandstillDetector:
+    """The last second of small images, and what halted in it."""
+
+    def __init__(self, covered: float) -> None:
+        self._covered = covered
+        self._looks: deque[CellChange] = deque(maxlen=MOST)
+        self.standstill: Standstill | None = None
+
+    def forget(self) -> None:
+        """Start afresh: what came before says nothing about what comes."""
+        self._looks.clear()
+        self.standstill = None
+
+    def update(self, small: Floats, factor: int, time: float) -> Standstill | None:
+        """Take in a frame.
+
+        Args:
+            small: (h, w) float32, grey.
+            factor: Pixels of the image along one of these.
+            time: Seconds.
+
+        Returns:
+            What stands still that moved before, or None.
+        """
+        if self._looks and self._looks[-1].small.shape != small.shape:
+            self.forget()
+        still = 0.25 + 2.0 / factor  # sensor noise of 2 grey levels, averaged
+        if self.standstill is not None:
+            if _persists(self.standstill, small, still):
+                return self.standstill
+            self.forget()
+        self._push(small, time)
+        self.standstill = self._halted(still)
+        return self.standstill
+
+    def _push(self, small: Floats, time: float) -> None:
+        looks = self._looks
+        while looks and time - looks[0].time > KEPT_S and len(looks) > 3 * FEWEST:
+            looks.popleft()
+        last = looks[-1].small if looks else small
+        lag = next((k.small for k in reversed(looks) if time - k.time >= LAG_S - 1e-6), last)
+        looks.append(
+            CellChange(
+                time,
+                small,
+                per_cell(cv2.absdiff(small, last)),
+                per_cell(cv2.absdiff(small, lag)),
+                _texture(small),
+            )
+        )
+
+    def _halted(self, still: float) -> Standstill | None:
+        now = self._looks[-1]
+        after = [k for k in self._looks if now.time - k.time < AFTER_S]
+        # A slow camera gives few frames in that time: three are needed to see that it stands.
+        after = after if len(after) >= 4 else list(self._looks)[-4:]
+        before = list(self._looks)[1 : len(self._looks) - len(after)]
+        if len(before) < FEWEST:
+            return None
+        calm = np.median([k.change for k in after[1:]], axis=0)
+        least = np.min([k.slow for k in before], axis=0)
+        most = np.max([k.change for k in before], axis=0)
+        texture = np.min([k.texture for k in before], axis=0)
+        stands = calm < still
+        noise = min(still, float(np.quantile(least, 0.1)))
+        lively = least > 0.4 + 2.0 * noise
+        stopped = lively & stands & (now.slow < 0.25 * least)
+        then = before[-1].small
+        # Light and codecs change what is bright by more than what is dark.
+        calls_for = JUMP + 0.1 * per_cell(then) + 3.0 * most
+        jump = per_cell(cv2.absdiff(now.small, then)) > calls_for
+        bare = (texture > 3.0) & (now.texture < 0.3 * texture)
+        moving = now.slow > np.maximum(still, 0.25 * least)
+        if not moving.any() and _all_stopped(lively, stopped):
+            return Standstill(True, lively, now.small, after[0].time)
+        taken = stands & (stopped | jump | bare)
+        goes_on = float(np.mean(lively & ~stopped)) > 0.05
+        if not goes_on:
+            taken &= jump | bare
+        part = _largest(taken)
+        share = float(part.mean())
+        if share < self._covered or share > 0.92 or _same_scene(part, then, now.small):
+            return None
+        return Standstill(False, part, now.small, after[0].time)
+
+
+def per_cell(values: NDArray[np.integer[Any] | np.floating[Any]]) -> Floats:
+    """Means over cells of `CELL` x `CELL`, about."""
+    rows, columns = (max(1, round(n / CELL)) for n in values.shape)
+    out = cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA)
+    return np.asarray(out, dtype=np.float32).reshape(rows, columns)
+
+
+def _texture(small: Floats) -> Floats:
+    mean = per_cell(small)
+    return np.sqrt(np.maximum(per_cell(small * small) - mean * mean, 0.0))
+
+
+def _persists(halt: Standstill, small: Floats, still: float) -> bool:
+    """Whether what stood still looks the same as it did then."""
+    if halt.small.shape != small.shape:
+        return False
+    apart = per_cell(cv2.absdiff(small, halt.small))[halt.cells]
+    return float(np.mean(apart < still + 1.0)) > (0.9 if halt.whole else 0.6)
+
+
+def _all_stopped(lively: Mask, stopped: Mask) -> bool:
+    """Whether all that moved stopped at once: more than one thing, or a large part of the view."""
+    moved = int(lively.sum())
+    if moved == 0 or stopped.sum() < 0.97 * moved:
+        return False
+    groups = cv2.connectedComponents(lively.astype(np.uint8), connectivity=8)[0] - 1
+    return float(lively.mean()) > (0.04 if groups > 1 else 0.3)
+
+
+def _largest(cells: Mask) -> Mask:
+    """The largest connected part; single cells that are missing in it are filled."""
+    closed = cv2.morphologyEx(cells.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
+    if count < 2:
+        return np.zeros(cells.shape, dtype=bool)
+    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return np.asarray(labels == best) & cells
+
+
+def _same_scene(part: Mask, then: Floats, now: Floats) -> bool:
+    """Whether a part shows what it did before in another light: that is no cover."""
+    size = (then.shape[1], then.shape[0])
+    inside = cv2.resize(part.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    a, b = then[inside], now[inside]
+    if a.std() < 2.0 or b.std() < 2.0:
+        return False
+    return float(np.corrcoef(a, b)[0, 1]) > 0.8

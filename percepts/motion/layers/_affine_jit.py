@@ -1,0 +1,176 @@
+"""The inner loops of fitting layers to constraints, compiled; `affine` says what they mean."""
+
+from __future__ import annotations
+
+from math import log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+from visup.percepts.motion.features.work_image import Floats
+
+Doubles = NDArray[np.float64]
+SETTLED = 0.003  # pixels, far below what is measured: a fit that moves by less is done
+
+
+@compiled
+def displacements(xy: Floats, matrix: Doubles, bend: Doubles) -> Floats:
+    """Displacements of (N, 2) positions under a (2, 3) affine motion with a (2, 3) bend."""
+    out = np.empty(xy.shape, np.float32)
+    for i in range(2):
+        a, b, c = np.float32(matrix[i, 0]), np.float32(matrix[i, 1]), np.float32(matrix[i, 2])
+        d, e = np.float32(bend[i, 0] / 1000.0), np.float32(bend[i, 1] / 1000.0)
+        f = np.float32(bend[i, 2] / 1000.0)
+        for n in range(len(xy)):
+            x, y = xy[n, 0], xy[n, 1]
+            out[n, i] = (a + d * x + e * y) * x + (b + f * y) * y + c
+    return out
+
+
+@compiled
+def squared_misfits(
+    xy: Floats, moved: Floats, information: Floats, matrix: Doubles, bend: Doubles, slack: float
+) -> Floats:
+    """Squared Mahalanobis distance of N constraints to a motion that is known up to `slack`."""
+    at = displacements(xy, matrix, bend)
+    out = np.empty(len(xy), np.float32)
+    v = slack * slack
+    for n in range(len(xy)):
+        a, b, c = float(information[n, 0]), float(information[n, 1]), float(information[n, 2])
+        det = a * c - b * b
+        scale = 1 / (1 + v * (a + c) + v * v * det)
+        ex, ey = float(at[n, 0] - moved[n, 0]), float(at[n, 1] - moved[n, 1])
+        a, b, c = (a + v * det) * scale, b * scale, (c + v * det) * scale
+        out[n] = (a * ex + 2 * b * ey) * ex + c * ey * ey
+    return out
+
+
+@compiled
+def log_likelihoods(
+    xy: Floats, moved: Floats, information: Floats, matrix: Doubles, bend: Doubles, slack: float
+) -> Floats:
+    """Log likelihood of N constraints under a motion, relative to one that is exactly known."""
+    out = squared_misfits(xy, moved, information, matrix, bend, slack)
+    v = slack * slack
+    for n in range(len(xy)):
+        a, b, c = float(information[n, 0]), float(information[n, 1]), float(information[n, 2])
+        det = a * c - b * b
+        wide = (a + c + 2 * v * det) / (1 + v * (a + c) + v * v * det)
+        width = log(max(wide, 1e-9) / (a + c + 1e-9))
+        out[n] = 0.5 * width - 0.5 * out[n]
+    return out
+
+
+@compiled
+def reweighted_least_squares(
+    phi: Doubles,
+    moved: Floats,
+    information: Floats,
+    weight: Doubles,
+    start: Floats,
+    hold: Doubles,
+    slack: float,
+    cutoff: float,
+    rounds: int,
+) -> tuple[Doubles, Doubles, float]:
+    """Iteratively reweighted least squares for a displacement field that is linear in `phi`.
+
+    Args:
+        phi: (N, K) float64.
+        moved: (N, 2) float32 displacements.
+        information: (N, 3) float32 inverse covariances.
+        weight: (N,) float64.
+        start: (N, 2) float32 displacements to begin with.
+        hold: (K,) float64, how strongly each coefficient is held at zero; more than nothing.
+        slack: Error of the model itself, pixels.
+        cutoff: Mahalanobis distance beyond which a constraint hardly counts.
+        rounds: Most iterations.
+
+    Returns:
+        (2, K) coefficients, the last (N,) weights, and the mean information of N under these.
+    """
+    count, k = phi.shape
+    info, v = np.empty((count, 3)), slack * slack
+    for n in range(count):
+        a, b, c = float(information[n, 0]), float(information[n, 1]), float(information[n, 2])
+        det = a * c - b * b
+        scale = 1 / (1 + v * (a + c) + v * v * det)
+        info[n, 0], info[n, 1], info[n, 2] = (a + v * det) * scale, b * scale, (c + v * det) * scale
+    now = start.astype(np.float64)
+    w, model = np.empty(count), np.zeros((2, k))
+    normal, right = np.empty((2 * k, 2 * k)), np.empty(2 * k)
+    for _ in range(rounds):
+        normal[:], right[:] = 0, 0
+        for i in range(k):
+            normal[i, i] = normal[k + i, k + i] = hold[i]
+        for n in range(count):
+            a, b, c = info[n, 0], info[n, 1], info[n, 2]
+            dx, dy = float(moved[n, 0]), float(moved[n, 1])
+            ex, ey = dx - now[n, 0], dy - now[n, 1]
+            off = 1 + ((a * ex + 2 * b * ey) * ex + c * ey * ey) / cutoff**2
+            w[n] = weight[n] / (off * off)
+            for i in range(k):
+                p = w[n] * phi[n, i]
+                right[i] += p * (a * dx + b * dy)
+                right[k + i] += p * (b * dx + c * dy)
+                for j in range(i + 1):
+                    normal[i, j] += p * phi[n, j] * a
+                    normal[k + i, k + j] += p * phi[n, j] * c
+                for j in range(k):
+                    normal[k + i, j] += p * phi[n, j] * b
+        _solve(normal, right)
+        model = right.copy().reshape(2, k)
+        step = 0.0
+        for n in range(count):
+            for i in range(2):
+                there = 0.0
+                for j in range(k):
+                    there += model[i, j] * phi[n, j]
+                step = max(step, abs(there - now[n, i]))
+                now[n, i] = there
+        if step < SETTLED:
+            break
+    mean = 0.0
+    for n in range(count):
+        mean += w[n] * (info[n, 0] + info[n, 2])
+    return model, w, mean
+
+
+@compiled
+def _solve(normal: Doubles, right: Doubles) -> None:
+    """Solve a positive definite system in place by Cholesky; the lower triangle is read."""
+    size = len(right)
+    for i in range(size):
+        for j in range(i + 1):
+            total = normal[i, j]
+            for k in range(j):
+                total -= normal[i, k] * normal[j, k]
+            normal[i, j] = sqrt(total) if i == j else total / normal[j, j]
+    for i in range(size):
+        for k in range(i):
+            right[i] -= normal[i, k] * right[k]
+        right[i] /= normal[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            right[i] -= normal[k, i] * right[k]
+        right[i] /= normal[i, i]
+
+
+@compiled
+def median(values: Floats) -> float:
+    """The median of (N,) float32 with one or more, as `np.median` rounds it."""
+    half = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, half)[half])
+    parts = np.partition(values, half)
+    return float((parts[:half].max() + parts[half]) / np.float32(2))
+
+
+@compiled
+def quantile(values: Floats, share: float) -> float:
+    """What a share of (N,) float32 with one or more lie below, between two of them in proportion."""
+    ordered, at = np.sort(values), share * (len(values) - 1)
+    low = int(at)
+    high = min(low + 1, len(values) - 1)
+    return float(ordered[low]) + (at - low) * (float(ordered[high]) - float(ordered[low]))

@@ -1,0 +1,208 @@
+"""Layers of motion: affine models fitted to constraints by robust EM, with an outlier class.
+
+The background is not one layer but a few large ones: what covers most of the image, what is fixed
+to the camera (a sill, a bonnet, stars seen from a camera that keeps its attitude) and possibly a
+second wide layer (a planet that drifts behind). Everything else that moves is an object.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.features.motion_constraints import Constraints
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.layers._affine_jit import (
+    displacements,
+    log_likelihoods,
+    reweighted_least_squares,
+    squared_misfits,
+)
+
+Doubles = NDArray[np.float64]
+STILL: Doubles = np.zeros((2, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Affine:
+    """A displacement field that is affine in position: d(x, y) = matrix @ (x, y, 1).
+
+    Attributes:
+        matrix: (2, 3) float64, pixels of displacement.
+        sigma: Standard deviation of its displacements where it was fitted, pixels.
+        support: How many constraints it rests on (sum of weights).
+        bend: (2, 3) float64 coefficients of (x^2, xy, y^2) / 1000, for a camera that turns or a
+            scene that is tilted; None for a plain affine motion.
+    """
+
+    matrix: Doubles
+    sigma: float = 0.0
+    support: float = 0.0
+    bend: Doubles | None = None
+
+    def at(self, xy: Floats) -> Floats:
+        """Displacements of (N, 2) positions, (N, 2) float32."""
+        there = np.ascontiguousarray(xy, dtype=np.float32)
+        return displacements(there, *self._coefficients)
+
+    @property
+    def _coefficients(self) -> tuple[Doubles, Doubles]:
+        """(2, 3) and (2, 3) float64, as the compiled loops take them."""
+        matrix = np.ascontiguousarray(self.matrix, dtype=np.float64)
+        bend = STILL if self.bend is None else np.ascontiguousarray(self.bend, dtype=np.float64)
+        return matrix, bend
+
+    def shift(self, where: tuple[float, float]) -> tuple[float, float]:
+        """(x, y) displacement of one position; what `at` says, without arrays."""
+        x, y = where
+        (a, b, c), (d, e, f) = self.matrix.tolist()
+        dx, dy = a * x + b * y + c, d * x + e * y + f
+        if self.bend is not None:
+            (p, q, r), (s, t, u) = self.bend.tolist()
+            dx += (p * x * x + q * x * y + r * y * y) / 1000.0
+            dy += (s * x * x + t * x * y + u * y * y) / 1000.0
+        return dx, dy
+
+    def scaled(self, factor: float) -> Affine:
+        """The same motion over a baseline that is `factor` times as long."""
+        bend = None if self.bend is None else self.bend * factor
+        return Affine(self.matrix * factor, self.sigma * factor, self.support, bend)
+
+
+def fit_bent(c: Constraints, weight: Floats, start: Affine, slack: float = 0.15) -> Affine:
+    """A robust quadratic fit, for the background of a camera that moves.
+
+    Args:
+        c: N constraints.
+        weight: (N,) float32, how far each belongs to the layer.
+        start: An affine fit.
+        slack: Error of the model itself, pixels.
+
+    Returns:
+        The bent motion.
+    """
+    use = np.flatnonzero(weight > 0)
+    if not len(use):
+        return start
+    xy, share = c.xy[use], weight[use]
+    centre, spread = xy.mean(axis=0), float(xy.std()) + 1.0
+    x, y = ((xy - centre) / spread).T.astype(np.float64)
+    phi = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
+    hold = np.array([1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-3]) / slack**2
+    moved, information = c.moved[use], c.information[use]
+    model, w, _ = reweighted_least_squares(
+        phi, moved, information, share.astype(np.float64), start.at(xy), hold, slack, 3.0, 5
+    )
+    return _unscaled(model, centre, spread, float(w.sum()))
+
+
+def _unscaled(model: Doubles, centre: Doubles, spread: float, support: float) -> Affine:
+    """A quadratic in centred and scaled coordinates as one in pixels."""
+    a, b, c = (model[:, i] / spread**2 for i in range(3))
+    d, e = model[:, 3] / spread, model[:, 4] / spread
+    x, y = float(centre[0]), float(centre[1])
+    linear_x = d - 2 * a * x - b * y
+    linear_y = e - 2 * c * y - b * x
+    constant = model[:, 5] - d * x - e * y + a * x * x + b * x * y + c * y * y
+    matrix = np.stack([linear_x, linear_y, constant], axis=1)
+    return Affine(matrix, 0.0, support, np.stack([a, b, c], axis=1) * 1000.0)
+
+
+def distances(model: Affine, c: Constraints, slack: float = 0.0) -> Floats:
+    """Squared Mahalanobis distance of each constraint to a layer.
+
+    Args:
+        model: The layer's displacement over the baseline of the constraints.
+        c: N constraints.
+        slack: Standard deviation to allow for the model itself, pixels.
+
+    Returns:
+        (N,) float32.
+    """
+    return squared_misfits(c.xy, c.moved, c.information, *model._coefficients, max(slack, 0.0))
+
+
+def log_likelihood(model: Affine, c: Constraints, slack: float) -> Floats:
+    """Log likelihood of each constraint under a layer, relative to one that is exactly known.
+
+    A layer that is allowed a wide error pays for it, or it would explain everything.
+
+    Args:
+        model: The layer's displacement over the baseline of the constraints.
+        c: N constraints.
+        slack: Standard deviation to allow for the model itself, pixels.
+
+    Returns:
+        (N,) float32, 0 at best.
+    """
+    return log_likelihoods(c.xy, c.moved, c.information, *model._coefficients, max(slack, 0.0))
+
+
+def widened(information: Floats, sigma: float) -> Floats:
+    """Information after adding an isotropic variance to the covariance, (N, 3) float32."""
+    if sigma <= 0:
+        return information
+    a, b, c = np.ascontiguousarray(information.T, dtype=np.float64)
+    # (L^-1 + v I)^-1 = L (I + v L)^-1, in closed form for 2 x 2, safe when L is singular.
+    v = sigma * sigma
+    det = a * c - b * b
+    scale = 1 / (1 + v * (a + c) + v * v * det)
+    out = np.empty(information.shape, dtype=np.float32)
+    out[:, 0] = (a + v * det) * scale
+    out[:, 1] = b * scale
+    out[:, 2] = (c + v * det) * scale
+    return out
+
+
+def fit_affine(
+    c: Constraints,
+    weight: Floats,
+    guess: Affine,
+    *,
+    rigidity: float = 3.0,
+    rounds: int = 4,
+    slack: float = 0.1,
+    cutoff: float = 3.5,
+) -> Affine:
+    """A robust affine fit by iteratively reweighted least squares (the M and E steps of one layer).
+
+    Args:
+        c: N constraints.
+        weight: (N,) float32, how far each belongs to the layer.
+        guess: Where to start.
+        rigidity: How strongly the linear part is held at zero.
+        rounds: Iterations.
+        slack: Error of the model itself, pixels.
+        cutoff: Mahalanobis distance beyond which a constraint hardly counts.
+
+    Returns:
+        The fitted layer; the guess with no support when there is nothing to fit.
+    """
+    total = float(weight.sum())
+    if total < 3.0:
+        return Affine(guess.matrix, guess.sigma, 0.0)
+    # What has no weight has no say, and an object has few of the constraints.
+    use = np.flatnonzero(weight > 0)
+    xy, share = c.xy[use], weight[use]
+    centre = (share @ xy) / total
+    spread = float(np.sqrt((share @ ((xy - centre) ** 2).sum(1)) / total)) + 1.0
+    phi = np.ones((len(use), 3))
+    phi[:, :2] = (xy - centre) / spread
+    # Along an edge nothing is known: the least motion is taken there, not a drifting guess.
+    hold = np.array([rigidity, rigidity, 0.01]) / slack**2
+    model, w, mean = reweighted_least_squares(
+        phi,
+        c.moved[use],
+        c.information[use],
+        share.astype(np.float64),
+        guess.at(xy),
+        hold,
+        slack,
+        cutoff,
+        rounds,
+    )
+    linear = model[:, :2] / spread
+    matrix = np.concatenate([linear, (model[:, 2] - linear @ centre)[:, None]], axis=1)
+    return Affine(matrix, float(1 / np.sqrt(mean / 2 + 1e-9)), float(w.sum()))

@@ -1,0 +1,32 @@
+"""The motion of a layer per second, as measured over one baseline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from visup.percepts.motion.layers.affine import Doubles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AffineRate:
+    """A layer's motion per second as measured over one baseline.
+
+    Attributes:
+        matrix: (2, 3) float64, pixels per second, affine in position.
+        sigma: Standard deviation, pixels per second.
+        time: When it was measured, seconds.
+        span_s: Baseline, seconds.
+        bend: Quadratic part, as in `Affine`, per second, or None.
+    """
+
+    matrix: Doubles
+    sigma: float
+    time: float
+    span_s: float
+    bend: Doubles | None = None
+
+    def velocity(self, where: tuple[float, float]) -> Doubles:
+        """(vx, vy) at a position, pixels per second."""
+        return np.asarray(self.matrix[:, :2] @ np.asarray(where) + self.matrix[:, 2])

@@ -1,0 +1,224 @@
+"""The dense posterior: which layer each superpixel belongs to, and how surely.
+
+Evidence comes where the image has structure; between edges it is spread over alike neighbours by a
+random walk (a linear system), so the flat inside of an object takes the label of its outline while
+a dark sky, which is larger than its borders with objects, stays background. What is not settled by
+evidence stays between the labels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from visup.percepts.motion.features._superpixels_jit import bayes_shares, sum_point_evidence
+from visup.percepts.motion.features.motion_constraints import Points
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.features.superpixels import Superpixels
+from visup.percepts.motion.features.tone_histograms import tone_likelihood
+from visup.percepts.motion.features.work_image import Floats
+
+REACH = 2.0  # pixels on either side of a point: an edge may belong to either of its sides
+CLIP = 5.0
+STAY = 4.0  # weight of what was there before where an object rests
+STILL_TOLD = 0.9  # share of the evidence that is left out there
+DOUBT = 0.03  # weight of evidence for anything but background from which a cell is in doubt
+DOUBT_STEPS = 3  # how far it is felt: beyond, what is seen is background
+LEAST = 0.03  # no label is ever quite impossible before there is evidence
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointEvidence:
+    """What the motion of points says of the labels.
+
+    Attributes:
+        points: N points.
+        likelihood: (N, K) float32, log likelihood of each label.
+        informative: (N,) bool, whether a point says what is seen there: a corner whose motion was
+            measured.
+    """
+
+    points: Points
+    likelihood: Floats
+    informative: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelPrior:
+    """What is expected of the labels before the evidence of a frame.
+
+    Attributes:
+        shares: (count, K) float32, by where the tracks are predicted.
+        by_appearance: (count, K) float32, the same after the tones of the superpixels.
+        stationary: (count,) bool, where an object rests: motion tells nothing there.
+    """
+
+    shares: Floats
+    by_appearance: Floats
+    stationary: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labelling:
+    """The labels of the superpixels: 0 is the background, k the k-th track, the last unknown motion.
+
+    Attributes:
+        posterior: (count, K) float32; rows sum to 1.
+        winner: (count,) int64, the likeliest label of each.
+    """
+
+    posterior: Floats
+    winner: NDArray[np.int64]
+
+
+def cell_evidence(
+    cells: Superpixels, evidence: PointEvidence, dense: Floats, prior: Floats
+) -> tuple[Floats, Floats]:
+    """Bayes' rule in each superpixel: the prior times the likelihood of its constraints.
+
+    Args:
+        cells: The superpixels.
+        evidence: What points say.
+        dense: (count, K) float32, log likelihood by dense comparison.
+        prior: (count, K) float32 label shares before.
+
+    Returns:
+        (count, K) float32 label shares, and (count,) float32 the weight of the evidence, 0 to 1.
+    """
+    points, has = evidence.points, evidence.informative
+    totals, number = sum_point_evidence(
+        cells.labels,
+        points.xy[has],
+        points.normal[has],
+        evidence.likelihood[has],
+        REACH,
+        cells.count,
+    )
+    return bayes_shares(totals, number, dense, prior, LEAST, CLIP)
+
+
+def random_walk(
+    cells: Superpixels,
+    share: Floats,
+    weight: Floats,
+    prior: Floats,
+    persistence: Floats,
+    bias: Floats,
+) -> Floats:
+    """Solve for the posterior of every superpixel.
+
+    Args:
+        cells: The superpixels.
+        share: (count, K) label shares by evidence; label 0 is the background.
+        weight: (count,) weight of the evidence.
+        prior: (count, K) posterior carried from the frame before.
+        persistence: (count,) weight of that prior.
+        bias: (count,) weight of the belief that it is background.
+
+    Returns:
+        (count, K) float32 posterior; rows sum to 1.
+    """
+    # Far from all that may not be background, nothing else can come out: the rest is solved for,
+    # with those cells as its border.
+    doubt = (share[:, 1:].sum(axis=1) * weight + prior[:, 1:].sum(axis=1) * persistence) > DOUBT
+    inside = np.flatnonzero(cells.dilated(doubt[:, None], DOUBT_STEPS)[:, 0])
+    out = np.zeros(share.shape)
+    out[:, 0] = 1.0
+    if not len(inside):
+        return out.astype(np.float32)
+    right = (share * weight[:, None] + prior * persistence[:, None])[inside].astype(np.float64)
+    own = (weight + persistence + bias)[inside].astype(np.float64)
+    system, beyond = _system(cells.link, inside, own)
+    right[:, 0] += bias[inside] + beyond
+    found = splu(
+        system,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        relax=1,  # cells have so few neighbours that there is nothing to gather in dense blocks
+        panel_size=1,
+        options={"SymmetricMode": True},
+    ).solve(right)
+    found = np.maximum(found, 0)
+    out[inside] = found / found.sum(axis=1, keepdims=True)
+    return np.asarray(out, dtype=np.float32)
+
+
+def _system(
+    link: sparse.csr_matrix, inside: NDArray[np.int64], own: NDArray[np.float64]
+) -> tuple[sparse.csc_matrix, NDArray[np.float64]]:
+    """The weighted Laplacian of some cells, and (M,) the affinity of each to cells left out.
+
+    Args:
+        link: (count, count) affinity of neighbours, symmetric.
+        inside: (M,) numbers of the cells, ascending.
+        own: (M,) what else is on the diagonal.
+
+    Returns:
+        (M, M) float64, symmetric; and (M,) float64.
+    """
+    m = len(inside)
+    number = np.full(link.shape[0], -1, dtype=np.int32)
+    number[inside] = np.arange(m, dtype=np.int32)
+    one, other = (
+        number[np.repeat(np.arange(link.shape[0]), np.diff(link.indptr))],
+        number[link.indices],
+    )
+    mine = one >= 0
+    one, other, value = one[mine], other[mine], link.data[mine].astype(np.float64)
+    degree = np.bincount(one, weights=value, minlength=m)
+    within = other >= 0
+    one, other, value = one[within], other[within], value[within]
+    ends = np.cumsum(np.bincount(one, minlength=m) + 1)
+    # The diagonal comes last in each column: nothing asks for another order.
+    place = np.arange(len(one)) + one
+    data, rows = np.empty(len(one) + m), np.empty(len(one) + m, dtype=np.int32)
+    data[place], rows[place] = -value, other
+    data[ends - 1], rows[ends - 1] = degree + own, np.arange(m)
+    columns = np.concatenate([[0], ends]).astype(np.int32)
+    beyond = np.asarray(degree - np.bincount(one, weights=value, minlength=m))
+    return sparse.csc_matrix((data, rows, columns), shape=(m, m)), beyond
+
+
+def appearance_prior(cells: Superpixels, prior: Floats) -> Floats:
+    """Shares of the labels (count, K) that are expected, after the tones of the superpixels."""
+    out = prior * tone_likelihood(cells, prior)
+    return np.asarray(out / np.maximum(out.sum(axis=1, keepdims=True), 1e-6))
+
+
+def label_cells(
+    cells: Superpixels,
+    evidence: PointEvidence,
+    dense: Floats,
+    prior: LabelPrior,
+    settings: MotionSettings,
+) -> Labelling:
+    """The labels of the superpixels by motion, appearance and what was there before.
+
+    Args:
+        cells: The superpixels.
+        evidence: What points say.
+        dense: (count, K) float32, log likelihood by dense comparison.
+        prior: What is expected.
+        settings: Weights.
+    """
+    stay = prior.stationary
+    share, weight = cell_evidence(cells, evidence, dense, prior.shares)
+    trust = np.full(cells.count, settings.persistence, dtype=np.float32)
+    bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
+    bias[_border(cells.labels)] *= 10
+    bias *= np.where(prior.shares[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
+    trust[stay], bias[stay] = STAY, 0.0
+    weight[stay] *= 1 - STILL_TOLD
+    posterior = random_walk(
+        cells, share, settings.evidence * weight, prior.by_appearance, trust, bias
+    )
+    return Labelling(posterior, posterior.argmax(axis=1))
+
+
+def _border(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Superpixels at the border of the image: what is seen there more often lies behind."""
+    return np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))

@@ -1,0 +1,126 @@
+"""The motion of the widest part of the image, found among random samples, whatever else moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.motion.features.motion_constraints import Constraints, mahalanobis
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.layers.affine import Affine, fit_affine, widened
+
+BALANCE_GRID = (6, 8)
+
+
+def balanced_weights(
+    xy: Floats, shape: tuple[int, int], keep: Floats
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Weights with which each part of the image counts once, however many points it has.
+
+    Args:
+        xy: (N, 2) positions.
+        shape: (h, w) of the image.
+        keep: (N,) weight of each point before that, 0 to 1.
+
+    Returns:
+        (N,) float32 weights that sum to 1 in each occupied cell; (N,) int64 cell numbers.
+    """
+    rows, cols = BALANCE_GRID
+    row = np.clip(xy[:, 1] * rows / shape[0], 0, rows - 1).astype(np.int64)
+    col = np.clip(xy[:, 0] * cols / shape[1], 0, cols - 1).astype(np.int64)
+    cell = row * cols + col
+    total = np.bincount(cell, weights=keep, minlength=rows * cols)
+    return (keep / np.maximum(total[cell], 1e-6)).astype(np.float32) * (keep > 0), cell
+
+
+def fit_dominant(
+    c: Constraints, weight: Floats, guesses: tuple[Affine, ...], seed: int, slack: float = 0.15
+) -> Affine:
+    """The affine motion that explains the widest part of the image.
+
+    Args:
+        c: N constraints.
+        weight: (N,) float32 spatially balanced weights.
+        guesses: Motions to try first; earlier ones win ties.
+        seed: For the random samples.
+        slack: Error of the model itself, pixels.
+
+    Returns:
+        The refined best motion; the first guess when there is too little to go by.
+    """
+    usable = np.flatnonzero(weight > 0)
+    if len(usable) < 8:
+        return guesses[0]
+    rng = np.random.default_rng(seed)
+    part = _UsableConstraints(
+        c.xy[usable], c.moved[usable], widened(c.information[usable], slack), weight[usable]
+    )
+    best, best_score = guesses[0], 1.03 * part.scores(guesses[:1])[0] + 1e-6
+    for guess, score in zip(guesses[1:], part.scores(guesses[1:]), strict=True):
+        if score > best_score:
+            best, best_score = guess, score
+    if best_score < 0.8 * part.weight.sum():
+        samples = _sample_fits(c, usable[_draw_samples(rng, part.weight)])
+        scores = part.scores(samples)
+        first = int(scores.argmax())
+        if scores[first] > best_score:
+            best = samples[first]
+    # No ties to the guess: zoom and rotation of the camera must come out whole.
+    return fit_affine(c, weight * 20, best, rigidity=0.02, rounds=5, slack=slack, cutoff=2.5)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _UsableConstraints:
+    """The constraints that a dominant motion is sought for: (N, 2), (N, 2), (N, 3), (N,)."""
+
+    xy: Floats
+    moved: Floats
+    info: Floats
+    weight: Floats
+
+    def scores(self, models: Sequence[Affine]) -> Floats:
+        """How much weight each of M motions explains, (M,) float32."""
+        if any(m.bend is not None for m in models):
+            each = [mahalanobis(m.at(self.xy) - self.moved, self.info) for m in models]
+            m2 = np.stack(each)
+        elif not len(models):
+            return np.zeros(0, np.float32)
+        else:
+            x, y = np.ascontiguousarray(self.xy.T)
+            matrices = np.stack([m.matrix for m in models]).astype(np.float32)
+            place = np.stack([x, y, np.ones_like(x)])
+            ex = matrices[:, 0] @ place - self.moved[:, 0]
+            ey = matrices[:, 1] @ place - self.moved[:, 1]
+            a, b, d = np.ascontiguousarray(self.info.T)
+            m2 = (a * ex + 2 * b * ey) * ex + d * ey * ey
+        return np.asarray(np.maximum(0, 1 - m2 / 12.0) @ self.weight)
+
+
+def _draw_samples(rng: np.random.Generator, weight: Floats, samples: int = 40) -> NDArray[np.int64]:
+    """Random samples of four, by weight: (samples, 4). A point drawn twice does no harm."""
+    heap = np.cumsum(weight, dtype=np.float64)
+    at = np.searchsorted(heap, rng.random((samples, 4)) * heap[-1], side="right")
+    return np.asarray(np.minimum(at, len(weight) - 1))
+
+
+def _sample_fits(c: Constraints, pick: NDArray[np.int64]) -> list[Affine]:
+    """Affine motions through each of (M, 4) samples of constraints."""
+    xy, moved = c.xy[pick].astype(np.float64), c.moved[pick].astype(np.float64)
+    centre = xy.mean(axis=1)
+    phi = np.ones((*pick.shape, 3))
+    phi[..., :2] = (xy - centre[:, None]) / 50.0
+    a, b, d = np.moveaxis(c.information[pick].astype(np.float64), -1, 0)
+    dx, dy = moved[..., 0], moved[..., 1]
+    normal = np.empty((len(pick), 2, 3, 2, 3))
+    for i, j, k in ((0, 0, a), (0, 1, b), (1, 0, b), (1, 1, d)):
+        normal[:, i, :, j] = np.einsum("mn,mni,mnj->mij", k, phi, phi)
+    pull = np.stack([a * dx + b * dy, b * dx + d * dy], axis=1)
+    right = pull @ phi
+    system = normal.reshape(-1, 6, 6) + np.eye(6) * 1e-2
+    model = np.linalg.solve(system, right.reshape(-1, 6, 1)).reshape(-1, 2, 3)
+    linear = model[..., :2] / 50.0
+    shift = model[..., 2] - np.einsum("mij,mj->mi", linear, centre)
+    return [Affine(np.column_stack([m, s])) for m, s in zip(linear, shift, strict=True)]

@@ -1,0 +1,174 @@
+"""From a probability map to a clean mask and its contour, at the full size of the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Region
+from visup.percepts.motion.features.work_image import Floats
+
+HOLE = 0.08  # share of a region's area up to which a hole in it is filled
+
+MARGIN = 3  # working pixels around a region that its smoothing looks at
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionOutline:
+    """A mask with what follows from it, in frame pixels.
+
+    Attributes:
+        bbox: (x, y, width, height), half open.
+        mask: (height, width) bool, cropped to the box.
+        contour: (N, 2) float32 outer boundary of the largest part.
+        centroid: (x, y).
+        area: Pixels.
+        cut: Whether it touches the border of the frame.
+    """
+
+    bbox: tuple[int, int, int, int]
+    mask: NDArray[np.bool_]
+    contour: Floats
+    centroid: tuple[float, float]
+    area: float
+    cut: bool
+
+    def region(
+        self, number: int, velocity: tuple[float, float], sigma: float, confidence: float
+    ) -> Region:
+        """The region that has this outline.
+
+        Args:
+            number: Its public id.
+            velocity: (vx, vy), frame pixels per second.
+            sigma: Standard deviation of the velocity, the same unit.
+            confidence: 0 to 1.
+
+        Returns:
+            The region.
+        """
+        return Region(
+            id=number,
+            bbox=self.bbox,
+            mask=self.mask,
+            contour=self.contour,
+            centroid=self.centroid,
+            area=self.area,
+            velocity=velocity,
+            velocity_sigma=sigma,
+            cut=self.cut,
+            confidence=confidence,
+        )
+
+
+def region_outline(
+    share: Floats,
+    corner: tuple[int, int],
+    shape: tuple[int, int],
+    size: tuple[int, int],
+    least: float,
+) -> RegionOutline | None:
+    """The outline of a region.
+
+    Args:
+        share: (h, w) float32 probability in a part of the working image, `MARGIN` wider than the
+            region where the image goes on.
+        corner: (x, y) of that part, working pixels.
+        shape: (height, width) of the working image.
+        size: (width, height) of the frame.
+        least: Least area, frame pixels.
+
+    Returns:
+        The outline, or None when too little is left.
+    """
+    scale = size[0] / shape[1], size[1] / shape[0]
+    # Cleaned while it is small, then only the part around the region is enlarged.
+    mask = clean_mask(share > 0.5, least / (scale[0] * scale[1]))
+    if mask is None:
+        return None
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
+    left, top = max(x - MARGIN, 0), max(y - MARGIN, 0)
+    part = np.s_[top : y + h + MARGIN, left : x + w + MARGIN]
+    soft = _soft(share[part], mask[part])
+    left, top = corner[0] + left, corner[1] + top
+    bottom, right = top + soft.shape[0], left + soft.shape[1]
+    smooth = cv2.GaussianBlur(soft, (3, 3), 0.8)
+    x0, y0 = round(left * scale[0]), round(top * scale[1])
+    x1, y1 = round(right * scale[0]), round(bottom * scale[1])
+    full = cv2.resize(smooth, (x1 - x0, y1 - y0), interpolation=cv2.INTER_LINEAR) > 127
+    return describe_mask(full, (x0, y0), size) if full.any() else None
+
+
+def _soft(share: Floats, mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Shares in 255ths, on the side of a half on which the mask has them."""
+    lifted = np.where(mask, np.where(share > 0.5, share, 1), np.minimum(share, 0.498))
+    return np.asarray(lifted * np.float32(255) + np.float32(0.5), dtype=np.uint8)
+
+
+def clean_mask(mask: NDArray[np.bool_], least: float) -> NDArray[np.bool_] | None:
+    """Drop specks, keep parts of at least a tenth of the largest (an occluder may split a region).
+
+    Args:
+        mask: (H, W) bool.
+        least: Least area of the largest part, pixels.
+
+    Returns:
+        (H, W) bool, or None when the largest part is too small.
+    """
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=4)
+    if count < 2:
+        return None
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    largest = int(areas.max())
+    if largest < least:
+        return None
+    keep = np.ones(count, dtype=bool)
+    keep[1:] = areas >= max(0.1 * largest, 0.25 * least)
+    # Most regions are of one piece without a hole: then there is nothing to repaint.
+    whole = mask if keep.all() else mask & keep[labels]
+    return _filled(whole, HOLE * largest)
+
+
+def _filled(mask: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
+    """Fill holes of up to `most` pixels: what is quite enclosed and small is seldom background."""
+    padded = np.ones((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
+    np.logical_not(mask, out=padded[1:-1, 1:-1].view(bool))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] <= most
+    small[[0, labels[0, 0]]] = False
+    return np.asarray(mask | small[labels][1:-1, 1:-1]) if small.any() else mask
+
+
+def describe_mask(
+    mask: NDArray[np.bool_], origin: tuple[int, int], size: tuple[int, int]
+) -> RegionOutline:
+    """Box, contour, centroid and area of a mask that is not empty.
+
+    Args:
+        mask: (H, W) bool, part of the frame.
+        origin: (x, y) of the part in the frame.
+        size: (width, height) of the frame.
+
+    Returns:
+        The outline.
+    """
+    x, y, w, h = cv2.boundingRect(mask.view(np.uint8))
+    crop = np.ascontiguousarray(mask[y : y + h, x : x + w])
+    x, y = x + origin[0], y + origin[1]
+    found, _ = cv2.findContours(
+        crop.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(x, y)
+    )
+    largest = max(found, key=cv2.contourArea)
+    sums = cv2.moments(crop.view(np.uint8), binaryImage=True)
+    area = sums["m00"]
+    return RegionOutline(
+        bbox=(x, y, w, h),
+        mask=crop,
+        contour=largest.reshape(-1, 2).astype(np.float32),
+        centroid=(sums["m10"] / area + x, sums["m01"] / area + y),
+        area=area,
+        cut=bool(x == 0 or y == 0 or x + w == size[0] or y + h == size[1]),
+    )

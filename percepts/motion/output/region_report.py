@@ -1,0 +1,198 @@
+"""What is reported of the tracks, and how directives are obeyed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Directive, Region
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.settings import MotionSettings
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.layers.dense_labelling import CLIP, PointEvidence
+from visup.percepts.motion.outlines.outline_refinement import CONTEXT, refine_outline
+from visup.percepts.motion.outlines.region_outline import RegionOutline, region_outline
+from visup.percepts.motion.static_camera.track_fusion import MotionEvidence
+from visup.percepts.motion.tracks.measurements import FrameMeasurements, min_region_area
+from visup.percepts.motion.tracks.track import Indices, Track
+
+
+def apply_ignore(
+    directives: Sequence[Directive], scene: FrameMeasurements, evidence: PointEvidence
+) -> PointEvidence:
+    """Forbid motion where cogitation asks to ignore it.
+
+    Args:
+        directives: Their boxes are in frame pixels.
+        scene: The frame.
+        evidence: What points say of the labels.
+
+    Returns:
+        The evidence, all for the background in such boxes.
+    """
+    out = evidence.likelihood
+    for box in _boxes(directives, "ignore"):
+        inside = _inside(scene.points.xy / scene.image.scale, box)
+        out = out.copy()
+        out[inside, 1:] = out[inside].min(initial=0) - 10
+    return replace(evidence, likelihood=out)
+
+
+def looked_at(
+    directives: Sequence[Directive], tracks: Sequence[Track], scene: FrameMeasurements
+) -> tuple[bool, ...]:
+    """Which tracks lie where cogitation asks to look.
+
+    Args:
+        directives: Those of kind 'look_at' count; their boxes are in frame pixels.
+        tracks: All tracks.
+        scene: The frame.
+
+    Returns:
+        For each track whether its centre lies in such a box.
+    """
+    boxes = _boxes(directives, "look_at")
+    centres = np.array([t.centre for t in tracks]).reshape(-1, 2) / scene.image.scale
+    inside = [_inside(centres, box) for box in boxes]
+    return tuple(np.any(inside, axis=0).tolist()) if boxes else (False,) * len(tracks)
+
+
+def motion_evidence(
+    scene: FrameMeasurements, winner: Indices, evidence: PointEvidence
+) -> MotionEvidence:
+    """Which points tell of the motion of a track, and how surely.
+
+    Args:
+        scene: The frame.
+        winner: (count,) label of each superpixel; label k is track k - 1.
+        evidence: What points say of the labels.
+
+    Returns:
+        Those in tracks, in frame pixels.
+    """
+    at, likelihood = winner[scene.at], evidence.likelihood
+    use = np.flatnonzero(evidence.informative & (at > 0) & (at < likelihood.shape[1] - 1))
+    gain = likelihood[use, at[use]] - likelihood[use, 0]
+    return MotionEvidence(scene.points.xy[use] / scene.image.scale, np.clip(gain, -CLIP, CLIP))
+
+
+Box = tuple[float, float, float, float]
+
+
+def _boxes(directives: Sequence[Directive], kind: str) -> list[Box]:
+    boxes = [_box(d.data) for d in directives if d.kind == kind]
+    return [box for box in boxes if box is not None]
+
+
+def report_regions(
+    tracks: Sequence[Track],
+    scene: FrameMeasurements,
+    size: tuple[int, int],
+    settings: MotionSettings,
+    beside: Executor,
+) -> tuple[Region, ...]:
+    """Regions of the confirmed tracks that are in view.
+
+    Args:
+        tracks: All tracks.
+        scene: The frame.
+        size: (width, height) of the frame.
+        settings: Gives the least area.
+        beside: Draws every other outline meanwhile.
+
+    Returns:
+        Regions by id.
+    """
+    scale = scene.image.scale
+    least = min_region_area(scene, settings) / scale**2
+    told = [t for t in tracks if t.id > 0]
+
+    def drawn(t: Track) -> RegionOutline | None:
+        return _track_outline(t, [o.share for o in told if o is not t], scene, size, least)
+
+    told_now = [t for t in told if t.last_seen == scene.time]
+    later = [beside.submit(drawn, t) for t in told_now[1::2]]
+    shapes: list[RegionOutline | None] = [None] * len(told_now)
+    shapes[::2] = [drawn(t) for t in told_now[::2]]
+    shapes[1::2] = [shape.result() for shape in later]
+    out = [_region(t, s, scale) for t, s in zip(told_now, shapes, strict=True) if s is not None]
+    return tuple(sorted(out, key=lambda r: r.id))
+
+
+def _track_outline(
+    t: Track,
+    others: Sequence[Floats],
+    scene: FrameMeasurements,
+    size: tuple[int, int],
+    least: float,
+) -> RegionOutline | None:
+    x, y, w, h = scene.cells.box(t.share > 0.5)
+    if not w:
+        return None
+    left, top = max(x - CONTEXT, 0), max(y - CONTEXT, 0)
+    part = np.s_[top : y + h + CONTEXT, left : x + w + CONTEXT]
+    labels = scene.cells.labels[part]
+    share = t.share[labels]
+    drawn = refine_outline(share, np.ascontiguousarray(scene.image.tone[part]))
+    if others:
+        # What another object shows is not taken from it.
+        taken = (np.max(others, axis=0) > 0.5)[labels]
+        drawn = np.where(taken, share, drawn)
+    return region_outline(drawn, (left, top), scene.image.shape, size, least)
+
+
+def select_regions(
+    regions: Sequence[Region], directives: Sequence[Directive]
+) -> tuple[Region, ...]:
+    """Regions that cogitation wants to be told of.
+
+    Args:
+        regions: All that were found.
+        directives: 'expect_regions' keeps the surest, 'ignore' leaves out what lies in its box.
+
+    Returns:
+        Regions by id.
+    """
+    left = _best([r for r in regions if not _ignored(r, directives)], directives)
+    return tuple(sorted(left, key=lambda r: r.id))
+
+
+def _best(regions: list[Region], directives: Sequence[Directive]) -> list[Region]:
+    counts = [d.data.get("count") for d in directives if d.kind == "expect_regions"]
+    wanted = [int(c) for c in counts if isinstance(c, int) and c >= 0]
+    if not wanted:
+        return regions
+    surest = sorted(regions, key=lambda r: (-round(r.confidence, 2), r.id))
+    return surest[: max(wanted)]
+
+
+def _ignored(region: Region, directives: Sequence[Directive]) -> bool:
+    boxes = [_box(d.data) for d in directives if d.kind == "ignore"]
+    centre = np.asarray([region.centroid])
+    return any(bool(_inside(centre, box)[0]) for box in boxes if box is not None)
+
+
+def _box(data: Mapping[str, Any]) -> tuple[float, float, float, float] | None:
+    box = data.get("bbox")
+    if box is None or len(box) != 4:
+        return None
+    x, y, w, h = (float(v) for v in box)
+    return x, y, w, h
+
+
+def _inside(xy: NDArray[Any], box: tuple[float, float, float, float]) -> NDArray[np.bool_]:
+    x, y, w, h = box
+    return np.asarray((xy[:, 0] >= x) & (xy[:, 0] < x + w) & (xy[:, 1] >= y) & (xy[:, 1] < y + h))
+
+
+def _region(t: Track, shape: RegionOutline, scale: float) -> Region:
+    rate = t.best_rate()
+    centre = (shape.centroid[0] * scale, shape.centroid[1] * scale)
+    speed = t.velocity(centre) / scale
+    sigma = rate.sigma / scale if rate is not None else float("inf")
+    sure = float(1 - np.exp(-max(t.evidence, 0.0) / 100.0))
+    return shape.region(t.id, (float(speed[0]), float(speed[1])), sigma, sure)

@@ -1,0 +1,200 @@
+"""Views: silhouettes of a mesh as seen from directions spread evenly over the sphere.
+
+Conventions: a direction is the unit vector from the object to the viewer, in the mesh's own frame. The
+projection is parallel. Roll: as in `agent/model/orientation.py`.
+Needs the extra ``visup[render]``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import DatabaseError, ExtraMissingError
+from visup.agent.model.orientation import image_axes
+
+PICTURE = 200
+"""Pixels along the longer side of a rendered silhouette."""
+
+_MOST_SPREAD = 400
+_STEPS = 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedView:
+    """A silhouette of a mesh.
+
+    Attributes:
+        direction: (3,) unit vector from the object to the viewer, mesh frame.
+        mask: (H, W) bool, background all around.
+        pixel: Side of a pixel in mesh units.
+    """
+
+    direction: NDArray[np.float64]
+    mask: NDArray[np.bool_]
+    pixel: float
+
+    @property
+    def area(self) -> float:
+        """Area of the silhouette, mesh units squared."""
+        return float(np.count_nonzero(self.mask)) * self.pixel**2
+
+
+def sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
+    """Directions spread evenly over the sphere: a Fibonacci lattice, turned at random.
+
+    Args:
+        count: How many, at least 1.
+        seed: Seed of the turn; 0 leaves the lattice as it is.
+
+    Returns:
+        (count, 3) float64 unit vectors.
+
+    Example:
+        >>> d = sphere_directions(32)
+        >>> d.shape, bool(np.allclose(np.linalg.norm(d, axis=1), 1)), float(abs(d.mean(0)).max()) < 0.05
+        ((32, 3), True, True)
+    """
+    k = np.arange(count) + 0.5
+    z = 1 - 2 * k / count
+    turn = np.pi * (1 + 5**0.5) * k
+    flat = np.sqrt(1 - z**2)
+    lattice = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    return lattice if seed == 0 else np.asarray(lattice @ _turn(seed).T)
+
+
+def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
+    """Directions spread evenly over the sphere when each stands for its opposite too.
+
+    In parallel projection the silhouette from behind is the mirror image of the one from before, and a
+    mirrored match tells of the opposite direction: half of the sphere is enough, and is covered
+    twice as densely by as many views.
+
+    Args:
+        count: How many, at least 1.
+        seed: Seed of the turn; 0 leaves them as they are.
+
+    Returns:
+        (count, 3) float64 unit vectors.
+
+    Example:
+        >>> d = half_sphere_directions(32)
+        >>> np.degrees(np.arccos(np.abs(d @ d.T - np.eye(32)).max())).round().item()
+        24.0
+    """
+    lattice = sphere_directions(2 * count)[:count]
+    # Many are even enough as they are, and each step would take long.
+    spread = _spread(lattice) if count <= _MOST_SPREAD else lattice
+    return spread if seed == 0 else np.asarray(spread @ _turn(seed).T)
+
+
+def _spread(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Let directions and their opposites push one another apart, as charges on a sphere do."""
+    out, size = directions.copy(), len(directions)
+    spacing = np.sqrt(2 * np.pi / size)
+    for step in range(_STEPS):
+        apart = out[:, None] - np.concatenate([out, -out])[None]
+        squares = (apart**2).sum(axis=-1)
+        squares[np.arange(size), np.arange(size)] = np.inf
+        force = (apart / squares[..., None] ** 1.5).sum(axis=1)
+        force -= (force * out).sum(axis=1, keepdims=True) * out
+        strongest = max(float(np.linalg.norm(force, axis=1).max()), 1e-12)
+        out += force * (0.3 * spacing / strongest * (1 - step / _STEPS))
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+    return out
+
+
+def _turn(seed: int) -> NDArray[np.float64]:
+    """A rotation drawn at random."""
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return np.asarray(q * np.sign(np.diag(r)))
+
+
+def load_mesh(path: Path) -> Any:
+    """Read a mesh file.
+
+    Args:
+        path: Any format that trimesh reads (PLY, STL, OBJ, OFF, GLB, ...).
+
+    Returns:
+        A ``trimesh.Trimesh`` with at least one triangle.
+
+    Raises:
+        DatabaseError: The file is missing, is no mesh or has no triangles.
+        ExtraMissingError: trimesh is not installed.
+    """
+    try:
+        import trimesh
+    except ImportError as e:
+        raise ExtraMissingError("Rendering views of a mesh", "render") from e
+    if not path.is_file():
+        raise DatabaseError("there is no such mesh file", where=str(path), expected="a mesh file")
+    try:
+        mesh = trimesh.load_mesh(str(path), process=False)
+        faces = len(mesh.faces)
+    except Exception as e:  # trimesh's readers raise errors of every kind
+        raise DatabaseError(
+            f"this is not a mesh that can be read ({type(e).__name__}: {e})",
+            where=str(path),
+            expected="a mesh file such as PLY, STL, OBJ or OFF",
+        ) from e
+    if faces == 0 or not np.isfinite(mesh.vertices).all() or float(np.ptp(mesh.vertices)) == 0.0:
+        raise DatabaseError(
+            "this mesh has no triangles of finite size", where=str(path), expected="a triangle mesh"
+        )
+    return mesh
+
+
+def render_views(
+    mesh: Any, directions: NDArray[np.float64], picture: int = PICTURE
+) -> list[RenderedView]:
+    """Silhouettes of a mesh from given directions.
+
+    Args:
+        mesh: A ``trimesh.Trimesh``.
+        directions: (V, 3) unit vectors from the object to the viewer, mesh frame.
+        picture: Pixels along the longer side of each silhouette.
+
+    Returns:
+        One view for each direction.
+
+    Raises:
+        ExtraMissingError: embreex is not installed.
+    """
+    try:
+        from trimesh.ray.ray_pyembree import RayMeshIntersector
+    except ImportError as e:
+        raise ExtraMissingError("Rendering views of a mesh", "render") from e
+    centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    size = float(np.linalg.norm(mesh.vertices - centre, axis=1).max())
+    unit = mesh.copy()
+    unit.vertices = (mesh.vertices - centre) / size
+    rays = RayMeshIntersector(unit)
+    points = np.asarray(unit.vertices)
+    return [
+        _render(rays, points, np.asarray(d, dtype=np.float64), picture, size) for d in directions
+    ]
+
+
+def _render(
+    rays: Any,
+    points: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    picture: int,
+    size: float,
+) -> RenderedView:
+    """One silhouette of a mesh of unit radius; `size` turns pixels back into mesh units."""
+    right, up = image_axes(direction)
+    u, v = points @ right, points @ up
+    pixel = max(np.ptp(u), np.ptp(v), 1e-6) / picture
+    columns = np.arange(u.min() - 1.5 * pixel, u.max() + 2 * pixel, pixel)
+    rows = np.arange(v.max() + 1.5 * pixel, v.min() - 2 * pixel, -pixel)
+    grid_u, grid_v = np.meshgrid(columns, rows)
+    origins = grid_u[..., None] * right + grid_v[..., None] * up + 2.0 * direction
+    towards = np.broadcast_to(-direction, origins.shape).reshape(-1, 3)
+    hits = rays.intersects_any(origins.reshape(-1, 3), towards)
+    return RenderedView(direction, hits.reshape(grid_u.shape), pixel * size)

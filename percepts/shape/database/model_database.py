@@ -1,0 +1,198 @@
+"""The model database: names, views and shapes, and what a silhouette looks like of them.
+
+Read `search.py` for the search, `storage.py` for the file and `build.py` for what goes into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TypedDict, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.database.catalogue import Shapes, Views
+from visup.percepts.shape.database.search import Ranking, SearchLimits, ViewMatch, ViewSearch
+from visup.percepts.shape.database.storage import write_more, write_new
+from visup.percepts.shape.database.time_budget import share_within
+from visup.percepts.shape.database.view_directions import neighbours
+from visup.percepts.shape.index.view_records import ModelView, NewView
+from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
+from visup.percepts.shape.silhouette.silhouette import Silhouette, normalise
+
+__all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
+
+CANDIDATES = 20
+"""Views whose outlines are compared when no budget asks for fewer."""
+
+
+class QueryOptions(TypedDict, total=False):
+    """What may be asked of a ranking; `ModelDatabase.query` says what each means."""
+
+    top: int
+    per_name: int | None
+    threshold: float
+    restrict: Collection[str] | None
+    try_first: Collection[str]
+    mirror: bool
+
+
+class ModelDatabase:
+    """Views of models, read from one file; each shape is read when it is first looked at.
+
+    Args:
+        path: The file.
+        views: What stands in it.
+    """
+
+    def __init__(self, path: Path, views: Views) -> None:
+        self.path = path
+        self.views = views
+        self._neighbours: dict[str, list[tuple[int, ...]]] = {}
+
+    @classmethod
+    def open(cls, path: Path | str) -> ModelDatabase:
+        """Open a database file.
+
+        Raises:
+            DatabaseError: Missing, truncated, foreign or of another version.
+        """
+        return cls(Path(path), Views.read(Path(path)))
+
+    @classmethod
+    def create(cls, path: Path | str, views: Iterable[NewView] = ()) -> ModelDatabase:
+        """Write a database with these views, in place of whatever stands at the path, and open it.
+
+        Raises:
+            DatabaseError: The file cannot be written.
+        """
+        write_new(Path(path), views)
+        return cls.open(path)
+
+    def names(self) -> tuple[str, ...]:
+        """Names of the models, in the order of the file."""
+        return self.views.names
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """Shapes of all views, in the order of `views`; each is read when it is asked for."""
+        return Shapes(self.path, self.views)
+
+    @cached_property
+    def _search(self) -> ViewSearch:
+        return ViewSearch(self.views, self.shapes)
+
+    def neighbours(self, view: ModelView) -> tuple[ModelView, ...]:
+        """Views of the same model that are next to a view on the sphere of directions.
+
+        Each view stands for its directions and, mirrored, for the opposite ones.
+
+        Args:
+            view: One of this database.
+
+        Returns:
+            Its neighbours, rising by number; none when its direction is not known.
+        """
+        own = self.views.named({view.name})
+        if view.name not in self._neighbours:
+            self._neighbours[view.name] = neighbours([self.views[k].seen_from for k in own])
+        return tuple(self.views[own[k]] for k in self._neighbours[view.name][view.number])
+
+    def query_all(
+        self,
+        shapes: Sequence[NDArray[np.bool_] | Silhouette | Shape],
+        *,
+        budget_ms: float | None = None,
+        budget: float = 0.1,
+        **wishes: Unpack[QueryOptions],
+    ) -> tuple[Ranking, ...]:
+        """Rank the views that each of several shapes looks like, such as all regions of a frame.
+
+        Args:
+            shapes: Masks (H, W) bool of what no border cuts, silhouettes or shapes.
+            budget_ms: Milliseconds for all together on the machine of the benchmarks, shared evenly;
+                the likeliest views are compared first. See `time_budget.py`.
+            budget: See `query`.
+            wishes: For each shape, as for `query`.
+
+        Returns:
+            A ranking for each shape.
+        """
+        if budget_ms is not None and shapes:
+            budget = min(budget, share_within(budget_ms / len(shapes), len(self.views)))
+        return tuple(self.query(shape, budget=budget, **wishes) for shape in shapes)
+
+    def add(self, views: Iterable[NewView]) -> ModelDatabase:
+        """Add views, to names new or known; the database as it is then. See `build.py`.
+
+        Raises:
+            DatabaseError: The file cannot be written; it stays as it was.
+        """
+        write_more(self.path, views)
+        return ModelDatabase.open(self.path)
+
+    def query(
+        self,
+        shape: NDArray[np.bool_] | Silhouette | Shape,
+        *,
+        cut: bool = False,
+        top: int = 10,
+        per_name: int | None = None,
+        threshold: float = 0.0,
+        restrict: Collection[str] | None = None,
+        try_first: Collection[str] = (),
+        budget: float = 0.1,
+        mirror: bool = True,
+    ) -> Ranking:
+        """Rank the views that a shape looks like.
+
+        A cut shape is compared with cut views as it is, and with whole views as they look when they are
+        cut in the same way; one of which it is not known where the border lies, as it is.
+
+        Args:
+            shape: A mask (H, W) bool, a silhouette or a shape.
+            cut: Whether the image border cuts the mask; a silhouette or shape has its own mark.
+            top: How many matches are wanted.
+            per_name: How many views of one model may be among them; any number when None.
+            threshold: Least similarity.
+            restrict: Names that alone are searched; all when None.
+            try_first: Names whose likeliest views are compared whatever the index says.
+            budget: Share of the views that may be compared in full: at least 16 are (4 when less than
+                the usual tenth is asked for), and at most `CANDIDATES`. With 1, all are.
+            mirror: Whether a view is also recognised by its mirror image, which is what is seen from
+                behind.
+
+        Returns:
+            The matches, best first; empty when the mask shows nothing.
+        """
+        query = as_shape(shape, cut)
+        if query is None or not self.views:
+            return Ranking((), 0)
+        among = self.views.named(restrict)
+        most = candidates_wanted(len(self.views), budget)
+        wanted = SearchLimits(top, per_name, threshold, most, mirror)
+        favoured = np.intersect1d(self.views.named(try_first), among) if try_first else None
+        if not query.cut or query.border is None:
+            return self._search.whole(query, among, wanted, favoured)
+        cut_views = self.views.cut[among]
+        alike = self._search.whole(query, among[cut_views], wanted, favoured)
+        parts = self._search.cut(query, among[~cut_views], wanted)
+        matches = wanted.best([*alike.matches, *parts.matches])
+        return Ranking(tuple(matches), alike.compared + parts.compared)
+
+
+def candidates_wanted(views: int, budget: float = 0.1) -> int:
+    """How many of so many views are compared in full: a share of them, within limits (see `query`)."""
+    if budget >= 1:
+        return views
+    return int(min(CANDIDATES, max(16 if budget >= 0.1 else 4, budget * views)))
+
+
+def as_shape(shape: NDArray[np.bool_] | Silhouette | Shape, cut: bool = False) -> Shape | None:
+    """The shape of a mask, a silhouette or itself; None when a mask shows nothing."""
+    if isinstance(shape, Shape):
+        return shape
+    silhouette = shape if isinstance(shape, Silhouette) else normalise(shape, cut=cut)
+    return None if silhouette is None else shape_of(silhouette)

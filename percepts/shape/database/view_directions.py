@@ -1,0 +1,139 @@
+"""Directions of views: symmetric views merged, and which views are neighbours.
+
+Two views are one when their outlines, turned in the plane or mirrored, lie upon each other. In parallel
+projection the silhouette from behind is the mirror image of the one from before: a view that looks
+like the mirror image of another is seen, unmirrored, from the opposite direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.index.view_records import Direction, NewView
+from visup.percepts.shape.silhouette.silhouette import resample_closed
+
+ALIKE = 0.005
+"""Distance of outlines below which two views are one, in square roots of their area."""
+
+ALIKE_AREA = 0.01
+"""Their areas then differ by less than this share: a model's size is the same from all sides."""
+
+_POINTS = 384
+
+
+def merge_symmetric(views: Sequence[NewView]) -> list[NewView]:
+    """Views of one model, those that are seen from several directions stored once.
+
+    Args:
+        views: In order; a view joins the first one that it is alike. Views of unknown direction or
+            size stay as they are.
+
+    Returns:
+        The views that are left, in order; `also` holds the directions of those that joined them.
+    """
+    waves = [frequencies(v.shape.contour) for v in views]
+    areas = np.array([v.area or np.nan for v in views])
+    kept: list[int] = []
+    also: dict[int, tuple[Direction, ...]] = {}
+    for k, view in enumerate(views):
+        first = None if view.direction is None else _first_alike(k, kept, waves, areas)
+        if first is None or view.direction is None:
+            kept.append(k)
+            continue
+        number, mirrored = first
+        x, y, z = view.direction
+        seen = (-x, -y, -z) if mirrored else view.direction
+        also[number] = (*also.get(number, ()), seen)
+    return [replace(views[k], also=(*views[k].also, *also.get(k, ()))) for k in kept]
+
+
+def frequencies(contour: NDArray[np.floating]) -> NDArray[np.complex128]:
+    """An outline (N, 2) by its frequencies (P,): points evenly spaced along it, as complex numbers."""
+    points = resample_closed(np.asarray(contour, dtype=np.float64), count=_POINTS)
+    return np.asarray(np.fft.fft(points[:, 0] + 1j * points[:, 1]))
+
+
+def _first_alike(
+    number: int,
+    kept: Sequence[int],
+    waves: Sequence[NDArray[np.complex128]],
+    areas: NDArray[np.float64],
+) -> tuple[int, bool] | None:
+    """The first of the kept views that this one is alike, and whether mirrored."""
+    near = np.abs(areas[list(kept)] / areas[number] - 1) < ALIKE_AREA
+    for k in np.flatnonzero(near):
+        other = kept[int(k)]
+        straight, mirror = outline_gap(waves[number], waves[other])
+        if min(straight, mirror) < ALIKE:
+            return other, mirror < straight
+    return None
+
+
+def outline_gap(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> tuple[float, float]:
+    """How far apart two outlines lie when the one is turned upon the other.
+
+    Args:
+        one: `frequencies` of an outline about its centroid.
+        other: The same of the other.
+
+    Returns:
+        Root mean squared distance of corresponding points at the best rotation and starting point;
+        and the same with the mirror image of the other.
+    """
+    size = len(one)
+    energy = float((np.abs(one) ** 2).sum() + (np.abs(other) ** 2).sum()) / size
+    # Mirrored, the outline runs the other way: conjugate points in opposite order.
+    gaps = []
+    for theirs in (other, np.conj(other)):
+        alike = np.abs(np.fft.ifft(np.conj(one) * theirs)).max()
+        gaps.append(float(np.sqrt(max(0.0, energy - 2 * alike) / size)))
+    return gaps[0], gaps[1]
+
+
+def neighbours(seen_from: Sequence[Sequence[Direction]]) -> list[tuple[int, ...]]:
+    """Which views of a model are neighbours on the sphere of directions.
+
+    A view covers its directions and, mirrored, the opposite ones. Two views are neighbours when an edge
+    of the convex hull of all these joins them (the Delaunay triangulation of the sphere).
+
+    Args:
+        seen_from: For each view the directions from which it is seen; none when they are unknown.
+
+    Returns:
+        For each view the numbers of its neighbours, rising.
+
+    Example:
+        Three views along the axes cover the six corners of an octahedron.
+
+        >>> neighbours([[(1, 0, 0)], [(0, 1, 0)], [(0, 0, 1)], []])
+        [(1, 2), (0, 2), (0, 1), ()]
+    """
+    owners = [k for k, directions in enumerate(seen_from) for _ in directions]
+    vectors = np.array([d for directions in seen_from for d in directions]).reshape(-1, 3)
+    points = np.concatenate([vectors, -vectors])
+    found: list[set[int]] = [set() for _ in seen_from]
+    for a, b in _hull_edges(points):
+        one, other = owners[a % len(owners)], owners[b % len(owners)]
+        if one != other:
+            found[one].add(other)
+            found[other].add(one)
+    return [tuple(sorted(f)) for f in found]
+
+
+def _hull_edges(points: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Edges of the convex hull; all pairs when the points span no solid."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    every = [(a, b) for a in range(len(points)) for b in range(a)]
+    if len(points) < 5 or np.linalg.matrix_rank(points, tol=1e-6) < 3:
+        return every
+    try:
+        corners = np.asarray(ConvexHull(points).simplices)
+    except QhullError:
+        return every
+    sides = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [0, 2]]]))
+    return [(int(a), int(b)) for a, b in np.unique(sides, axis=0)]

@@ -1,0 +1,299 @@
+"""The index: which views of the database are worth a full comparison.
+
+Three sieves, each finer and dearer than the one before:
+
+1. *Roots.* A view's root carries its topological signature vector (Shokoufandeh et al. 2005), how much
+   of the shape lies how far from its middle, and its greatest radius; its outline's spectrum stands
+   beside it. One product of the query's vector with all views' leaves the nearest `NEAREST`.
+2. *Sketches.* Of these, the outlines are compared at a few points at all rotations, the areas are laid
+   on each other, and the roots again: that leaves as many as are to be compared in full. A quarter of
+   them are views of models that would have none otherwise, so that a ranking of models is full.
+3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every
+   node takes its best partner, whoever else wants it and whatever hangs below. The matching of
+   `match_graphs.py` can only do worse, so that views can be matched best bound first until no bound left
+   can change the result.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.index.outline_sketch import SPECTRUM, sketch, sketch_distances, spectra
+from visup.percepts.shape.index.view_records import Records, graph_arrays, node_records
+from visup.percepts.shape.matching.graph_matching import (
+    WEIGHTS,
+    MatchWeights,
+    embed,
+    node_similarities,
+)
+from visup.percepts.shape.matching.shape_similarity import Shape
+from visup.percepts.shape.shocks.shock_graph import ShockGraph
+from visup.percepts.shape.silhouette.area_overlap import AreaIndex, AreaOverlaps, area_overlaps
+
+NEAREST = 500
+"""Views whose sketches are compared."""
+
+KEPT = 4096
+"""Views whose nodes' features are kept in memory at most."""
+
+# What makes squared distances of roots, squared ones of spectra, and distances of sketches comparable:
+# medians over pairs of 39 meshes' views.
+_ROOT_SCALE = 1.35
+_SPECTRUM_SCALE = 0.106
+_SKETCH_SCALE = 0.467
+_AREA_SCALE = 0.25
+_ROOT_SHARE = 0.3
+_AREA_SHARE = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Views worth a full comparison.
+
+    Attributes:
+        numbers: (C,) numbers of the views, rising.
+        bounds: (C,) what the similarity of the graphs cannot exceed.
+        similar: For each view the (N, M) similarities of the query's nodes with the view's.
+        overlaps: How the query's area lies on theirs.
+    """
+
+    numbers: NDArray[np.intp]
+    bounds: NDArray[np.float64]
+    similar: list[NDArray[np.float32]]
+    overlaps: AreaOverlaps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewSummaries:
+    """What the first two sieves need to know of views.
+
+    Attributes:
+        roots: (V,) records of `view_records.NODE`.
+        sketches: (V, POINTS, HEIGHTS) int8.
+        areas: (V, RINGS, ANGLES) uint8.
+        models: (V,) whole numbers, which views are of one model.
+    """
+
+    roots: Records
+    sketches: NDArray[np.int8]
+    areas: NDArray[np.uint8]
+    models: NDArray[np.integer[Any]]
+
+    @classmethod
+    def read(cls, views: Records) -> ViewSummaries:
+        """Those of views in a file, (V,) records of `view_records.VIEW`."""
+        return cls(views["root"], views["sketch"], views["areas"], views["model"])
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape]) -> ViewSummaries:
+        """Those of shapes in memory, at least one; each is taken for a model of its own."""
+        roots = np.concatenate([node_records(s.graph)[:1] for s in shapes])
+        sketches = np.stack([sketch(s.heights) for s in shapes])
+        areas = np.stack([s.areas for s in shapes])
+        return cls(roots, sketches, areas, np.arange(len(shapes)))
+
+
+class ViewIndex:
+    """What is compared of many views before any is compared in full.
+
+    Args:
+        shapes: The views' shapes; only those of candidates are looked at when `summaries` are given.
+        weights: How much each node feature counts.
+        summaries: Of the same views; from the shapes when None.
+    """
+
+    def __init__(
+        self,
+        shapes: Sequence[Shape],
+        weights: MatchWeights = WEIGHTS,
+        summaries: ViewSummaries | None = None,
+    ) -> None:
+        self.weights = weights
+        self._shapes = shapes
+        self._given = summaries
+        self._features: OrderedDict[int, NDArray[np.float32]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._shapes)
+
+    @cached_property
+    def _summaries(self) -> ViewSummaries:
+        return self._given or ViewSummaries.of(self._shapes)
+
+    @cached_property
+    def _roots(self) -> NDArray[np.float32]:
+        """(V, D) vectors of the first sieve: the roots' features, then the outlines' spectra."""
+        parts = [
+            _vectors(self._summaries, slice(k, k + 4096), self.weights)
+            for k in range(0, len(self), 4096)
+        ]
+        return np.concatenate(parts)
+
+    @cached_property
+    def _squares(self) -> NDArray[np.float32]:
+        return np.asarray(np.einsum("ij,ij->i", self._roots, self._roots))
+
+    def likeliest(
+        self, query: Shape, among: NDArray[np.intp] | None, most: int
+    ) -> NDArray[np.intp]:
+        """The views that a shape is likeliest to look like, by roots and sketches.
+
+        Args:
+            query: A shape.
+            among: Numbers of views, rising; all views when None.
+            most: How many are wanted.
+
+        Returns:
+            At most so many of the numbers, rising.
+        """
+        size = len(self) if among is None else len(among)
+        if size <= most:
+            return np.arange(size) if among is None else among
+        own = _vectors(ViewSummaries.of([query]), slice(None), self.weights)[0]
+        apart = self._apart(own, among)
+        if size > (nearest := max(NEAREST, most)):
+            kept = np.argpartition(apart, nearest - 1)[:nearest]
+            kept.sort()
+            among, apart = (kept if among is None else among[kept]), apart[kept]
+        among = np.arange(size) if among is None else among
+        # The spectrum has done its part: the sketches tell the same better.
+        features = len(own) - SPECTRUM
+        squares = ((self._roots[among, :features] - own[:features]) ** 2).sum(axis=1)
+        outlines = sketch_distances(sketch(query.heights), self._summaries.sketches[among])
+        uncovered = 1.0 - self._covered(query, among)
+        apart = (
+            outlines / _SKETCH_SCALE
+            + _ROOT_SHARE * np.sqrt(squares)
+            + _AREA_SHARE * np.sqrt(uncovered / _AREA_SCALE)
+        )
+        order = among[np.argsort(apart, kind="stable")]
+        return np.sort(_spread(order, self._summaries.models[order], most))
+
+    def _apart(
+        self, own: NDArray[np.float32], among: NDArray[np.intp] | None
+    ) -> NDArray[np.float32]:
+        """Squared distances from views' vectors, but for the query's own square."""
+        if among is None or len(among) == len(self):
+            return self._squares - 2 * (self._roots @ own)
+        return np.asarray(self._squares[among] - 2 * (self._roots[among] @ own))
+
+    def candidates(
+        self,
+        query: Shape,
+        among: NDArray[np.intp] | None,
+        most: int,
+        favoured: NDArray[np.intp] | None = None,
+    ) -> Candidates:
+        """The views that are worth a full comparison.
+
+        Args:
+            query: A shape.
+            among: Numbers of views, rising; all views when None.
+            most: How many are wanted.
+            favoured: Numbers of views of which as many come along, whatever the others are like.
+        """
+        numbers = self.likeliest(query, among, most)
+        if favoured is not None and len(favoured):
+            extra = self.likeliest(query, favoured, most)
+            numbers = np.union1d(numbers, extra).astype(np.intp)
+        bounds, similar = self.bounds(query.graph, numbers)
+        return Candidates(numbers, bounds, similar, self.overlaps(query, numbers))
+
+    def overlaps(self, query: Shape, among: NDArray[np.intp]) -> AreaOverlaps:
+        """How a shape's area lies on those of some views."""
+        if len(self) <= KEPT:
+            return self._areas.overlaps(query.areas, among)
+        return area_overlaps(query.areas, self._summaries.areas[among])
+
+    def _covered(self, query: Shape, among: NDArray[np.intp]) -> NDArray[np.float64]:
+        """How well a shape's area lies on those of some views, mirrored or not, (V,)."""
+        if len(self) <= KEPT:
+            similar = self._areas.similarities(query.areas, among)
+        else:
+            similar = AreaIndex(self._summaries.areas[among]).similarities(query.areas)
+        return np.asarray(similar.max(axis=1))
+
+    def best_covered(self, query: Shape, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+        """The views whose areas lie best on a shape's: at most so many of the numbers, rising."""
+        covered = [self._covered(query, among[k : k + KEPT]) for k in range(0, len(among), KEPT)]
+        return np.sort(among[np.argsort(-np.concatenate(covered), kind="stable")[:most]])
+
+    @cached_property
+    def _areas(self) -> AreaIndex:
+        return AreaIndex(self._summaries.areas)
+
+    def bounds(
+        self, query: ShockGraph, among: NDArray[np.intp], *, part: bool = False
+    ) -> tuple[NDArray[np.float64], list[NDArray[np.float32]]]:
+        """Bound the similarity of a query with views.
+
+        Args:
+            query: A shock graph of N nodes.
+            among: Numbers of the views to look at, rising.
+            part: Whether the query is a part only, so that the views' other nodes do not count.
+
+        Returns:
+            (V,) float64, for each view a number that `match_nodes` cannot exceed; and for each view the
+            (N, M) similarities of the query's nodes with the view's.
+        """
+        if not len(among):
+            return np.empty(0), []
+        features = [self._nodes(int(k)) for k in among]
+        sizes = np.array([len(f) for f in features])
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
+        shares = np.concatenate([self._shapes[int(k)].graph.weights for k in among])
+        similar = node_similarities(embed(query, self.weights), np.concatenate(features))
+        roots = similar[0, starts].astype(np.float64)
+        inner = similar[1:].copy()
+        inner[:, starts] = 0.0
+        forth = query.weights[1:] @ np.maximum.reduceat(inner, starts, axis=1)
+        back = np.add.reduceat(inner.max(axis=0) * shares, starts)
+        nodes = forth if part else 0.5 * (forth + back)
+        bounds = self.weights.root * roots + (1 - self.weights.root) * nodes
+        ends = np.append(starts[1:], len(shares)).tolist()
+        return bounds, [similar[:, a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
+
+    def _nodes(self, view: int) -> NDArray[np.float32]:
+        """Features of a view's nodes, kept for the next time."""
+        kept = self._features.get(view)
+        if kept is None:
+            kept = embed(self._shapes[view].graph, self.weights)
+            self._features[view] = kept
+            if len(self._features) > KEPT:
+                self._features.popitem(last=False)
+        return kept
+
+
+def _spread(
+    order: NDArray[np.intp], models: NDArray[np.integer[Any]], most: int
+) -> NDArray[np.intp]:
+    """The first of an order; a quarter of the places goes to models that have none yet."""
+    sure = most - most // 4
+    later, first_of = order[sure:], np.unique(models[sure:], return_index=True)
+    new = np.sort(first_of[1][~np.isin(first_of[0], models[:sure])])[: most // 4]
+    others = np.delete(np.arange(len(later)), new)[: most - sure - len(new)]
+    return np.concatenate([order[:sure], later[new], later[others]])
+
+
+def _vectors(summaries: ViewSummaries, part: slice, weights: MatchWeights) -> NDArray[np.float32]:
+    """Vectors of the first sieve for some of the views: roots' features, then spectra, both scaled."""
+    features = embed(_roots_as_nodes(summaries.roots[part]), weights)
+    waves = spectra(summaries.sketches[part]) / np.float32(_SPECTRUM_SCALE**0.5)
+    return np.hstack([features / np.float32(_ROOT_SCALE**0.5), waves])
+
+
+def _roots_as_nodes(roots: Records) -> ShockGraph:
+    """Roots of many views as the nodes of one graph: features of nodes do not depend on edges."""
+    return ShockGraph(
+        edges=np.empty((0, 2), dtype=np.int16),
+        below=np.empty((0, 0), dtype=bool),
+        key=b"",
+        **graph_arrays(roots),
+    )

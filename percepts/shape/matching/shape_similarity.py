@@ -1,0 +1,185 @@
+"""Two shapes compared: the shock graphs first, their outlines and areas for a second look.
+
+The shock graph gives the correspondences and a share of the similarity; how the outlines run and how
+well the areas cover each other give the rest. All terms are kept apart in the result, so that a similarity
+can be explained.
+
+Read next: `model_database.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.shape.matching.graph_matching import GraphMatch, match_graphs
+from visup.percepts.shape.shocks.shock_graph import ShockGraph, shock_graph
+from visup.percepts.shape.silhouette.area_overlap import AreaOverlaps, area_overlaps
+from visup.percepts.shape.silhouette.height_functions import outline_distances, outline_heights
+from visup.percepts.shape.silhouette.silhouette import Silhouette
+
+GRAPH_SHARE = 0.25
+"""Share of the similarity that the shock graph gives."""
+
+AREA_SHARE = 0.2
+"""Share that the areas give; the outlines give the rest."""
+
+OUTLINE_SHARE = 1.0 - GRAPH_SHARE - AREA_SHARE
+"""Share that the outlines give."""
+
+AREA_POWER = 8
+"""Overlaps of unlike shapes are high already; to this power they differ as the other terms do."""
+
+OUTLINE_SCALE = 0.36
+"""Distance of outlines at which their similarity has fallen to 1/e."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A silhouette with what is compared of it.
+
+    Attributes:
+        contour: (N, 2) outline in normal form.
+        graph: Its shock graph.
+        areas: (RINGS, ANGLES) uint8, its area by ring and angle; see `area_overlap.area_map`.
+        cut: Whether the image border cuts it.
+        border: Where that border lies, radians; see `silhouette.Silhouette`.
+    """
+
+    contour: NDArray[np.floating]
+    graph: ShockGraph
+    areas: NDArray[np.uint8]
+    cut: bool = False
+    border: float | None = None
+
+    @cached_property
+    def heights(self) -> NDArray[np.float32]:
+        """Height functions of the outline; computed when first asked for."""
+        return outline_heights(self.contour)
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How alike two shapes are, and why.
+
+    Attributes:
+        similarity: 0 to 1; 1 for equal shapes.
+        of_graphs: Similarity of the shock graphs alone.
+        of_outlines: Similarity of the outlines alone.
+        of_areas: Similarity of the areas alone.
+        match: Corresponding nodes.
+        mirrored: Whether it is the mirror image of the second that looks like the first.
+        rotation: Radians from x towards y (clockwise in the image) that take the second, mirrored left to
+            right before if it is, onto the first, in (-pi, pi].
+    """
+
+    similarity: float
+    of_graphs: float
+    of_outlines: float
+    of_areas: float
+    match: GraphMatch
+    mirrored: bool = False
+    rotation: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutlineAreaSimilarities:
+    """How alike one shape is to others without their graphs, each as it is or mirrored.
+
+    Attributes:
+        of_outlines: (B,) in [0, 1].
+        of_areas: (B,) in [0, 1].
+        mirrored: (B,) bool.
+        rotation: (B,) radians, as in `Likeness`.
+    """
+
+    of_outlines: NDArray[np.float64]
+    of_areas: NDArray[np.float64]
+    mirrored: NDArray[np.bool_]
+    rotation: NDArray[np.float64]
+
+    @property
+    def worth(self) -> NDArray[np.float64]:
+        """(B,) what they give to the similarity, at most 1 - `GRAPH_SHARE`."""
+        return OUTLINE_SHARE * self.of_outlines + AREA_SHARE * self.of_areas
+
+    def joined(self, number: int, graphs: GraphMatch) -> Likeness:
+        """The likeness of one of the others, once its graph is matched."""
+        similarity = GRAPH_SHARE * graphs.similarity + float(self.worth[number])
+        # Features are of single precision: further digits mean nothing, and equal shapes give exactly 1.
+        return Likeness(
+            min(1.0, round(similarity, 5)),
+            graphs.similarity,
+            float(self.of_outlines[number]),
+            float(self.of_areas[number]),
+            graphs,
+            bool(self.mirrored[number]),
+            float(self.rotation[number]),
+        )
+
+
+def shape_of(silhouette: Silhouette) -> Shape:
+    """What is compared of a silhouette in normal form."""
+    graph = shock_graph(silhouette)
+    return Shape(silhouette.contour, graph, silhouette.areas, silhouette.cut, silhouette.border)
+
+
+def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True) -> Likeness:
+    """Compare two shapes; the similarity is the same whichever comes first.
+
+    Args:
+        a: The first shape.
+        b: The second shape.
+        mirror: Whether a shape is also like its mirror image; the shock graph by itself does not tell
+            the two apart.
+
+    Example:
+        >>> from visup.percepts.shape.silhouette.silhouette import normalise
+        >>> y, x = np.mgrid[-40:41, -60:61]
+        >>> disc = shape_of(normalise(np.hypot(x, y) < 30))
+        >>> strip = shape_of(normalise((abs(x) < 55) & (abs(y) < 8)))
+        >>> compare(disc, disc).similarity, compare(disc, strip).similarity < 0.35
+        (1.0, True)
+    """
+    overlaps = area_overlaps(a.areas, b.areas[None])
+    return compare_outlines_and_areas(a, [b], overlaps, mirror=mirror).joined(
+        0, match_graphs(a.graph, b.graph)
+    )
+
+
+def compare_outlines_and_areas(
+    query: Shape, others: Sequence[Shape], overlaps: AreaOverlaps, *, mirror: bool = True
+) -> OutlineAreaSimilarities:
+    """Compare one shape's outline and area with many.
+
+    Args:
+        query: The shape.
+        others: B shapes.
+        overlaps: How its area lies on theirs.
+        mirror: Whether mirror images count.
+    """
+    outlines, areas = _outline_similarities(query, others), overlaps.similarity**AREA_POWER
+    worth = OUTLINE_SHARE * outlines + AREA_SHARE * areas
+    mirrored = (worth[:, 1] > worth[:, 0]) & mirror
+    each, side = np.arange(len(others)), mirrored.astype(np.intp)
+    return OutlineAreaSimilarities(
+        outlines[each, side], areas[each, side], mirrored, overlaps.rotation[each, side]
+    )
+
+
+def _outline_similarities(query: Shape, others: Sequence[Shape]) -> NDArray[np.float64]:
+    """Similarity of one outline with many, as they are and mirrored, (B, 2) in [0, 1].
+
+    Alignment is not quite the same in both directions; the shapes' own order decides on one.
+    """
+    if not others:
+        return np.empty((0, 2))
+    heights = np.stack([o.heights for o in others])
+    own = np.broadcast_to(query.heights, heights.shape)
+    first = np.array([query.graph.key <= o.graph.key for o in others])[:, None, None]
+    distance = outline_distances(np.where(first, own, heights), np.where(first, heights, own))
+    return np.asarray(np.exp(-((distance / OUTLINE_SCALE) ** 2)))

@@ -1,0 +1,101 @@
+"""Who is awake: behaviours that are called when the scene asks for them, coarse ones first.
+
+A behaviour's contract says when it is awake, as a condition of the rule language about one object `a`:
+"expected(a)" for one that a stage of a task asks something of now, "exists b: gap(a, b) < 60 px" for one that
+comes near another. What sees all the time is coarse; it hands over, by such a condition, to what
+looks more closely at that object, and takes over again when the condition ends or the finer one fails
+(`relieves`). What safety rules read is given by behaviours that never sleep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from visup.agent import AlertCondition, Contract, Directive, Mind, Observation, Outcome, Severity
+from visup.agent.model.errors import BehaviourError, VisupError
+from visup.agent.model.records import WAKE
+from visup.rules.formula.nodes import Rule, calls
+from visup.rules.language.parser import parse_rules
+from visup.rules.predicates.inputs_missing import percepts_read
+from visup.rules.safety.reasoner import SAFETY, RuleMemory, RuleReasoner
+
+ACTIVATION = "rules.waking"
+_PREFIX = "awake_"
+
+
+def activation_rules(contracts: Sequence[Contract]) -> tuple[Rule, ...]:
+    """A rule for each behaviour that sleeps at times: when it is awake.
+
+    Raises:
+        BehaviourError: A condition is not one.
+    """
+    return tuple(_rule(c) for c in contracts if c.awake)
+
+
+def _rule(contract: Contract) -> Rule:
+    name = f"{_PREFIX}{contract.name}"
+    say = f"The behaviour '{contract.name}' is called for {{a}}."
+    try:
+        text = f'rule {name}(a): info\nwhen {contract.awake}\nsay "{say}"\n'
+        (rule,) = parse_rules(text, "awake")
+    except (VisupError, ValueError) as fault:
+        raise BehaviourError(
+            f"`awake` is no condition about an object `a`: {fault}",
+            where=f"contract of '{contract.name}'",
+            expected='a condition of the rule language, such as "expected(a)"',
+            hint="see docs/rules.md; a choice of others is `exists b: ...`",
+        ) from fault
+    return rule
+
+
+def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> frozenset[str]:
+    """Names of behaviours that must not sleep: safety rules read what nobody else gives all the time.
+
+    Args:
+        contracts: Of all behaviours.
+        rules: What is watched; those that are more than information count.
+    """
+    read = {
+        kind
+        for rule in rules
+        if rule.severity > Severity.INFO
+        for formula in rule.formulas
+        for call in calls(formula)
+        for kind in percepts_read(call.name)
+    }
+    always = {kind for c in contracts if not c.awake for kind in c.gives}
+    return frozenset(c.name for c in contracts if c.awake and set(c.gives) & (read - always))
+
+
+@dataclass(frozen=True, slots=True)
+class ActivationReasoner:
+    """Reasoner of the match phase, after the tasks: calls behaviours that are asleep else.
+
+    Attributes:
+        rules: From `activation_rules`.
+    """
+
+    rules: tuple[Rule, ...]
+    _reasoner: RuleReasoner = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_reasoner", RuleReasoner(self.rules))
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Reasoner`."""
+        # What these rules remember stands, while they look, where rules look for it.
+        own = mind.remember(SAFETY, mind.memory.get(ACTIVATION, RuleMemory()))
+        asked = self._reasoner(own, observation)
+        mind = mind.remember(ACTIVATION, asked.mind.memory[SAFETY])
+        return Outcome(mind, directives=tuple(_directives(mind, asked.conditions)))
+
+
+def _directives(mind: Mind, concerns: Sequence[AlertCondition]) -> Iterator[Directive]:
+    for concern in concerns:
+        (number,) = concern.objects
+        region = mind.objects[number].region.id
+        name = concern.kind.removeprefix(_PREFIX)
+        data = {"behaviour": name, "object": number, "region": region}
+        yield Directive(WAKE, concern.cause, MappingProxyType(data))

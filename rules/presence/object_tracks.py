@@ -1,0 +1,268 @@
+"""What presence reasoning remembers of each object: where it was whole, how it moved, how much shows.
+
+First-order spatial knowledge is where an object was, second-order how it moved (paper, section 5);
+both serve to tell an object that left from one that something else hides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import exp
+from types import MappingProxyType
+
+from visup.agent import Mind, Region
+from visup.agent.model.fast_replace import replace
+from visup.rules.geometry.regions import Box, box_intersection, expanded, shared_pixels, shifted
+
+TRACKS = "rules.presence"
+EXIT_HORIZON_S = 6.0
+"""What is leaving is out of sight after so long, seconds."""
+
+TimedCentroid = tuple[float, float, float]
+"""(time, x, y) of a centroid: seconds, pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectTrack:
+    """What is remembered of one object's sightings.
+
+    Attributes:
+        region: Its region as last seen.
+        seen_at: Seconds of that.
+        coherent_since: Seconds since when sightings followed each other without a jump.
+        sightings: How many since then.
+        fixes: Centroids of the last second in which it was in the clear; at most 16.
+        whole: Its box when last seen whole.
+        whole_at: Seconds of that.
+        drift: (vx, vy) when last in the clear, pixels per second.
+        reference: Area of the whole object, pixels.
+        visible: Share of the reference in sight, 0 to 1.
+        partial_since: Seconds since when only a small part shows, or None.
+        clear_since: Seconds since when most of it shows again, or None.
+        merged_with: The object in whose region it went up, or None.
+        merged_since: Seconds of that.
+        parted_at: Seconds when it last had a region of its own again, or None.
+        changed_at: Seconds when it was given another region; shapes of the older one cannot be
+            compared with those of the new one.
+        told: What was told last: '', 'seen', 'occluded', 'lost' or 'left'.
+        first: Its box when first seen.
+    """
+
+    region: Region
+    seen_at: float
+    coherent_since: float
+    sightings: int = 1
+    fixes: tuple[TimedCentroid, ...] = ()
+    whole: Box = (0, 0, 0, 0)
+    whole_at: float = 0.0
+    drift: tuple[float, float] = (0.0, 0.0)
+    reference: float = 0.0
+    visible: float = 1.0
+    partial_since: float | None = None
+    clear_since: float | None = None
+    merged_with: int | None = None
+    merged_since: float = 0.0
+    parted_at: float | None = None
+    changed_at: float = -1.0
+    told: str = ""
+    first: Box = (0, 0, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class PresenceMemory:
+    """All tracks.
+
+    Attributes:
+        start: Seconds of the first observation of regions, or None before it.
+        of: Object id -> its track.
+    """
+
+    start: float | None = None
+    of: Mapping[int, ObjectTrack] = field(default_factory=lambda: MappingProxyType({}))
+
+
+EMPTY_MEMORY = PresenceMemory()
+
+
+def presence_memory(mind: Mind) -> PresenceMemory:
+    """The tracks that the mind remembers."""
+    found: PresenceMemory = mind.memory.get(TRACKS, EMPTY_MEMORY)
+    return found
+
+
+def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
+    """Pairs of objects that are seen as one region now."""
+    found = [
+        (i, t.merged_with) for i, t in presence_memory(mind).of.items() if t.merged_with is not None
+    ]
+    return tuple(sorted(found)) if found else ()
+
+
+def visible_share(mind: Mind, object_id: int) -> float:
+    """Share of an object in sight, 0 to 1; 1 while nothing is known, 0 while it is in a merged region."""
+    of = presence_memory(mind).of
+    track = of.get(object_id)
+    if track is None:
+        return 1.0
+    merged = track.merged_with is not None or any(t.merged_with == object_id for t in of.values())
+    return 0.0 if merged else track.visible
+
+
+def new_track(region: Region, now: float) -> ObjectTrack:
+    """The track of an object seen for the first time."""
+    fix = (now, *region.centroid)
+    return ObjectTrack(
+        region,
+        now,
+        now,
+        fixes=(fix,),
+        whole=region.bbox,
+        whole_at=now,
+        reference=region.area,
+        changed_at=now,
+        first=region.bbox,
+    )
+
+
+def update_track(
+    track: ObjectTrack, region: Region, now: float, crowded: bool, allowed_gap_s: float
+) -> ObjectTrack:
+    """The track after another sighting.
+
+    Args:
+        track: Before.
+        region: The object's region now.
+        now: Seconds.
+        crowded: Whether another region touches it, so that a part of it may be hidden.
+        allowed_gap_s: A longer time without sight breaks coherence.
+
+    Returns:
+        The track after it. The reference area follows an object in the clear, is forgotten slowly
+        for one that the border cuts, and stands still for one that others may hide.
+    """
+    dt = now - track.seen_at
+    smooth = dt <= allowed_gap_s and _coherent(track.region, region)
+    reference = _reference_area(track, region, dt, crowded)
+    visible = min(1.0, region.area / max(reference, 1.0))
+    clear = not crowded and visible > 0.7
+    fixes = _recent_centroids(track.fixes, (now, *region.centroid)) if clear else track.fixes
+    return replace(
+        track,
+        region=region,
+        seen_at=now,
+        coherent_since=track.coherent_since if smooth else now,
+        sightings=track.sightings + 1 if smooth else 1,
+        fixes=fixes,
+        whole=region.bbox if clear else track.whole,
+        whole_at=now if clear else track.whole_at,
+        drift=_velocity(track, region, fixes, dt) if clear else track.drift,
+        reference=reference,
+        visible=visible,
+    )
+
+
+def predicted_box(track: ObjectTrack, now: float) -> Box:
+    """Where the whole object should be now, from where it was and how it drifted; 3 s ahead at most."""
+    ahead = min(now - track.whole_at, 3.0)
+    return shifted(track.whole, track.drift[0] * ahead, track.drift[1] * ahead)
+
+
+def predicted_share_outside(track: ObjectTrack, now: float, frame_size: tuple[int, int]) -> float:
+    """Share of the object's last box that should have left the image by now, 0 to 1."""
+    vx, vy = track.drift
+    ahead = now - track.seen_at
+    box = shifted(track.region.bbox, vx * ahead, vy * ahead)
+    inside = box_intersection(box, (0, 0, *frame_size))
+    return 1.0 - inside / max(1, box[2] * box[3])
+
+
+def heading_out(track: ObjectTrack, frame_size: tuple[int, int], margin: int = 3) -> bool:
+    """Whether the object was at an edge of the image, moving over it, and may be out of sight soon.
+
+    What would need longer than `EXIT_HORIZON_S` at its pace, such as an arm that reaches far into
+    the image and whose drift is noise, is not leaving whatever happens to it.
+    """
+    x, y, w, h = track.region.bbox
+    vx, vy = track.drift
+    width, height = frame_size
+    # For each edge: how near it the box is, its pace towards it, and the way to go until it is out.
+    edges = (
+        (x, -vx, x + w),
+        (y, -vy, y + h),
+        (width - x - w, vx, width - x),
+        (height - y - h, vy, height - y),
+    )
+    return any(
+        gap <= margin and pace > 1.0 and way < EXIT_HORIZON_S * pace for gap, pace, way in edges
+    )
+
+
+def border_sides(region: Region, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
+    """Sides of the image that a region reaches: 'left', 'top', 'right', 'bottom'."""
+    return sides_of(region.bbox, frame_size, margin)
+
+
+def sides_of(box: Box, frame_size: tuple[int, int], margin: int = 3) -> frozenset[str]:
+    """Sides of the image that a box reaches."""
+    x, y, w, h = box
+    reached = {
+        "left": x <= margin,
+        "top": y <= margin,
+        "right": x + w >= frame_size[0] - margin,
+        "bottom": y + h >= frame_size[1] - margin,
+    }
+    return frozenset(side for side, at in reached.items() if at)
+
+
+def at_border(region: Region, frame_size: tuple[int, int], margin: int = 3) -> bool:
+    """Whether a region is cut by the image border or as good as."""
+    return region.cut or bool(border_sides(region, frame_size, margin))
+
+
+def _coherent(before: Region, after: Region) -> bool:
+    near = box_intersection(expanded(before.bbox, 4), after.bbox) > 0
+    ratio = after.area / max(before.area, 1.0)
+    if before.cut and after.cut and ratio >= 2.5:
+        # What comes over the border shows in pieces that grow together: it goes on while it still
+        # is where it was.
+        return near and shared_pixels(before, after) > 0.6 * before.area
+    return near and 0.4 < ratio < 2.5
+
+
+def _reference_area(track: ObjectTrack, region: Region, dt: float, crowded: bool) -> float:
+    if crowded:
+        return track.reference
+    if region.cut:
+        return max(region.area, track.reference * exp(-dt / 8.0))
+    return track.reference + (region.area - track.reference) * (1.0 - exp(-dt / 0.5))
+
+
+def _recent_centroids(
+    fixes: tuple[TimedCentroid, ...], fix: TimedCentroid
+) -> tuple[TimedCentroid, ...]:
+    if fixes and fix[0] - fixes[-1][0] < 1.0 / 16.0:
+        return fixes
+    since = fix[0] - 1.0
+    return (*[f for f in fixes if f[0] > since], fix)[-16:]
+
+
+def _velocity(
+    track: ObjectTrack, region: Region, fixes: tuple[TimedCentroid, ...], dt: float
+) -> tuple[float, float]:
+    """How it moves: by image motion where that is known, else by how its centroid moved.
+
+    A centroid moves as well when something unseen begins to hide the body.
+    """
+    if region.velocity_sigma > 0.0:
+        share = max(1.0 - exp(-dt / 0.4), 1.0 / track.sightings)
+        old, new = track.drift, region.velocity
+        return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
+    if len(fixes) < 3:
+        # Too few places tell nothing: what is known stays.
+        return track.drift
+    middle = sum([t for t, _, _ in fixes]) / len(fixes)
+    lever = sum([(t - middle) ** 2 for t, _, _ in fixes])
+    along = sum([(t - middle) * x for t, x, _ in fixes])
+    down = sum([(t - middle) * y for t, _, y in fixes])
+    return along / lever, down / lever

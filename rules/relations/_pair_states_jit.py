@@ -1,0 +1,327 @@
+"""What is said of two bodies from the states and quantities of one step, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.compiled import compiled
+from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Floats
+from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
+
+COUPLED, MERGED = 1, 2
+"""Marks of pairs that are one body, or are seen as one region."""
+
+GAP, RATE, SIGMA, RELATIVE = range(4)
+"""Of the tables of `Measured`."""
+
+
+TABLE_ROWS = (0, 1, 2, 8, 9, 10, 11, 12, 13, 14)
+STATE_ROWS = (14, 15, 16, 17, 10, 11, 12, 13, 9, 8)
+"""Rows of what is told, and the rows of the latch that they are taken from."""
+
+
+@compiled
+def smoothed_value(before: float, now: float, share: float, jump: float) -> float:
+    """One value, smoothed; see `smooth.py`."""
+    step = now - before
+    return share * step + before if abs(step) <= jump else now
+
+
+@compiled
+def smoothed_boxes(
+    boxes: Floats,
+    gaps: Floats,
+    seen: Floats,
+    tables: Floats,
+    numbers: tuple[float, float, float, float, float],
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Where bodies are, smoothed.
+
+    Args:
+        boxes: (M, 4) before, pixels.
+        gaps: (P,) of the outlines before, pixels.
+        seen: (M, 8) how bodies were seen; see `measure_loops.near_pairs`.
+        tables: (5, M, M); see `Measured`.
+        numbers: Share of what is new; differences of edges, and of gaps, beyond which a mean begins anew,
+            pixels; for how long a box stands for a body out of sight, seconds; gap up to which outlines
+            may meet, pixels.
+
+    Returns:
+        (M, 4) boxes and (P,) gaps, NaN unknown, and the numbers of the pairs that may meet.
+    """
+    share, jump, wide, hold, near = numbers
+    now, apart = np.full(boxes.shape, np.nan), np.empty(len(gaps))
+    asked = np.empty(len(gaps), np.int64)
+    for i in range(len(boxes)):
+        if not seen[i, 0] > hold:
+            for k in range(4):
+                now[i, k] = smoothed_value(boxes[i, k], seen[i, 4 + k], share, jump)
+    number = count = 0
+    for i in range(len(boxes)):
+        for j in range(i + 1, len(boxes)):
+            apart[number] = smoothed_value(gaps[number], tables[GAP, i, j], share, wide)
+            if apart[number] <= near:
+                asked[count] = number
+                count += 1
+            number += 1
+    return now, apart, asked[:count]
+
+
+@compiled
+def smoothed_outlines(
+    before: Floats,
+    gaps: Floats,
+    asked: NDArray[np.int64],
+    found: Floats,
+    numbers: tuple[float, ...],
+) -> Floats:
+    """How outlines stand to each other, smoothed.
+
+    Args:
+        before: (3, P) pixels; see `outline_differences`.
+        gaps: (P,) pixels, NaN unknown.
+        asked: (K,) pairs that were looked at.
+        found: (3, K) of these, pixels.
+        numbers: Share of what is new; differences beyond which a mean begins anew; distance that stands for
+            pairs that were not looked at, pixels.
+
+    Returns:
+        (3, P) pixels; NaN unknown.
+    """
+    share, jump, far = numbers
+    now, k = np.empty(before.shape), 0
+    for number in range(len(gaps)):
+        looked = k < len(asked) and asked[k] == number
+        for row in range(3):
+            value = found[row, k] if looked else np.nan if np.isnan(gaps[number]) else far
+            now[row, number] = smoothed_value(before[row, number], value, share, jump)
+        k += looked
+    return now
+
+
+@compiled
+def classify_trend(
+    rate: float,
+    sigma: float,
+    before: int,
+    pending: int,
+    limits: tuple[float, float],
+    sigmas: tuple[float, float],
+) -> int:
+    """Which trend a rate of change stands for, with hysteresis.
+
+    Args:
+        rate: Pixels per second; NaN unknown.
+        sigma: Its standard deviation.
+        before: The trend believed so far.
+        pending: The trend that wanted to be believed so far.
+        limits: Rate that must be exceeded to enter a trend, and below which it ends.
+        sigmas: How many deviations the rate must also exceed to want to enter, and how many to go
+            on wanting it. Deviations are themselves estimates and jump; one wide one in a row does
+            not take back what was seen.
+
+    Returns:
+        Its code; a rate between the thresholds leaves things as they are.
+    """
+    if not np.isfinite(rate):
+        return UNKNOWN
+    enter, leave = limits
+    towards = CONVERGING if rate < 0.0 else DIVERGING
+    least = (sigmas[1] if pending == towards else sigmas[0]) * sigma
+    if abs(rate) > enter and abs(rate) > least:
+        return towards
+    # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
+    goes_on = (before == CONVERGING and rate <= 0.0) or (before == DIVERGING and rate >= 0.0)
+    return before if goes_on and abs(rate) >= leave else KEEPING
+
+
+@compiled
+def combined_trend(image: int, depth: int) -> int:
+    """Judge the trends of an image distance and of a depth difference together.
+
+    Args:
+        image: Code of the trend in the image.
+        depth: Code of the trend of the depth difference, UNKNOWN where depth is not known.
+
+    Returns:
+        The image's trend where the depth agrees, keeps or is unknown; the depth's where the image
+        keeps its distance; UNKNOWN where they contradict each other.
+    """
+    if depth == UNKNOWN:
+        return image
+    if image == KEEPING:
+        return depth
+    against = image == CONVERGING and depth == DIVERGING
+    against = against or (image == DIVERGING and depth == CONVERGING)
+    return UNKNOWN if against else image
+
+
+@compiled
+def _threshold(before: int, enter: float, leave: float) -> float:
+    """Up to which value a state is begun or kept; by the middle while it is not known yet."""
+    return leave if before == 1 else 0.5 * (enter + leave) if before == UNKNOWN else enter
+
+
+@compiled
+def _touching(
+    gap: float, depths: tuple[float, float], before: int, limits: tuple[float, ...]
+) -> int:
+    """By the gap, and not where depth tells the two apart."""
+    near, far, level, apart = limits
+    if np.isnan(gap):
+        return UNKNOWN
+    nearest, between = min(depths[0], depths[1]), abs(depths[0] - depths[1])
+    if between > _threshold(before, level, apart) * nearest:
+        return 0
+    return int(gap <= _threshold(before, near, far))
+
+
+@compiled
+def _length(vectors: Floats, i: int, j: int) -> float:
+    x, y = vectors[i, 0] - vectors[j, 0], vectors[i, 1] - vectors[j, 1]
+    return float(np.sqrt(x * x + y * y))
+
+
+@compiled
+def _together(
+    relative: float,
+    halves: tuple[float, float],
+    slower: float,
+    before: int,
+    limits: tuple[float, ...],
+) -> int:
+    """Whether both move and neither moves relative to the other, over the window and in its halves.
+
+    The halves are looked at so that a body that bounces off, whose mean relative velocity is zero for a
+    moment, is not taken for one that rests.
+    """
+    still, half, wide, goes_on = limits
+    if np.isnan(relative):
+        return UNKNOWN
+    held = before == 1
+    if not slower > 2.0 * still * (goes_on if held else 1.0):
+        return 0
+    share = wide if held else 1.0
+    rest = halves[0] < share * half and halves[1] < share * half
+    return int(rest and relative < share * still)
+
+
+@compiled
+def classify_motion(
+    state: Codes,
+    pending: Codes,
+    tables: Floats,
+    motion: Floats,
+    speed: Floats,
+    depth: Floats,
+    gap: Floats,
+    marks: Codes,
+    limits: tuple[
+        tuple[float, float],
+        tuple[float, float],
+        tuple[float, float, float, float],
+        tuple[float, float, float, float],
+    ],
+    codes: Codes,
+) -> None:
+    """Trend, touch and moving together of all pairs.
+
+    Args:
+        state: (3, P) of these so far.
+        pending: (3, P) what wanted to be believed so far.
+        tables: (5, M, M); see `Measured`.
+        motion: (3, M, 2) pixels per second.
+        speed: (M,) pixels per second.
+        depth: (M,); NaN unknown.
+        gap: (P,) of the outlines, smoothed, pixels.
+        marks: (P,) `COUPLED` or `MERGED` pairs.
+        limits: Rates to enter and to leave a trend; in deviations, to want it and to go on wanting it;
+            gaps to begin and to keep a touch, shares of depth by which it ends and begins to be none;
+            relative speed of rest, the same in halves of the window, by how much more it may be while
+            it goes on, share of the speed that is asked for at which it does. Pixels, seconds.
+        codes: (4, P) written but for the last row, the trend of depth, which is read.
+    """
+    rates, sigmas, touch, rest = limits
+    count, k = len(speed), -1
+    for i in range(count):
+        for j in range(i + 1, count):
+            k += 1
+            found = classify_trend(
+                tables[RATE, i, j], tables[SIGMA, i, j], state[0, k], pending[0, k], rates, sigmas
+            )
+            found = combined_trend(found, codes[3, k])
+            touching = _touching(gap[k], (depth[i], depth[j]), state[1, k], touch)
+            halves = _length(motion[1], i, j), _length(motion[2], i, j)
+            slower = min(speed[i], speed[j])
+            codes[2, k] = _together(tables[RELATIVE, i, j], halves, slower, state[2, k], rest)
+            if marks[k] & COUPLED and touching == 1 and found == DIVERGING:
+                # One body that turns changes its outline; it parts when its parts no longer touch.
+                found = KEEPING
+            if marks[k] & MERGED:
+                found, touching = UNKNOWN, 1
+            codes[0, k], codes[1, k] = found, touching
+
+
+@compiled
+def relation_rows(
+    state: Codes,
+    since: Floats,
+    rcc8: Codes,
+    rcc8_since: Floats,
+    tables: Floats,
+    depth: Floats,
+    converse: Codes,
+    opposite: Codes,
+    numbers: tuple[float, float, float],
+) -> tuple[Codes, Floats, Floats]:
+    """What a table of relations says of all pairs; its rows are those of `relations.QUESTIONS`.
+
+    Args:
+        state: (R, P) of the latch; see `relations.py`.
+        since: (R, P) seconds.
+        rcc8: (2, P) of boxes and of outlines.
+        rcc8_since: (2, P) seconds.
+        tables: (5, M, M); see `Measured`.
+        depth: (M,); NaN unknown.
+        converse: RCC-8 of (a, b) -> that of (b, a).
+        opposite: The same of directions.
+        numbers: Seconds now; most that is believed without depth; noise of a trend that is never believed
+            to be less, pixels per second.
+
+    Returns:
+        (16, P) codes and (16, P) seconds; (7, P) certainty of what cannot be doubted, of most others and
+        of trends, then gap, trend, its deviation and relative speed.
+    """
+    now, image_only, floor = numbers
+    count, pairs = len(depth), state.shape[1]
+    codes, moments, values = (
+        np.empty((16, pairs), np.int8),
+        np.empty((16, pairs)),
+        np.empty((7, pairs)),
+    )
+    for n in range(len(TABLE_ROWS)):
+        for k in range(pairs):
+            codes[TABLE_ROWS[n], k], moments[TABLE_ROWS[n], k] = (
+                state[STATE_ROWS[n], k],
+                since[STATE_ROWS[n], k],
+            )
+    for k in range(pairs):
+        codes[3, k], codes[6, k], moments[15, k] = rcc8[0, k], rcc8[1, k], since[8, k]
+        moments[3, k] = moments[4, k] = rcc8_since[0, k]
+        moments[6, k] = moments[7, k] = rcc8_since[1, k]
+    k = -1
+    for i in range(count):
+        for j in range(i + 1, count):
+            k += 1
+            codes[4, k], codes[7, k] = converse[rcc8[0, k]], converse[rcc8[1, k]]
+            codes[15, k] = opposite[state[8, k]]
+            gap, rate, sigma = tables[GAP, i, j], tables[RATE, i, j], tables[SIGMA, i, j]
+            codes[5, k], moments[5, k] = (UNKNOWN if np.isnan(gap) else 0), now
+            cap = 1.0 if np.isfinite(depth[i]) and np.isfinite(depth[j]) else image_only
+            sure = abs(rate / np.hypot(sigma, floor))
+            sure = 0.0 if np.isnan(sure) else 1.0 - 0.5 * np.exp(-sure / 3.0)
+            values[0, k], values[1, k], values[2, k] = 1.0, min(cap, 0.9), min(cap, sure)
+            values[3, k], values[4, k], values[5, k] = gap, rate, sigma
+            values[6, k] = tables[RELATIVE, i, j]
+    return codes, moments, values

@@ -1,0 +1,149 @@
+"""Stages that no observation can tell apart: the same is seen of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
+from visup.tasks.grammar.analysis import Grammar
+from visup.tasks.grammar.conditions import Fact
+from visup.tasks.grammar.graphs import dependencies_first
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    AnyOrder,
+    Choice,
+    Conditioned,
+    Counted,
+    Course,
+    Hold,
+    Reference,
+    Repeated,
+    Sequence,
+    Span,
+    Task,
+    Timed,
+    Together,
+    children,
+    walk,
+)
+
+DEEPEST = 40  # references within references that are looked into
+NOTHING = Action("", ())
+
+
+@dataclass(frozen=True)
+class AmbiguityCheck:
+    """Checks whether the stages of a task can be told apart.
+
+    Attributes:
+        task: The task, whole.
+        source: For places.
+        grammar: Its grammar.
+    """
+
+    task: Task
+    source: Source
+    grammar: Grammar
+
+    def faults(self) -> Iterator[Diagnostic]:
+        """One fault for each pair of neighbours that look the same."""
+        for stage in self.grammar.stages.values():
+            if isinstance(stage.body, Actors):
+                continue
+            for course in walk(stage.body):
+                if isinstance(course, Choice):
+                    yield from self.options(course)
+                elif isinstance(course, Sequence):
+                    yield from self.turns(course)
+
+    def options(self, choice: Choice) -> Iterator[Diagnostic]:
+        """Alternatives that ask for the same."""
+        seen: dict[int, Course] = {}
+        for option in choice.options:
+            form = self.forms.of(option)
+            if form is not None and form in seen:
+                what = f"no observation can tell `{option}` from `{seen[form]}`"
+                hint = "take one of them out, or say by what they differ"
+                yield self.fault(what, option.span, hint)
+            elif form is not None:
+                seen[form] = option
+
+    def turns(self, sequence: Sequence) -> Iterator[Diagnostic]:
+        """Neighbours that ask for the same, without a `for` or a sign that parts them."""
+        for before, after in zip(sequence.items, sequence.items[1:], strict=False):
+            one, other = self.bare(before), self.bare(after)
+            if one is not None and one == other:
+                what = f"no observation can tell where `{before}` ends and `{after}` begins"
+                hint = f"say it once, or how long the first lasts: `{before} for 5 s {after}`"
+                yield self.fault(what, after.span, hint)
+
+    def fault(self, what: str, span: Span, hint: str) -> Diagnostic:
+        """A fault at the place of a course."""
+        return self.source.fault("E230", what, span, hint=hint)
+
+    def bare(self, course: Course) -> Fact | None:
+        """What a course asks for when that is one action without `for` and signs, or None."""
+        fact = self.grammar.sole_fact(course)
+        return None if fact is None or self.governed(course) else fact
+
+    def governed(self, course: Course) -> bool:
+        """Whether a `for` or a sign stands between a course and its only action."""
+        for _ in range(DEEPEST):
+            match course:
+                case Conditioned():
+                    return True
+                case Timed(item=item, clauses=clauses):
+                    if any(isinstance(c, Hold) for c in clauses):
+                        return True
+                    course = item
+                case Reference(stage=name) if name in self.grammar.stages:
+                    body = self.grammar.stages[name].body
+                    if isinstance(body, Actors):
+                        return False
+                    course = body
+                case _:
+                    return False
+        return True
+
+    @cached_property
+    def forms(self) -> _Forms:
+        """The forms of all stages."""
+        return _Forms(self.grammar)
+
+
+class _Forms:
+    """Numbers for what is seen of courses, stages written out: the same number, the same sight.
+
+    Equal parts share a number, so that a stage that is referred to often is looked at once.
+    """
+
+    def __init__(self, grammar: Grammar) -> None:
+        self._numbers: dict[object, int] = {}
+        self._stages: dict[str, int | None] = {}
+        for name in dependencies_first(grammar.mentions):
+            body = grammar.stages[name].body
+            course = Action(name, body.names) if isinstance(body, Actors) else body
+            self._stages[name] = self.of(course)
+
+    def of(self, course: Course) -> int | None:
+        """The number of a course; None when it comes back to itself."""
+        if isinstance(course, Reference):
+            return self._stages.get(course.stage)
+        if not children(course):
+            return self._number(course)
+        inner = [self.of(c) for c in children(course)]
+        if any(i is None for i in inner):
+            return None
+        if isinstance(course, Choice | Together | AnyOrder):
+            return self._number((type(course).__name__, frozenset(inner)))
+        if isinstance(course, Sequence):
+            return self._number(tuple(inner))
+        if isinstance(course, Conditioned | Timed | Counted | Repeated):
+            return self._number((replace(course, item=NOTHING), inner[0]))
+        return None
+
+    def _number(self, form: object) -> int:
+        return self._numbers.setdefault(form, len(self._numbers))

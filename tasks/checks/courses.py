@@ -1,0 +1,211 @@
+"""What the courses of a task must satisfy: they end, and their clauses and invariants agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AnySet
+from dataclasses import dataclass
+from functools import cached_property
+
+from visup.tasks.actions.actions import ActionDefinition, contradict
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
+from visup.tasks.grammar.analysis import Grammar
+from visup.tasks.grammar.conditions import Fact
+from visup.tasks.grammar.graphs import reachable
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    AnyOrder,
+    Conditioned,
+    Counted,
+    Course,
+    Deadline,
+    Hold,
+    Invariant,
+    Reference,
+    Repeated,
+    Task,
+    Timed,
+    Together,
+    walk,
+)
+from visup.tasks.grammar.units import value
+
+MOST_IN_ANY_ORDER = 6
+
+
+@dataclass(frozen=True)
+class CourseCheck:
+    """Checks of the courses of a task.
+
+    Attributes:
+        task: The task, with at least one rule.
+        source: For places.
+        actions: The actions that it may ask for.
+        whole: Whether every stage that it mentions is there.
+        grammar: The grammar of the task.
+    """
+
+    task: Task
+    source: Source
+    actions: Mapping[str, ActionDefinition]
+    whole: bool
+    grammar: Grammar
+
+    @cached_property
+    def courses(self) -> list[Course]:
+        """Every course of every stage, outermost first."""
+        bodies = [s.body for s in self.task.stages if not isinstance(s.body, Actors)]
+        return [c for body in bodies for c in walk(body)]
+
+    def faults(self) -> Iterator[Diagnostic]:
+        """All faults of the courses."""
+        yield from self.endless()
+        yield from self.conditions()
+        yield from self.counts()
+        yield from self.clauses()
+        yield from self.together()
+        yield from self.invariants()
+        yield from self.repetitions()
+
+    def endless(self) -> Iterator[Diagnostic]:
+        """Stages that never begin or never end."""
+        begins = self.grammar.left_recursive()
+        for stage in begins:
+            what = f"stage `<{stage.name}>` begins with itself and so never begins"
+            hint = f"let something come first, such as `<try> | <try> <{stage.name}>`"
+            yield self.source.fault(
+                "E206", what, stage.span, "an action before it comes again", hint
+            )
+        if begins or not self.whole:
+            return
+        for stage in self.grammar.non_terminating():
+            what = f"stage `<{stage.name}>` can never end"
+            hint = f"offer a way out, such as `( ... <{stage.name}> )?` or `| ...`"
+            yield self.source.fault(
+                "E207", what, stage.span, "a course without the stage itself", hint
+            )
+
+    def clauses(self) -> Iterator[Diagnostic]:
+        """Clauses said twice, that contradict each other, or that hold nothing."""
+        for course in self.courses:
+            if not isinstance(course, Timed):
+                continue
+            holds = [c for c in course.clauses if isinstance(c, Hold)]
+            deadlines = [c for c in course.clauses if isinstance(c, Deadline)]
+            for word, clauses in (("for", holds), ("within", deadlines)):
+                if len(clauses) > 1:
+                    span = clauses[1].span
+                    yield self.source.fault(
+                        "E208", f"`{word}` is said twice", span, f"one `{word}`"
+                    )
+            least = self.grammar.min_duration(course)
+            for deadline in deadlines[:1]:
+                if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
+                    what = f"what takes at least {least:g} s cannot be over {deadline}"
+                    yield self.source.fault("E208", what, deadline.span, "a longer `within`")
+            if holds and self.grammar.is_sequential(course.item):
+                what = f"`{holds[0]}` stands behind things that follow one another"
+                hint = "put `for` behind the one that must hold"
+                expected = "one action, or several at the same time"
+                yield self.source.fault("E216", what, holds[0].span, expected, hint)
+
+    def together(self) -> Iterator[Diagnostic]:
+        """Actions that can never hold at the same time."""
+        for course in self.courses:
+            if not isinstance(course, Together):
+                continue
+            parts = [self.grammar.sole_fact(p) for p in course.parts]
+            for i, a in enumerate(parts):
+                for b in parts[i + 1 :]:
+                    if a and b and self.excluding(a, b):
+                        what = f"`{a}` and `{b}` can never hold at the same time"
+                        yield self.source.fault("E209", what, course.span, hint="in turn is `a b`")
+
+    def excluding(self, a: Fact, b: Fact) -> bool:
+        """Whether two facts can never hold at the same time."""
+        if isinstance(a, Action) and isinstance(b, Action):
+            return self.contradict(a, b)
+        return False
+
+    def contradict(self, a: Action, b: Action) -> bool:
+        """Whether two actions can never hold at the same time."""
+        one, other = self.actions.get(a.name), self.actions.get(b.name)
+        if one is None or other is None:
+            return False
+        return {str(x) for x in a.actors} == {str(x) for x in b.actors} and contradict(one, other)
+
+    def invariants(self) -> Iterator[Diagnostic]:
+        """Invariants that the task itself breaks."""
+        for invariant in self.task.invariants:
+            meant = self.meant(invariant.during)
+            for stage, fact in self.grammar.asked:
+                if stage in meant and self.breaks(invariant, fact):
+                    what = f"`{invariant}`, but stage `<{stage}>` asks for `{fact}`"
+                    hint = "say for which stage it is meant with `during <stage>`"
+                    yield self.source.fault("E210", what, invariant.span, hint=hint)
+                    break
+
+    def meant(self, during: tuple[Reference, ...]) -> AnySet[str]:
+        """The stages for which an invariant is meant, with those inside them."""
+        if not during:
+            return self.grammar.stages.keys()
+        known = [r.stage for r in during if r.stage in self.grammar.stages]
+        return reachable(self.grammar.mentions, known)
+
+    def breaks(self, invariant: Invariant, fact: Fact) -> bool:
+        """Whether a stage that asks for something breaks an invariant."""
+        said = invariant.condition
+        if not isinstance(said, Action) or not isinstance(fact, Action):
+            return invariant.when == "never" and str(said) == str(fact)
+        if invariant.when == "never":
+            return (fact.name, {*fact.actors}) == (said.name, {*said.actors})
+        return self.contradict(said, fact)
+
+    def conditions(self) -> Iterator[Diagnostic]:
+        """Signs said twice, or that hold for nothing in particular."""
+        for course in self.courses:
+            if not isinstance(course, Conditioned):
+                continue
+            told: set[str] = set()
+            for sign in course.conditions:
+                if sign.kind in told:
+                    what = f"`{sign.kind} when` is said twice"
+                    hint = "join the conditions with `or` or `and`"
+                    yield self.source.fault(
+                        "E235", what, sign.span, f"one `{sign.kind} when`", hint
+                    )
+                told.add(sign.kind)
+                if sign.kind in ("begins", "ends") and self.grammar.is_sequential(course.item):
+                    what = f"`{sign.kind} when` stands behind things that follow one another"
+                    hint = f"put it behind the one that {sign.kind} so"
+                    expected = "one action, or several at the same time"
+                    yield self.source.fault("E232", what, sign.span, expected, hint)
+
+    def counts(self) -> Iterator[Diagnostic]:
+        """Numbers of times that contradict each other, and orders that are too many."""
+        for course in self.courses:
+            if isinstance(course, Counted) and course.most is not None:
+                if course.most == 0:
+                    yield self.source.fault(
+                        "E233", "`at most 0 times` asks for nothing", course.span
+                    )
+                elif course.most < course.least:
+                    what = f"at least {course.least} and at most {course.most} times is never"
+                    yield self.source.fault("E233", what, course.span, "a greater `at most`")
+            if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
+                what = f"{len(course.items)} things in any order have too many orders to follow"
+                hint = "put those together that follow one another"
+                expected = f"at most {MOST_IN_ANY_ORDER}"
+                yield self.source.fault("E234", what, course.span, expected, hint)
+
+    def repetitions(self) -> Iterator[Diagnostic]:
+        """Repetitions of what may be left out."""
+        for course in self.courses:
+            mark = "at least" if isinstance(course, Counted) else getattr(course, "mark", "?")
+            if not isinstance(course, Repeated | Counted) or mark == "?":
+                continue
+            if self.grammar.nullable(course.item):
+                what = f"`{mark}` repeats what may be left out, so it has no end"
+                hint = "leave the `?` or `*` inside away"
+                yield self.source.fault("E215", what, course.span, hint=hint)

@@ -1,0 +1,209 @@
+"""What the words of a task must satisfy: actors, zones, parameters and amounts of the right kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AnySet
+from dataclasses import dataclass
+from functools import cached_property
+from math import isinf
+
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.actions.describe import written
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, did_you_mean
+from visup.tasks.diagnostics.recovery import ParsedFile
+from visup.tasks.grammar.conditions import Amount, Comparison, Name, Span, facts_of
+from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
+from visup.tasks.grammar.units import MEANT, SIZE, TIME, UNITS, dimension, units_of
+
+Asked = tuple[str, tuple[Name, ...], Span]
+"""An action that a file names, its actors, and where."""
+
+
+@dataclass(frozen=True)
+class NameCheck:
+    """Checks of the words of a task.
+
+    Attributes:
+        parsed: The tree, and what is known of the statements that did not parse.
+        source: For places.
+        actions: The actions that it may ask for.
+        percepts: The kinds of percept that will be at hand.
+        asked: Every action that the file names.
+    """
+
+    parsed: ParsedFile
+    source: Source
+    actions: Mapping[str, ActionDefinition]
+    percepts: AnySet[str]
+    asked: list[Asked]
+
+    @cached_property
+    def task(self) -> Task:
+        """What could be read."""
+        return self.parsed.task
+
+    @cached_property
+    def courses(self) -> list[Course]:
+        """Every course of every stage."""
+        bodies = (s.body for s in self.task.stages)
+        return [c for body in bodies if not isinstance(body, Actors) for c in walk(body)]
+
+    @cached_property
+    def comparisons(self) -> list[Comparison]:
+        """Every comparison of the file."""
+        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
+        conditions = [s.condition for s in signs] + [i.condition for i in self.task.invariants]
+        found = [c for c in self.courses if isinstance(c, Comparison)]
+        return found + [f for c in conditions for f in facts_of(c) if isinstance(f, Comparison)]
+
+    def faults(self) -> Iterator[Diagnostic]:
+        """All faults of the words."""
+        yield from self.amounts()
+        yield from self.compared()
+        yield from self.kinds()
+        yield from self.declared()
+        yield from self.unused()
+        yield from self.unobserved()
+
+    def used(self) -> Iterator[tuple[Amount, str]]:
+        """Every amount that is used, with what it should measure; empty when nobody knows."""
+        for course in self.courses:
+            if isinstance(course, Timed):
+                yield from ((c.duration, TIME) for c in course.clauses)
+            if isinstance(course, Conditioned):
+                yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
+        yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
+        yield from ((a.size, SIZE) for a in self.task.actors if a.size)
+        for comparison in self.comparisons:
+            meaning = self.actions.get(comparison.quantity.name)
+            yield comparison.amount, meaning.measures if meaning else ""
+
+    def amounts(self) -> Iterator[Diagnostic]:
+        """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
+        for parameter in self.task.parameters:
+            if parameter.amount.parameter:
+                what = f"parameter `{parameter.name}` is not given a number"
+                expected = "a number and a unit, such as `90 s`"
+                yield self.source.fault("E132", what, parameter.amount.span, expected)
+            else:
+                yield from self.amount(parameter.amount, "")
+        known = {p.name: p.amount for p in self.task.parameters}
+        for amount, wanted in self.used():
+            if not amount.parameter:
+                yield from self.amount(amount, wanted)
+            elif amount.parameter not in known:
+                if not self.parsed.lacking and amount.parameter not in self.parsed.defined:
+                    hint = did_you_mean(amount.parameter, known) if len(known) < MANY else None
+                    what = f"parameter `{amount.parameter}` is not declared"
+                    expected = f"`parameter {amount.parameter} is 90 s`"
+                    yield self.source.fault("E223", what, amount.span, expected, hint)
+            else:
+                yield from self.of_kind(known[amount.parameter], wanted, amount)
+
+    def amount(self, amount: Amount, wanted: str) -> Iterator[Diagnostic]:
+        """What is wrong with one amount that is not a parameter."""
+        if amount.unit not in UNITS:
+            meant = MEANT.get(amount.unit.casefold())
+            hint = f"did you mean `{meant}`?" if meant else None
+            if wanted == TIME and amount.unit == "m":
+                hint = "did you mean `min`?"
+            what = f"`{amount.unit}` is not a unit{' of time' if wanted == TIME else ''}"
+            expected = units_of(wanted) if wanted in _MEASURED else ", ".join(UNITS)
+            yield self.source.fault("E218", what, amount.span, expected, hint)
+        elif isinf(amount.number):
+            yield self.source.fault(
+                "E217", "the number is too large", amount.span, "a smaller number"
+            )
+        elif amount.number <= 0 and wanted == TIME:
+            yield self.source.fault("E217", f"`{amount}` is no time at all", amount.span)
+        elif amount.number <= 0 and wanted == SIZE:
+            yield self.source.fault("E217", f"`{amount}` is no size at all", amount.span)
+        else:
+            yield from self.of_kind(amount, wanted, amount)
+
+    def of_kind(self, amount: Amount, wanted: str, used: Amount) -> Iterator[Diagnostic]:
+        """A fault when an amount does not measure what is wanted where it is used."""
+        measured = dimension(amount)
+        if wanted in _MEASURED and measured and measured != wanted:
+            what = f"`{used}` is no {WORDS.get(wanted, wanted)}"
+            if used.parameter:
+                what = f"parameter `{used}` is `{amount}`, which is no {WORDS.get(wanted, wanted)}"
+            hint = "did you mean `min`?" if (wanted, amount.unit) == (TIME, "m") else None
+            yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
+
+    def compared(self) -> Iterator[Diagnostic]:
+        """Quantities that are not compared, comparisons of what is none."""
+        compared = {id(c.quantity.span) for c in self.comparisons}
+        for name, _, span in self.asked:
+            meaning = self.actions.get(name)
+            if meaning is None:
+                continue
+            if meaning.measures and id(span) not in compared:
+                what = f"`{name}` is a quantity and is not compared with anything"
+                yield self.source.fault("E227", what, span, f"such as `{written(meaning)}`")
+            elif not meaning.measures and id(span) in compared:
+                what = f"`{name}` is no quantity, so it cannot be compared"
+                some = sorted(m.name for m in self.actions.values() if m.measures)
+                yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
+
+    def kinds(self) -> Iterator[Diagnostic]:
+        """Zones where actors belong, and the other way round."""
+        zones = {z.name for z in self.task.zones}
+        for name, actors, _ in self.asked:
+            meaning = self.actions.get(name)
+            if meaning is None or len(actors) != meaning.arity:
+                continue
+            for actor, kind in zip(actors, meaning.kinds, strict=True):
+                said = str(actor)
+                known = said in zones or said in self.parsed.defined or self.parsed.lacking
+                if kind == "zone" and not known:
+                    what = f"`{name}` speaks of a zone, and `{said}` is none"
+                    hint = did_you_mean(said, zones)
+                    yield self.source.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
+                elif kind == "object" and said in zones:
+                    what = f"`{said}` is a zone, and `{name}` speaks of an actor here"
+                    yield self.source.fault("E229", what, actor.span, "an actor")
+
+    def declared(self) -> Iterator[Diagnostic]:
+        """Names declared twice; those of actors alone are told elsewhere."""
+        first: dict[str, str] = {a.name: "an actor" for a in self.task.actors}
+        for kind, declared in (("a zone", self.task.zones), ("a parameter", self.task.parameters)):
+            for one in declared:
+                if one.name in first:
+                    what = f"`{one.name}` is declared as {kind} and is {first[one.name]} already"
+                    yield self.source.fault("E224", what, one.span, "another name")
+                first.setdefault(one.name, kind)
+
+    def unused(self) -> Iterator[Diagnostic]:
+        """Zones and parameters that nothing uses; included files may offer more than is used."""
+        if self.parsed.faults:
+            return
+        named = {str(a) for _, actors, _ in self.asked for a in actors}
+        named |= {a.parameter for a, _ in self.used()}
+        for kind, declared in (("zone", self.task.zones), ("parameter", self.task.parameters)):
+            for one in declared:
+                if one.name not in named and not one.span.file:
+                    what = f"{kind} `{one.name}` is declared but not used"
+                    yield self.source.fault("E225", what, one.span)
+
+    def unobserved(self) -> Iterator[Diagnostic]:
+        """Actions that need percepts that will not be at hand, each told once."""
+        told = set()
+        for name, _, span in self.asked:
+            meaning = self.actions.get(name)
+            missing = sorted(meaning.needs - self.percepts) if meaning else []
+            if missing and name not in told:
+                told.add(name)
+                said = " and ".join(f"`{m}`" for m in missing)
+                what = f"`{name}` can never be observed: it needs {said}, which nothing will give"
+                hint = "switch the behaviour on that gives it, or ask for something else"
+                yield self.source.fault("E231", what, span, hint=hint)
+
+
+MANY = 500  # so many names are not compared with one another
+WORDS = {
+    "angular_speed": "speed of turning",
+    "size": "real size",
+}
+_MEASURED = frozenset(d for d, _ in UNITS.values())

@@ -1,0 +1,320 @@
+"""What a tree must satisfy beyond its syntax: known names, the right actors, stages that are reached.
+
+Courses and their clauses are checked in `check_courses.py`. Each check tells a fault where it
+stands and none that merely follows from another.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AnySet
+from dataclasses import dataclass, replace
+from difflib import SequenceMatcher
+from functools import cached_property
+
+from visup.tasks.actions.actions import ACTIONS, ActionDefinition
+from visup.tasks.checks.ambiguity import AmbiguityCheck
+from visup.tasks.checks.courses import CourseCheck
+from visup.tasks.checks.names import NameCheck
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, closest, did_you_mean
+from visup.tasks.diagnostics.recovery import ParsedFile
+from visup.tasks.grammar.analysis import Grammar
+from visup.tasks.grammar.conditions import action_of, facts_of
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    Comparison,
+    Conditioned,
+    Course,
+    Name,
+    Reference,
+    Span,
+    Stage,
+    walk,
+)
+from visup.tasks.grammar.statement import RESERVED_WORDS
+
+MANY = 500  # so many names are not compared with one another
+ALIKE = 0.85  # two names that are so alike are taken to be meant as one
+
+
+def check_semantics(
+    parsed: ParsedFile,
+    source: Source,
+    actions: Mapping[str, ActionDefinition],
+    percepts: AnySet[str],
+) -> list[Diagnostic]:
+    """All mistakes of meaning in what could be read of a file.
+
+    Args:
+        parsed: The tree, and what is known of the statements that did not parse.
+        source: For places.
+        actions: The actions that a task may ask for.
+        percepts: The kinds of percept that will be at hand.
+
+    Returns:
+        Faults in no particular order.
+    """
+    if not parsed.task.stages:
+        return []
+    return list(_Semantics(parsed, source, actions, percepts).faults())
+
+
+@dataclass(frozen=True)
+class _Semantics:
+    parsed: ParsedFile
+    source: Source
+    actions: Mapping[str, ActionDefinition]
+    percepts: AnySet[str]
+
+    @cached_property
+    def grammar(self) -> Grammar:
+        return Grammar(self.parsed.task)
+
+    @cached_property
+    def courses(self) -> list[tuple[Stage, Course]]:
+        """Every course of every stage, outermost first, with its stage."""
+        task = self.parsed.task
+        bodies = [(s, s.body) for s in task.stages if not isinstance(s.body, Actors)]
+        return [(s, c) for s, body in bodies for c in walk(body)]
+
+    @cached_property
+    def asked(self) -> list[tuple[str, tuple[Name, ...], Span]]:
+        """Every action that the file names, with its actors: (action, actors, place)."""
+        task = self.parsed.task
+        facts = [c for _, c in self.courses if isinstance(c, Action | Comparison)]
+        signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
+        conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
+        facts += [f for c in conditions for f in facts_of(c)]
+        actions = map(action_of, facts)
+        asked = [(a.name, a.actors, a.span) for a in actions]
+        asked += [
+            (s.name, s.body.names, s.span)
+            for s in task.stages
+            if isinstance(s.body, Actors) and not self.misread(s)
+        ]
+        return asked
+
+    @cached_property
+    def heads(self) -> set[int]:
+        """Identities of the places of heads."""
+        return {id(s.span) for s in self.parsed.task.stages}
+
+    def faults(self) -> Iterator[Diagnostic]:
+        yield from self.plain_lists()
+        yield from self.reserved()
+        yield from self.unknown_actions()
+        yield from self.actors_of_actions()
+        yield from self.references()
+        yield from self.twice()
+        if not self.parsed.faults:
+            yield from self.unreachable()
+            yield from self.slips()
+            yield from self.idle_actors()
+        whole = not (self.undefined or self.parsed.faults)
+        yield from CourseCheck(
+            self.parsed.task, self.source, self.actions, whole, self.grammar
+        ).faults()
+        yield from NameCheck(
+            self.parsed, self.source, self.actions, self.percepts, self.asked
+        ).faults()
+        if whole:
+            yield from AmbiguityCheck(self.parsed.task, self.source, self.grammar).faults()
+
+    def misread(self, stage: Stage) -> str:
+        """What a plain list of names was meant to be when it is no action, or empty."""
+        if not isinstance(stage.body, Actors) or stage.name in self.actions:
+            return ""
+        names = [str(n) for n in stage.body.names]
+        if names[0] in self.actions:
+            return "action"
+        if len(names) == 3 and names[1] in self.actions:
+            return "infix"
+        defined = self.defined
+        meant = all(n in defined and n != stage.name for n in names)
+        return "stages" if meant else ""
+
+    @cached_property
+    def defined(self) -> set[str]:
+        return {s.name for s in self.parsed.task.stages}
+
+    def plain_lists(self) -> Iterator[Diagnostic]:
+        for stage in self.parsed.task.stages:
+            if not isinstance(stage.body, Actors):
+                continue
+            names = [str(n) for n in stage.body.names]
+            match self.misread(stage):
+                case "action":
+                    meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
+                    what = f"the actors of `{names[0]}` stand without brackets"
+                    yield self.source.fault("E219", what, stage.body.span, meant)
+                case "infix":
+                    what = f"`{names[1]}` stands between its actors"
+                    meant = f"`{names[1]}({names[0]}, {names[2]})`"
+                    yield self.source.fault("E219", what, stage.body.span, meant)
+                case "stages":
+                    meant = f"`{' '.join(f'<{n}>' for n in names)}`"
+                    what = "stages are referred to without angle brackets"
+                    yield self.source.fault("E220", what, stage.body.span, meant)
+
+    def reserved(self) -> Iterator[Diagnostic]:
+        task = self.parsed.task
+        named = [a for _, actors, _ in self.asked for a in actors]
+        named += [Name(a.name, a.span) for a in task.declared]
+        for name in named:
+            if str(name) in RESERVED_WORDS:
+                what = f"`{name}` is a word of the language"
+                yield self.source.fault("E123", what, name.span, "another name")
+
+    def unknown_actions(self) -> Iterator[Diagnostic]:
+        told = set()
+        for name, _, span in self.asked:
+            if name in self.actions or name in told:
+                continue
+            told.add(name)
+            near = closest(name, self.actions)
+            shown = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
+            width = replace(span, end_line=span.line, end_column=span.column + len(name))
+            at = span if self.is_head(span) else width
+            hint = f"did you mean `{near}`?" if near else None
+            what = f"unknown action `{name}`"
+            if self.is_head(span):
+                what = f"`<{name}>` is given actors, but `{name}` is no action"
+            yield self.source.fault("E201", what, at, shown, hint)
+
+    def is_head(self, span: Span) -> bool:
+        return id(span) in self.heads
+
+    def actors_of_actions(self) -> Iterator[Diagnostic]:
+        for name, actors, span in self.asked:
+            meaning = self.actions.get(name)
+            if meaning is None:
+                continue
+            if len(actors) != meaning.arity:
+                what = f"`{name}` is given {_count(len(actors), 'actor')}"
+                expected = _count(meaning.arity, "actor")
+                if "zone" in meaning.kinds:
+                    expected = "an actor and a zone"
+                yield self.source.fault("E205", what, span, expected)
+            elif len({str(a) for a in actors}) < len(actors):
+                what = f"`{name}` between `{actors[0]}` and itself"
+                yield self.source.fault("E211", what, span, "different actors")
+
+    @cached_property
+    def undefined(self) -> dict[str, Reference]:
+        """The first reference to each stage that is not defined."""
+        known = {s.name for s in self.parsed.task.stages} | self.parsed.defined
+        found: dict[str, Reference] = {}
+        references = [c for _, c in self.courses if isinstance(c, Reference)]
+        references += [r for i in self.parsed.task.invariants for r in i.during]
+        for r in references:
+            if r.stage not in known and not self.parsed.lacking:
+                found.setdefault(r.stage, r)
+        return found
+
+    def references(self) -> Iterator[Diagnostic]:
+        defined = [s.name for s in self.parsed.task.stages]
+        heads = self.headless()
+        for name, reference in self.undefined.items():
+            if name in heads:
+                what = f"`::=` is missing after `<{name}>`"
+                yield self.source.fault("E102", what, heads[name].span, f"`<{name}> ::= ...`")
+                continue
+            expected = f"a rule `<{name}> ::= ...`"
+            if name in self.actions:
+                expected = f"a rule `<{name}> ::= arm satellite`, or `{name}(arm, satellite)`"
+            hint = did_you_mean(name, defined, "`<{}>`")
+            what = f"stage `<{name}>` is not defined"
+            yield self.source.fault("E202", what, reference.span, expected, hint)
+
+    def headless(self) -> dict[str, Reference]:
+        """Undefined stages at the beginning of a line, where a rule without `::=` would stand."""
+        found: dict[str, Reference] = {}
+        for _, c in self.courses:
+            if isinstance(c, Reference) and c.stage in self.undefined:
+                line = self.source.at(c.span).text
+                rest = line[c.span.end_column - 1 :].strip()
+                if not line[: c.span.column - 1].strip() and rest:
+                    found.setdefault(c.stage, c)
+        return found
+
+    def twice(self) -> Iterator[Diagnostic]:
+        first: dict[str, Span] = {}
+        for stage in self.parsed.task.stages:
+            if stage.name in first:
+                what = f"stage `<{stage.name}>` is defined twice"
+                hint = f"it is also defined in {_line(first[stage.name])}; join both with `|`"
+                yield self.source.fault("E203", what, stage.span, "one rule for each stage", hint)
+            first.setdefault(stage.name, stage.span)
+        declared: dict[str, Span] = {}
+        for actor in self.parsed.task.actors:
+            if actor.name in declared:
+                what = f"actor `{actor.name}` is declared twice"
+                hint = f"it is also declared in {_line(declared[actor.name])}"
+                yield self.source.fault("E212", what, actor.span, "`or` between its models", hint)
+            declared.setdefault(actor.name, actor.span)
+
+    def unreachable(self) -> Iterator[Diagnostic]:
+        if self.headless():
+            return
+        missing = {closest(u, self.grammar.stages) for u in self.undefined}
+        misread = {
+            str(n)
+            for s in self.parsed.task.stages
+            if isinstance(s.body, Actors) and self.misread(s)
+            for n in s.body.names
+        }
+        roots = self.parsed.task.roots
+        for stage in self.grammar.unreachable():
+            if stage.name not in missing | misread and not stage.span.file:
+                what = f"task `{roots[0]}` never comes to stage `<{stage.name}>`"
+                if len(roots) > 1:
+                    what = f"no task of the file comes to stage `<{stage.name}>`"
+                hint = "refer to it from another stage, or take it out; the first rule is the task"
+                yield self.source.fault("E204", what, stage.span, hint=hint)
+
+    def slips(self) -> Iterator[Diagnostic]:
+        """Actors that are named once and look like another that is declared or named more often."""
+        counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
+        task = self.parsed.task
+        declared = {a.name for a in task.actors} | {z.name for z in task.zones}
+        sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
+        if len(sure) > MANY:
+            return
+        for _, actors, _ in self.asked:
+            for actor in actors:
+                name = str(actor)
+                if name in declared or counts[name] > 1:
+                    continue
+                meant = next((o for o in sure if _slip(name, o)), None)
+                if meant is not None:
+                    what = f"actor `{name}` is named only here"
+                    yield self.source.fault(
+                        "E214", what, actor.span, hint=f"did you mean `{meant}`?"
+                    )
+
+    def idle_actors(self) -> Iterator[Diagnostic]:
+        named = {str(a) for _, actors, _ in self.asked for a in actors}
+        for actor in self.parsed.task.actors:
+            if actor.span.file or actor.name in named:
+                continue  # an included file may offer more than is used
+            if not any(_slip(n, actor.name) for n in named):
+                what = f"actor `{actor.name}` is declared but takes no part"
+                hint = did_you_mean(actor.name, named)
+                yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
+
+
+def _line(span: Span) -> str:
+    return f"line {span.line}{' of ' + span.file if span.file else ''}"
+
+
+def _slip(name: str, other: str) -> bool:
+    """Whether one name looks like a slip of the pen for another; `arm1` is none for `arm2`."""
+    if name == other or name.rstrip("0123456789_") == other.rstrip("0123456789_"):
+        return False
+    return SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.percepts.motion.clips import texture
+from visup.percepts.motion.outlines.outline_refinement import (
+    BAND,
+    LEAST,
+    NOISE,
+    SAMPLED,
+    inside_log_odds,
+    refine_outline,
+)
+
+SHAPE = (70, 90)
+
+
+def disc(x: float, y: float, radius: float) -> np.ndarray:
+    ys, xs = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    return np.asarray(np.hypot(xs - x, ys - y) < radius)
+
+
+def shares(mask: np.ndarray) -> np.ndarray:
+    return np.where(mask, np.float32(0.8), np.float32(0.1))
+
+
+def painted(mask: np.ndarray, inner: int, outer: int, seed: int = 1) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    grey = np.where(mask, inner, outer) + rng.normal(0, 3, SHAPE)
+    return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def iou(a: np.ndarray, b: np.ndarray) -> float:
+    return float((a & b).sum() / (a | b).sum())
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    st.integers(30, 60), st.integers(28, 42), st.integers(14, 22), st.integers(-3, 3), st.booleans()
+)
+def test_an_outline_that_is_a_few_pixels_off_comes_to_lie_on_the_edge(
+    x: int, y: int, radius: int, off: int, light: bool
+) -> None:
+    true = disc(x, y, radius)
+    tone = painted(true, *((180, 40) if light else (40, 180)))
+    rough = disc(x + off, y, radius - off)
+    found = refine_outline(shares(rough), tone) > 0.5
+    assert iou(found, true) >= min(0.97, iou(rough, true))
+
+
+def test_a_block_of_sky_at_the_side_of_an_object_is_given_up() -> None:
+    true = disc(45, 35, 20)
+    rough = true | cv2.dilate(true.astype(np.uint8), np.ones((9, 9), np.uint8)).astype(bool)
+    found = refine_outline(shares(rough), painted(true, 200, 10)) > 0.5
+    assert iou(found, true) > 0.95 > iou(rough, true)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(20, 70), st.integers(20, 50), st.integers(5, 25), st.integers(0, 50))
+def test_only_pixels_beside_the_outline_may_change(x: int, y: int, radius: int, seed: int) -> None:
+    share = shares(disc(x, y, radius))
+    tone = np.repeat(texture(seed, SHAPE)[..., None], 3, axis=2)
+    inside = (share > 0.5).astype(np.uint8)
+    kernel = np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)
+    far = cv2.dilate(inside, kernel) == cv2.erode(inside, kernel)
+    assert np.array_equal(refine_outline(share, tone)[far], share[far])
+
+
+def test_where_both_sides_look_alike_nothing_changes() -> None:
+    share = shares(disc(45, 35, 18))
+    plain = np.full((*SHAPE, 3), 90, np.uint8)
+    assert np.array_equal(refine_outline(share, plain) > 0.5, share > 0.5)
+
+
+@pytest.mark.parametrize("mask", [np.zeros(SHAPE, bool), np.ones(SHAPE, bool)])
+def test_what_has_no_outline_stays(mask: np.ndarray) -> None:
+    share = shares(mask)
+    assert np.array_equal(refine_outline(share, painted(mask, 10, 200)), share)
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(0, 1000))
+def test_odds_are_those_of_two_gaussians_in_the_window(seed: int) -> None:
+    """Against sums over every other pixel of every window, pixel by pixel."""
+    rng = np.random.default_rng(seed)
+    share = shares(disc(45, 35, 20))
+    tone = rng.integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
+    found = inside_log_odds(share, tone)
+    some, inside = tone[::2, ::2], (share > 0.5).astype(np.uint8)[::2, ::2]
+    half = SAMPLED[0] // 2
+    wide = cv2.copyMakeBorder(some, half, half, half, half, cv2.BORDER_REFLECT_101).astype(float)
+    mask = cv2.copyMakeBorder(inside, half, half, half, half, cv2.BORDER_REFLECT_101) > 0
+    told = np.flatnonzero(found)
+    for place in rng.choice(told, 12, replace=False):
+        y, x = divmod(int(place), SHAPE[1])
+        v, u = y // 2, x // 2
+        window, own = (a[v : v + SAMPLED[0], u : u + SAMPLED[0]] for a in (wide, mask))
+        assert LEAST < own.mean() < 1 - LEAST
+        cost = []
+        for side in (window[own], window[~own]):
+            variance = side.var(axis=0) + NOISE**2
+            gap = (tone[y, x] - side.mean(axis=0)) ** 2
+            cost.append(0.5 * (gap / variance + np.log(variance)).sum() / 3)
+        expected = float(np.clip(cost[1] - cost[0], -3, 3))
+        assert found[y, x] == pytest.approx(expected, abs=0.02)

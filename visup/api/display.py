@@ -1,0 +1,74 @@
+"""How runs and tables look on a terminal and in a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
+from itertools import islice
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from visup.agent.model.mind import Verdict
+from visup.agent.model.records import Event
+from visup.agent.model.step import Step
+from visup.report.pictures import html_picture, text_picture
+from visup.terminal.display import html_of
+from visup.terminal.narrator import event_row, verdict_line
+from visup.wording import worded_once
+
+MOST_EVENTS = 12
+MOST_ROWS = 10
+
+
+def story(title: str, events: Iterable[Event], verdict: Verdict | None) -> RenderableType:
+    """A run as text: what it is about, the latest of what was told, the verdict so far.
+
+    Args:
+        title: What it is about.
+        events: All of its events.
+        verdict: As it stands.
+    """
+    told = worded_once(tuple(events))
+    head = [Text(f"{len(told) - MOST_EVENTS} earlier events", style="dim")]
+    return Group(
+        Text(title, style="bold"),
+        *(head if len(told) > MOST_EVENTS else ()),
+        *(event_row(e) for e in told[-MOST_EVENTS:]),
+        Text.from_markup(verdict_line(verdict)),
+    )
+
+
+def with_picture(text: RenderableType, step: Step | None) -> RenderableType:
+    """A text below the picture of a step, for a terminal."""
+    return Group(text_picture(step.draw()), text) if step and step.frame else text
+
+
+def html_with_picture(text: RenderableType, step: Step | None) -> str:
+    """A text below the picture of a step, for a notebook."""
+    return (html_picture(step.draw()) if step and step.frame else "") + html_of(text)
+
+
+def rows(title: str, records: Iterable[Any]) -> RenderableType:
+    """The first of some records as a table, as wide as the terminal."""
+    several = list(islice(records, MOST_ROWS + 1))
+    table = Table(title=title, title_justify="left", box=None, header_style="dim")
+    names = _names(several[0]) if several else ()
+    for name in names:
+        table.add_column(name, no_wrap=name != "text", overflow="ellipsis")
+    for record in several[:MOST_ROWS]:
+        table.add_row(*(_short(getattr(record, name)) for name in names))
+    return Group(table, *([Text("...")] if len(several) > MOST_ROWS else []))
+
+
+def _names(record: Any) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(record))[:8] if is_dataclass(record) else ()
+
+
+def _short(value: object) -> Text:
+    if isinstance(value, float):
+        return Text(f"{value:.6g}")
+    shown = value if isinstance(value, str | int | tuple) or value is None else type(value).__name__
+    return Text(str(shown))

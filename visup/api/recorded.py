@@ -1,0 +1,224 @@
+"""`visup.open_run`: a run folder read back as records."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import RenderableType
+
+from visup.agent.model.display import enable_display
+from visup.agent.model.errors import OutputError, SettingsError
+from visup.agent.model.mind import UNKNOWN_OBJECT, Verdict
+from visup.agent.model.records import Alert, Event, Severity
+from visup.agent.storage.journal_reader import Recording
+from visup.api.display import story
+from visup.api.records import Records
+from visup.runs.resume import recorded_settings
+from visup.runs.settings import WatchSettings
+from visup.terminal.display import html_of
+
+Record = TypeVar("Record")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedStep:
+    """What was believed after one step, in short.
+
+    Attributes:
+        frame_index: Number of the frame.
+        time: Seconds.
+        objects: Ids of the objects that were believed in.
+        verdicts: Task -> verdict so far.
+        stages: Task -> stage -> status.
+        health: State of the camera.
+        unknown: Kinds of percepts that were not available.
+    """
+
+    frame_index: int
+    time: float
+    objects: tuple[int, ...] = ()
+    verdicts: Mapping[str, str] = field(default_factory=dict)
+    stages: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    health: str = ""
+    unknown: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedObject:
+    """What was believed of one object after one step.
+
+    Attributes:
+        frame_index: Number of the frame.
+        time: Seconds.
+        id: Number of the object within the run, from 1.
+        name: The likeliest model, or 'unknown object'.
+        share: Share of the votes for it, 0 to 1.
+        presence: 'seen', 'hidden' or 'left'.
+        confirmed: Whether it is more than a passing impression.
+        region: Id of its region.
+        bbox: (x, y, width, height), pixels.
+        area: Pixels.
+        velocity: (x, y), pixels per second.
+        cut: Whether the image border cuts it.
+        candidates: Model -> share of the votes.
+        depth: In units of the model, or relative; None when unknown.
+    """
+
+    frame_index: int
+    time: float
+    id: int
+    name: str
+    share: float
+    presence: str
+    confirmed: bool
+    region: int
+    bbox: tuple[int, ...]
+    area: float
+    velocity: tuple[float, ...]
+    cut: bool
+    candidates: Mapping[str, float] = field(default_factory=dict)
+    depth: float | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class RecordedRun:
+    """A run on disk, which may still go on; each part is read when it is first asked for.
+
+    Attributes:
+        recording: Its journal.
+    """
+
+    recording: Recording
+
+    @property
+    def folder(self) -> Path:
+        """The run folder."""
+        return self.recording.path.parent
+
+    @cached_property
+    def facts(self) -> Mapping[str, Any]:
+        """What was noted about the run: version, source, frame rate, settings."""
+        return self.recording.facts()
+
+    @cached_property
+    def settings(self) -> WatchSettings:
+        """The settings of the run."""
+        return recorded_settings(self.facts, str(self.recording.path))
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict; None when nothing was to be judged, or the run was not ended."""
+        said = self.facts.get("verdict")
+        return self._read(Verdict, said) if said is not None else None
+
+    @cached_property
+    def events(self) -> Records[Event]:
+        """What happened, in order."""
+        return self._records(Event, _event, self.recording.events())
+
+    @cached_property
+    def alerts(self) -> Records[Alert]:
+        """Alerts as they were last, in the order in which they were opened."""
+        return self._records(Alert, _alert, self.recording.alerts().values())
+
+    @cached_property
+    def steps(self) -> Records[RecordedStep]:
+        """What was believed after each step, in short."""
+        return self._records(RecordedStep, _step, self.recording.summaries())
+
+    @cached_property
+    def objects(self) -> Records[RecordedObject]:
+        """What was believed of each object after each step: one record for both."""
+        lines = ({**o, **_when(s)} for s in self.recording.summaries() for o in s["objects"])
+        return self._records(RecordedObject, _object, lines)
+
+    def __repr__(self) -> str:
+        return f"RecordedRun({str(self.folder)!r})"
+
+    def __rich__(self) -> RenderableType:
+        return story(str(self.folder), self.events, self.verdict)
+
+    def _repr_html_(self) -> str:
+        return html_of(story(str(self.folder), self.events, self.verdict))
+
+    def _records(
+        self, kind: type[Record], made: Callable[[Any], Record], lines: Iterable[Any]
+    ) -> Records[Record]:
+        return Records(kind, [self._read(made, line) for line in lines])
+
+    def _read(self, made: Callable[[Any], Record], line: Any) -> Record:
+        try:
+            return made(line)
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as fault:
+            where = str(self.recording.path)
+            raise OutputError(f"a record cannot be read ({fault})", where=where) from fault
+
+
+def open_run(folder: str | os.PathLike[str]) -> RecordedRun:
+    """A recorded run, as records.
+
+    Example:
+        ```python
+        run = visup.open_run("demo-run")
+        for event in run.events:
+            print(event.time, event.text)
+        run.objects.to_pandas().groupby("name")["time"].describe()
+        ```
+
+    Args:
+        folder: A run folder, or the journal in it.
+
+    Raises:
+        OutputError: There is no run, or it cannot be read.
+        SettingsError: `folder` is no path.
+    """
+    if not isinstance(folder, str | os.PathLike):
+        raise SettingsError(f"a run folder cannot be {folder!r}", expected="a path")
+    return RecordedRun(Recording.open(Path(folder)))
+
+
+def _event(line: Mapping[str, Any]) -> Event:
+    return Event(**_known(Event, line))
+
+
+def _alert(line: Mapping[str, Any]) -> Alert:
+    return Alert(**_known(Alert, line))
+
+
+def _known(kind: Any, line: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a record from its line in the journal, lists as tuples."""
+    names = {f.name for f in fields(kind)}
+    given = {k: tuple(v) if isinstance(v, list) else v for k, v in line.items() if k in names}
+    return {**given, "severity": Severity[line["severity"].upper()]}
+
+
+def _when(summary: Mapping[str, Any]) -> dict[str, Any]:
+    return {"frame_index": summary["frame_index"], "time": summary["time"]}
+
+
+def _step(summary: Mapping[str, Any]) -> RecordedStep:
+    tasks = summary["tasks"]
+    return RecordedStep(
+        **_when(summary),
+        objects=tuple(o["id"] for o in summary["objects"]),
+        verdicts={t["task"]: t["verdict"] for t in tasks},
+        stages={t["task"]: t["stages"] for t in tasks},
+        health=summary["health"]["status"],
+        unknown=tuple(summary["unknown"]),
+    )
+
+
+def _object(line: Mapping[str, Any]) -> RecordedObject:
+    candidates = [(str(name), float(share)) for name, share in line["candidates"]]
+    name, share = candidates[0] if candidates else (UNKNOWN_OBJECT, 0.0)
+    lists = {"bbox": tuple(line["bbox"]), "velocity": tuple(line["velocity"])}
+    told = {**line, **lists, "name": name, "share": share, "candidates": dict(candidates)}
+    return RecordedObject(**told)
+
+
+enable_display(RecordedStep, RecordedObject)

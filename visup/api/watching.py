@@ -1,0 +1,209 @@
+"""`visup.watch`: a source is watched step by step, and the run tells what was seen."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from types import TracebackType
+from typing import Self, Unpack
+
+from rich.console import RenderableType
+
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.mind import Verdict
+from visup.agent.model.records import Alert, Event, Frame, Severity
+from visup.agent.model.step import Step
+from visup.api.display import html_with_picture, story, with_picture
+from visup.api.options import TaskLike, WatchOptions, settings_from
+from visup.api.records import Records
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.runs.result import RunResult
+from visup.runs.runner import Audience, fresh_folder, supervised
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import final_verdict
+
+KEPT_STEPS = 2000
+"""Steps that a run keeps in memory, some 100 kB each; events and alerts are kept all."""
+
+
+def watch(
+    source: str | int | os.PathLike[str] | WatchSettings,
+    *,
+    task: TaskLike | Sequence[TaskLike] | None = None,
+    models: str | os.PathLike[str] | ModelDatabase | None = None,
+    actors: Mapping[str, str | Sequence[str]] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    **options: Unpack[WatchOptions],
+) -> Run:
+    """Supervise a source: see what moves, name it, judge it by rules, verify tasks.
+
+    The run goes on as it is iterated over; asking for `verdict`, `events` and so on before that
+    watches the source to its end.
+
+    Example:
+        ```python
+        run = visup.watch("clip.mp4", task="dock", models="things.models", actors={"arm": "arm"})
+        for step in run:
+            print(step.time, [event.text for event in step.events])
+        print(run.verdict)
+        ```
+
+    Args:
+        source: A video file, a folder of images, a URL, the number of a camera, or whole `Settings`
+            (then nothing else but `out` may be given).
+        task: A task file, the name of a shipped task, a task from `visup.load_task`, or several;
+            None for supervision by the safety rules alone.
+        models: A model database, or None to go without identities.
+        actors: Actor of the task -> model or models that it may look like.
+        out: Folder to record to: journal, events, annotated video, report. None records nothing.
+        options: Further settings, named as in `visup.Settings`.
+
+    Returns:
+        The run, before its first step.
+
+    Raises:
+        VisupError: Something given is not as it should be; the message says what was expected.
+    """
+    if not isinstance(source, WatchSettings):
+        return Run(settings_from(source, task, models, actors, options), out)
+    if options or not (task is None and models is None and actors is None):
+        raise SettingsError(
+            "settings come whole: nothing but `out` can be given besides",
+            hint="change them with dataclasses.replace(settings, ...)",
+        )
+    return Run(source, out)
+
+
+class Run(Iterator[Step]):
+    """A supervised source; iterate over it for one step after another.
+
+    Each step that it yields carries its frame, so that `step.draw()` shows it. In a `with` statement
+    a run that is left early is ended properly, with its report.
+
+    Args:
+        settings: What to watch and against what.
+        out: Folder to record to, or None.
+
+    Attributes:
+        settings: As given.
+        result: How the run ended, with the recorded folder and report, or None while it goes on.
+    """
+
+    def __init__(self, settings: WatchSettings, out: str | os.PathLike[str] | None = None) -> None:
+        self.settings = settings
+        self.result: RunResult | None = None
+        self._steps: deque[Step] = deque(maxlen=KEPT_STEPS)
+        self._events: list[Event] = []
+        self._alerts: dict[int, Alert] = {}
+        self._frame: Frame | None = None
+        self._begun = False
+        folder = fresh_folder(Path(out), settings.source) if out is not None else None
+        self._run = supervised(settings, folder, Audience((self._note,)))
+
+    def __next__(self) -> Step:
+        self._begun = True
+        try:
+            step = next(self._run)
+        except StopIteration as end:
+            self._end(end)
+            raise
+        return replace(step, frame=self._frame)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def __repr__(self) -> str:
+        state = "ended" if self.result else "under way" if self._begun else "not begun"
+        return f"Run({self.settings.source!r}, {state}, {len(self._events)} events)"
+
+    def __rich__(self) -> RenderableType:
+        return with_picture(self._story(), self._last())
+
+    def _repr_html_(self) -> str:
+        return html_with_picture(self._story(), self._last())
+
+    def finish(self) -> Self:
+        """Watch what is left of the source, and return the run itself."""
+        for _ in self:
+            pass
+        return self
+
+    def stop(self) -> Self:
+        """End the run here: what was seen is judged and recorded as it is."""
+        if self.result is None and self._begun:
+            try:
+                self._run.throw(KeyboardInterrupt())
+            except StopIteration as end:
+                self._end(end)
+        return self
+
+    @property
+    def steps(self) -> Records[Step]:
+        """The steps so far, the latest `KEPT_STEPS` of them; the last one carries its frame."""
+        self._ask()
+        last = self._last()
+        return Records(Step, [*islice(self._steps, len(self._steps) - 1), last] if last else ())
+
+    @property
+    def events(self) -> Records[Event]:
+        """What happened so far, in order."""
+        self._ask()
+        return Records(Event, self._events)
+
+    @property
+    def alerts(self) -> Records[Alert]:
+        """Every alert so far as it is now, in the order in which they were opened."""
+        self._ask()
+        return Records(Alert, [self._alerts[i] for i in sorted(self._alerts)])
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict, or the verdict so far; None when nothing was to be judged and nothing was wrong."""
+        self._ask()
+        if self.result is not None:
+            return self.result.verdict
+        return self._verdict_so_far()
+
+    def _ask(self) -> None:
+        """Whoever asks before the first step wants to know about the whole source."""
+        if not self._begun:
+            self.finish()
+
+    def _last(self) -> Step | None:
+        return replace(self._steps[-1], frame=self._frame) if self._steps else None
+
+    def _story(self) -> RenderableType:
+        state = "" if self.result else "; the run is under way" if self._begun else "; not begun"
+        verdict = self.result.verdict if self.result else self._verdict_so_far()
+        return story(f"{self.settings.source}{state}", self._events, verdict)
+
+    def _note(self, step: Step, frame: Frame) -> None:
+        self._frame = frame
+        self._steps.append(step)
+        self._events += step.events
+        self._alerts |= {a.id: a for a in step.alerts}
+
+    def _end(self, end: StopIteration) -> None:
+        # A generator that has ended ends again, without its value, whenever it is asked.
+        self.result = self.result or end.value
+
+    def _verdict_so_far(self) -> Verdict | None:
+        if not self._steps:
+            return None
+        mind = self._steps[-1].mind
+        if mind.tasks:
+            return final_verdict(mind)
+        grave = any(e.severity >= Severity.WARNING for e in self._events)
+        return Verdict.INTERRUPTED if grave else None

@@ -1,0 +1,202 @@
+"""`visup eval clips`: rendered clips of what shared footage lacks, each with its bar.
+
+The scenarios stand in `visup/render/bench`. Their clips are rendered into a cache and anew when a scenario or
+the renderer has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from importlib import resources
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import OutputError, SettingsError
+from visup.render.scenario.library import bench_names, shipped_scenario
+
+MARK = "made-of.txt"
+"""File of a cached clip that says what it was made of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """What a clip must reach.
+
+    Attributes:
+        j_object: Least mean IoU of each object with its region, where it shows 500 pixels, from 2 s
+            after it first does.
+        id_switches: Most changes of an object's id.
+        ghost: Most frames that show a region where no object is, as a share.
+    """
+
+    j_object: float = 0.80
+    id_switches: int = 0
+    ghost: float = 0.01
+
+
+BARS: Mapping[str, Bar] = {}
+"""Bars that differ from the usual one, by clip."""
+
+
+def evaluate_clips(
+    cache: Path,
+    names: Sequence[str] = (),
+    *,
+    workers: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Render what is not yet rendered, score the segmenter on it, and compare with the bars.
+
+    Args:
+        cache: Folder for the clips; made when missing.
+        names: Which clips; all when empty.
+        workers: Processes that share the work; as many as there are cores when None.
+        progress: Told what is done.
+
+    Returns:
+        `items` by clip: what `evaluate_motion` says of it, `bar`, and `missed`, what it fell short of in
+        words. `total`: means, and how many clips `passed` of all `clips`.
+
+    Raises:
+        SettingsError: There is no clip of a name.
+        OutputError: The cache cannot be written.
+    """
+    wanted = _known(names)
+    found: dict[str, dict[str, Any]] = {}
+    for name, figures in _scored(wanted, cache, workers or os.cpu_count() or 1):
+        found[name] = figures
+        if progress is not None:
+            progress(f"{len(found)} of {len(wanted)} clips")
+    items = {name: judged(found[name], bar_of(name)) for name in wanted}
+    return {"total": _total(items), "items": items}
+
+
+def bar_of(name: str) -> Bar:
+    """The bar of a clip."""
+    return BARS.get(name, Bar())
+
+
+def judged(figures: Mapping[str, Any], bar: Bar) -> dict[str, Any]:
+    """The figures of a clip with its bar and what was missed.
+
+    Args:
+        figures: One item of `evaluate_motion`.
+        bar: What it must reach.
+
+    Returns:
+        The figures, `bar`, and `missed`: sentences, none when it passes.
+    """
+    objects: Mapping[str, Mapping[str, Any]] = figures.get("objects", {})
+    missed = [
+        f"J of {name} {o['J']:.2f} < {bar.j_object:.2f}"
+        for name, o in objects.items()
+        if o["J"] < bar.j_object
+    ]
+    if not objects:
+        missed.append("no object was scored")
+    switches = figures.get("id_switches", 0)
+    if switches > bar.id_switches:
+        missed.append(f"{switches} id switches > {bar.id_switches}")
+    ghost = figures.get("ghost", 0.0)
+    if ghost > bar.ghost:
+        missed.append(f"ghosts {ghost:.1%} > {bar.ghost:.0%}")
+    return {**figures, "bar": asdict(bar), "missed": missed}
+
+
+def rendered(name: str, cache: Path) -> Path:
+    """The folder of a clip, rendered now if it is not there or no longer what it was made of.
+
+    Args:
+        name: One of `bench_names`.
+        cache: Where clips are kept.
+
+    Returns:
+        A mission folder.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    from visup.render.output.writer import write_mission
+
+    folder, recipe = cache / name, _recipe(name)
+    mark = folder / MARK
+    if mark.is_file() and mark.read_text(encoding="utf-8") == recipe:
+        return folder
+    try:
+        if folder.exists():
+            shutil.rmtree(folder)
+        write_mission(shipped_scenario(f"bench/{name}"), folder)
+        # Last of all: a clip whose rendering was cut short has no mark.
+        mark.write_text(recipe, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(
+            f"the clip cannot be kept: {error.strerror}", where=str(folder)
+        ) from error
+    return folder
+
+
+def _recipe(name: str) -> str:
+    """What a clip is made of: the digest of its scenario and of all code that renders."""
+    digest = hashlib.sha256()
+    package = resources.files("visup.render")
+    rooms = (package / room for room in ("imaging", "meshes", "scenario"))
+    beside = [f for room in rooms for f in room.iterdir() if f.name.endswith(".py")]
+    code = sorted(beside, key=str)
+    for file in (*code, package / "scenarios" / "bench" / f"{name}.toml"):
+        digest.update(file.read_bytes())
+    return digest.hexdigest() + "\n"
+
+
+def _scored(
+    names: Sequence[str], cache: Path, workers: int
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Clips and their figures as they come."""
+    if min(workers, len(names)) == 1:
+        yield from ((name, _score(name, cache)) for name in names)
+        return
+    # Fresh processes: a fork would share the state of OpenCV's threads.
+    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
+        waiting = {pool.submit(_score, name, cache): name for name in names}
+        for done in as_completed(waiting):
+            yield waiting[done], done.result()
+
+
+def _alone() -> None:
+    """One thread for each process: the processes share the cores already."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+def _score(name: str, cache: Path) -> dict[str, Any]:
+    """The figures of one clip."""
+    from visup.evaluation.motion.runner import evaluate_motion
+
+    items: dict[str, dict[str, Any]] = evaluate_motion(rendered(name, cache))["items"]
+    return items[name]
+
+
+def _known(names: Sequence[str]) -> tuple[str, ...]:
+    known = bench_names()
+    for name in names:
+        if name not in known:
+            raise SettingsError(f"there is no clip {name!r}", expected=f"one of {', '.join(known)}")
+    return tuple(dict.fromkeys(names)) or known
+
+
+def _total(items: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    values = list(items.values())
+    out: dict[str, Any] = {}
+    for key in ("J", "F", "J_object", "ghost"):
+        numbers = [v[key] for v in values if key in v]
+        out[key] = sum(numbers) / len(numbers) if numbers else None
+    out["id_switches"] = sum(v.get("id_switches", 0) for v in values)
+    out["passed"] = sum(not v["missed"] for v in values)
+    out["clips"] = len(values)
+    return out

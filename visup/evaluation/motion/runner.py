@@ -1,0 +1,257 @@
+"""`visup eval motion`: segment sequences whose truth is known, and score the regions.
+
+The segmenter sees frames only; masks, boxes and `truth.json` are read by the scoring alone.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame, Region
+from visup.agent.model.errors import SettingsError, SourceError
+from visup.evaluation.motion.mask_scores import (
+    UNSCORED,
+    MaskOverlaps,
+    boundary_measure,
+    has_ghost,
+    object_scores,
+    overlaps_of,
+    region_similarity,
+)
+from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth
+from visup.percepts.motion.segmenter import MotionSegmenter
+from visup.percepts.video import open_source
+
+KEYS = ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledSequence:
+    """One sequence to score.
+
+    Attributes:
+        name: Path below the folder that was named.
+        source: What to open as video.
+        masks: Its masks in order of frames; empty for MOT folders.
+        truth: `truth.json` of a mission, or None.
+        boxes: MOT ground truth, or None.
+    """
+
+    name: str
+    source: Path
+    masks: tuple[Path, ...] = ()
+    truth: Path | None = None
+    boxes: Path | None = None
+
+
+@dataclass(slots=True)
+class SequenceMeasurements:
+    """What is gathered over the frames of one sequence."""
+
+    j: list[float] = field(default_factory=list)
+    f: list[float] = field(default_factory=list)
+    ghosts: list[bool] = field(default_factory=list)
+    overlaps: list[MaskOverlaps] = field(default_factory=list)
+    boxes: dict[int, dict[int, Box]] = field(default_factory=dict)
+    ms: list[float] = field(default_factory=list)
+    dis_ms: list[float] = field(default_factory=list)
+
+
+def evaluate_motion(
+    folder: Path,
+    *,
+    every: int = 1,
+    limit: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Score the segmenter on every sequence below a folder.
+
+    Args:
+        folder: Holds sequences (`<seq>/frames` with `<seq>/masks`), missions (`video.mp4`, `masks`,
+            `truth.json`), MOT folders (`img1`, `gt`), or is one of these.
+        every: Use every n-th frame only.
+        limit: Most frames of each sequence, or None for all.
+        progress: Told the name of each sequence before it is run.
+
+    Returns:
+        `total` and `items` by name, with the keys J, F, J_object, ghost, id_switches, mota, idf1,
+        ms and ratio; a key is absent where there is no such truth. A mission's item also has
+        `objects`: J and id switches of each.
+
+    Raises:
+        SettingsError: There is nothing to score below the folder.
+        SourceError: A sequence cannot be read.
+        ExtraMissingError: MOT folders are to be scored and `motmetrics` is not installed.
+    """
+    items: dict[str, dict[str, Any]] = {}
+    for sequence in find_sequences(folder):
+        if progress is not None:
+            progress(sequence.name)
+        items[sequence.name] = _scores(sequence, _run(sequence, every, limit))
+    return {"total": _total(list(items.values())), "items": items}
+
+
+def find_sequences(folder: Path) -> list[LabelledSequence]:
+    """Everything below a folder that can be scored, by name.
+
+    Raises:
+        SettingsError: There is nothing.
+    """
+    if not folder.is_dir():
+        raise SettingsError("there is no such folder", where=str(folder))
+    places = [folder, *sorted(p for p in folder.rglob("*") if p.is_dir())]
+    out = []
+    for place in places:
+        name = place.name if place == folder else str(place.relative_to(folder))
+        masks = tuple(sorted((place / "masks").glob("*.png")))
+        if (place / "frames").is_dir() and masks:
+            out.append(LabelledSequence(name, place / "frames", masks))
+        elif (place / "video.mp4").is_file() and masks and (place / "truth.json").is_file():
+            truth = place / "truth.json"
+            out.append(LabelledSequence(name, place / "video.mp4", masks, truth))
+        elif (place / "img1").is_dir() and (place / "gt" / "gt.txt").is_file():
+            out.append(LabelledSequence(name, place, boxes=place / "gt" / "gt.txt"))
+    if not out:
+        raise SettingsError(
+            "nothing to score was found",
+            where=str(folder),
+            expected="folders with frames and masks, missions, or MOT folders",
+        )
+    return out
+
+
+def _run(sequence: LabelledSequence, every: int, limit: int | None) -> SequenceMeasurements:
+    """Segment one sequence and gather what its scores need."""
+    tally = SequenceMeasurements()
+    names = _truth(sequence).get("labels", {})
+    segmenter = MotionSegmenter()
+    dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    before: NDArray[np.uint8] | None = None
+    for number, (frame, last) in enumerate(_frames(sequence, every, limit)):
+        start = time.perf_counter()
+        regions = segmenter.step(frame)
+        tally.ms.append(1e3 * (time.perf_counter() - start))
+        grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        if before is not None:
+            start = time.perf_counter()
+            dis.calc(before, grey, None)  # type: ignore[call-overload]
+            tally.dis_ms.append(1e3 * (time.perf_counter() - start))
+        before = grey
+        tally.boxes[frame.index] = {r.id: _box(r) for r in regions}
+        if frame.index < len(sequence.masks):
+            labels = _labels(sequence.masks[frame.index], frame.size)
+            masks = {r.id: r.full_mask(frame.size) for r in regions}
+            _tally_masks(tally, labels, masks, inner=number > 0 and not last)
+            if names:
+                seen = overlaps_of(frame.index, frame.time, labels, names, masks)
+                tally.overlaps.append(seen)
+    return tally
+
+
+def _frames(
+    sequence: LabelledSequence, every: int, limit: int | None
+) -> Iterator[tuple[Frame, bool]]:
+    """Frames, each with whether it is the last."""
+    with open_source(str(sequence.source), every=every) as source:
+        waiting: Frame | None = None
+        for count, frame in enumerate(source):
+            if limit is not None and count >= limit:
+                break
+            if waiting is not None:
+                yield waiting, False
+            waiting = frame
+        if waiting is not None:
+            yield waiting, True
+
+
+def _labels(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
+    labels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if labels is None:
+        raise SourceError("this mask cannot be read", where=str(path), expected="an 8-bit PNG")
+    if labels.ndim == 3:
+        labels = labels[..., 0]
+    if labels.shape != size[::-1]:
+        raise SourceError(
+            f"this mask has {labels.shape[1]} x {labels.shape[0]} pixels",
+            where=str(path),
+            expected=f"{size[0]} x {size[1]} as its frame",
+        )
+    return np.asarray(labels, dtype=np.uint8)
+
+
+def _box(region: Region) -> Box:
+    x, y, w, h = region.bbox
+    return float(x), float(y), float(w), float(h)
+
+
+def _tally_masks(
+    tally: SequenceMeasurements,
+    labels: NDArray[np.uint8],
+    masks: Mapping[int, NDArray[np.bool_]],
+    *,
+    inner: bool,
+) -> None:
+    """J and F of a frame that is neither first nor last, and whether it shows a ghost."""
+    scored = labels != UNSCORED
+    true = (labels > 0) & scored
+    seen = np.zeros(labels.shape, dtype=bool)
+    for mask in masks.values():
+        seen |= mask
+    j = region_similarity(seen, true, scored)
+    if j is None:
+        return
+    if inner:
+        tally.j.append(j)
+        tally.f.append(boundary_measure(seen & scored, true))
+    values = [v for v in np.unique(labels).tolist() if v != 0]
+    # What is not scored may be an object: a region there is no ghost.
+    tally.ghosts.append(has_ghost(masks.values(), [labels == v for v in values]))
+
+
+def _truth(sequence: LabelledSequence) -> dict[str, Any]:
+    return dict(json.loads(sequence.truth.read_text())) if sequence.truth else {}
+
+
+def _scores(sequence: LabelledSequence, tally: SequenceMeasurements) -> dict[str, Any]:
+    """The figures of one sequence."""
+    out: dict[str, Any] = {}
+    if tally.j:
+        out |= {"J": statistics.fmean(tally.j), "F": statistics.fmean(tally.f)}
+    if tally.ghosts:
+        out["ghost"] = statistics.fmean(tally.ghosts)
+    if sequence.truth is not None:
+        events = _truth(sequence).get("events", ())
+        coupled = [
+            (int(e["frame"]), frozenset(e["objects"])) for e in events if e["kind"] == "coupled"
+        ]
+        objects = object_scores(tally.overlaps, coupled)
+        if objects:
+            out["J_object"] = statistics.fmean(s.j for s in objects.values())
+            out["id_switches"] = sum(s.switches for s in objects.values())
+            out["objects"] = {n: {"J": s.j, "id_switches": s.switches} for n, s in objects.items()}
+    if sequence.boxes is not None:
+        out |= mot_scores(read_truth(sequence.boxes), tally.boxes)
+    out["ms"] = statistics.median(tally.ms)
+    if tally.dis_ms:
+        out["ratio"] = out["ms"] / statistics.median(tally.dis_ms)
+    return out
+
+
+def _total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Means over the sequences that have a figure; id switches are summed."""
+    out: dict[str, Any] = {}
+    for key in KEYS:
+        values = [item[key] for item in items if key in item]
+        if values:
+            out[key] = sum(values) if key == "id_switches" else statistics.fmean(values)
+    return out

@@ -1,0 +1,276 @@
+"""`visup eval reasoning`: rules and tasks on percepts made from the truth of missions.
+
+Seeing is left out, so that what is measured is reasoning alone: from percepts as wrong as told
+(`PerceptNoise`), who is who, what happened, how the task stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from visup.agent import Frame, Mind, ObjectBelief, Presence
+from visup.agent.cycle.agent import Agent, Reasoners
+from visup.agent.model.step import Step
+from visup.evaluation.missions.files import mission_folders
+from visup.evaluation.missions.pose_errors import true_spin
+from visup.evaluation.missions.runner import (
+    COVERING_IOU,
+    SMALLEST_SCORED_PX,
+    MissionRecorder,
+    mission_total,
+    report_scores,
+)
+from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth, parse_truth
+from visup.evaluation.reasoning.calibration import Calibration
+from visup.evaluation.simulation.percepts import PerceptNoise, behaviours_of, frames_of
+from visup.evaluation.simulation.truth_masks import Mission, TrueMask, load_mission
+from visup.rules.reasoners import default_reasoners
+from visup.tasks import load_task
+from visup.tasks.supervision.supervise import task_reasoner
+
+SPIN_SPAN_S = 5.0
+"""Spin is scored over the last seconds of a mission."""
+
+
+@dataclass(slots=True)
+class BeliefScorer:
+    """Takes down what is believed of one mission, frame by frame.
+
+    Attributes:
+        mission: With its truth.
+        truths: What truly happens.
+        who: Region id -> names of true objects.
+        said: Events, alerts, stages.
+        right: Object-frames with the right name, and
+        scored: all of them.
+        calibration: How sure it was, and whether rightly.
+        shows: (object, true name) -> frames in which its region showed that.
+        spins: (time, degrees per second) believed of each true object.
+        wrong: Frames at which a true object had not its name: (time, object, what was believed).
+    """
+
+    mission: Mission
+    truths: MissionTruth
+    who: Mapping[int, tuple[str, ...]]
+    said: MissionRecorder = field(default_factory=MissionRecorder)
+    right: int = 0
+    scored: int = 0
+    calibration: Calibration = field(default_factory=Calibration)
+    shows: dict[tuple[int, str], int] = field(default_factory=dict)
+    spins: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    wrong: list[tuple[float, str, str]] = field(default_factory=list)
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Take down one step; the agent calls it."""
+        self.said(step, frame)
+        for known in step.mind.objects.values():
+            names = self.who.get(known.region.id, ())
+            if known.last_seen == step.time and len(names) == 1:
+                key = (known.id, names[0])
+                self.shows[key] = self.shows.get(key, 0) + 1
+        for name, masks in self._scored(step):
+            belief = covering(step.mind, masks)
+            said = "nobody" if belief is None else belief.name
+            together = {self.truths.names[n] for n in self._together(name, step.time)}
+            right = said in together
+            self.scored += 1
+            self.right += right
+            if not right:
+                self.wrong.append((step.time, name, said))
+            if belief is not None:
+                self.calibration.add(belief.confidence, right)
+                if belief.pose is not None and belief.pose.spin is not None:
+                    spin = (step.time, belief.pose.spin.rate)
+                    self.spins.setdefault(name, []).append(spin)
+
+    def names(self) -> dict[int, str]:
+        """Believed object's id -> the true object that it showed most often."""
+        ranked = sorted(self.shows.items(), key=lambda item: (item[1], item[0]))
+        return {number: name for (number, name), _ in ranked}
+
+    def _together(self, name: str, time: float) -> frozenset[str]:
+        """The true objects that are one body with this one now."""
+        for event in self.truths.events:
+            if event.kind == "coupled" and name in event.objects and time >= event.time:
+                return event.objects
+        return frozenset({name})
+
+    def _scored(self, step: Step) -> Iterator[tuple[str, list[list[TrueMask]]]]:
+        """Objects that are scored in this frame, with the masks by which one may be covered."""
+        here = self.mission.masks[step.frame_index]
+        for name, mask in here.items():
+            entered = [
+                e.time for e in self.truths.events if e.kind == "entry" and name in e.objects
+            ]
+            late = bool(entered) and step.time >= min(entered) + UNSCORED_START_S
+            if mask.visible_px < SMALLEST_SCORED_PX or not late:
+                continue
+            union = [here[n] for n in sorted(self._together(name, step.time)) if n in here]
+            yield name, [[mask], union] if len(union) > 1 else [[mask]]
+
+
+def covering(mind: Mind, masks: Sequence[Sequence[TrueMask]]) -> ObjectBelief | None:
+    """The object that is believed to be where a true one is.
+
+    Args:
+        mind: The mind; objects out of sight count where they are believed to be.
+        masks: Of the true object; and of all that is one body with it.
+
+    Returns:
+        The belief whose region lies best upon one of these, or None when none does by half.
+    """
+    scored = [
+        (max(_iou(b, parts) for parts in masks), -b.id, b)
+        for b in mind.objects.values()
+        if b.presence is not Presence.LEFT or b.last_seen == mind.time
+    ]
+    best = max(scored, default=None, key=lambda s: s[:2])
+    return best[2] if best is not None and best[0] >= COVERING_IOU else None
+
+
+def _iou(belief: ObjectBelief, parts: Sequence[TrueMask]) -> float:
+    x, y, w, h = belief.region.bbox
+    both = 0
+    for true in parts:
+        rows, columns = true.inside.shape
+        left, top = max(x, true.at[0]), max(y, true.at[1])
+        right, bottom = min(x + w, true.at[0] + columns), min(y + h, true.at[1] + rows)
+        if left < right and top < bottom:
+            mine = belief.region.mask[top - y : bottom - y, left - x : right - x]
+            at = true.at
+            theirs = true.inside[top - at[1] : bottom - at[1], left - at[0] : right - at[0]] > 0
+            both += int(np.count_nonzero(mine & theirs))
+    whole = sum(true.visible_px for true in parts)
+    return both / max(1.0, belief.region.area + whole - both)
+
+
+def watch_mission(mission: Mission, noise: PerceptNoise, *, every: int = 1) -> BeliefScorer:
+    """Supervise one mission on percepts made from its truth."""
+    behaviours, who = behaviours_of(mission, noise)
+    watch = BeliefScorer(mission, parse_truth(mission.truth, mission.fps), who)
+    rules = default_reasoners()
+    task = task_reasoner([load_task(str(mission.description["task"]))])
+    agent = Agent(
+        behaviours=behaviours,
+        reasoners=Reasoners(rules.update, rules.cogitate, (task,)),
+        actors={a: (m,) for a, m in mission.description["actors"].items()},
+        observers=(watch,),
+    )
+    agent.run(frames_of(mission, every=every))
+    return watch
+
+
+def run_scores(watch: BeliefScorer) -> dict[str, Any]:
+    """Figures of one run."""
+    names = watch.names()
+    told = [(kind, ids) for kind, ids, _ in watch.said.events]
+    true = {(e.kind, e.objects) for e in watch.truths.events}
+
+    def false(kind: str) -> int:
+        return sum(
+            (k, frozenset(names.get(i, "?") for i in ids)) not in true
+            for k, ids in told
+            if k == kind
+        )
+
+    return {
+        "identity_counts": [watch.right, watch.scored],
+        "calibration": watch.calibration.counts(),
+        "false_coupled": false("coupled"),
+        "false_exit": false("exit"),
+        "spin_errors": _spin_errors(watch),
+        **report_scores(watch.truths, watch.said, names),
+    }
+
+
+def _spin_errors(watch: BeliefScorer) -> list[float]:
+    """Relative error of the satellite's spin at the end of a mission, where it is believed.
+
+    What it is compared with is how the satellite truly turns then: what was caught turns as it is carried.
+    """
+    end = watch.said.last.time if watch.said.last else 0.0
+    late = [(t, r) for t, r in watch.spins.get("satellite", []) if t > end - SPIN_SPAN_S]
+    rates = [(r, true_spin(watch.mission.truth, _index(watch, t), "satellite")) for t, r in late]
+    both = [(told, true) for told, true in rates if true is not None]
+    if not both:
+        return []
+    told, true = np.median(np.array(both), axis=0).tolist()
+    return [abs(told - true) / true] if true > 0 else []
+
+
+def _index(watch: BeliefScorer, time: float) -> int:
+    return round(time * watch.mission.fps)
+
+
+def evaluate_reasoning(
+    folder: Path,
+    *,
+    seeds: int = 20,
+    first: int = 0,
+    every: int = 1,
+    jobs: int = 2,
+    noise: PerceptNoise | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Figures over all missions below a folder, each seen with the noise of several seeds.
+
+    Args:
+        folder: A mission, or a folder of missions.
+        seeds: How many runs of each mission.
+        first: The first seed.
+        every: Use every n-th frame.
+        jobs: Processes.
+        noise: How wrong percepts are; its seed is not used.
+        progress: Told a line as each mission is done.
+
+    Returns:
+        {"total": {...}, "items": {mission: {...}}}; counts are summed over the seeds.
+
+    Raises:
+        SettingsError: There is no mission, or one cannot be read.
+    """
+    missions = mission_folders(folder)
+    noise = noise or PerceptNoise()
+    run = partial(_mission, every=every, noise=noise)
+    # No two runs share their chance.
+    chances = [
+        [seed * len(missions) + k for seed in range(first, first + seeds)]
+        for k in range(len(missions))
+    ]
+    runs: dict[str, list[dict[str, Any]]] = {}
+    with ProcessPoolExecutor(max_workers=jobs, mp_context=get_context("spawn")) as pool:
+        for mission, found in zip(missions, pool.map(run, missions, chances), strict=True):
+            runs[mission.name] = found
+            if progress:
+                progress(mission.name)
+    items = {name: _summed(found) for name, found in runs.items()}
+    return {"total": _summed([r for found in runs.values() for r in found]), "items": items}
+
+
+def _mission(
+    folder: Path, seeds: Sequence[int], every: int, noise: PerceptNoise
+) -> list[dict[str, Any]]:
+    mission = load_mission(folder, every=every)
+    return [
+        run_scores(watch_mission(mission, replace(noise, seed=seed), every=every)) for seed in seeds
+    ]
+
+
+def _summed(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Figures of several runs as one: counts are added up."""
+    total = mission_total([{k: v for k, v in r.items() if v is not None} for r in runs])
+    calibration = Calibration()
+    for run in runs:
+        calibration.join(run["calibration"])
+    spins = [e for r in runs for e in r["spin_errors"]]
+    total |= {k: sum(r[k] for r in runs) for k in ("false_coupled", "false_exit")}
+    total |= {"runs": len(runs), "ece": calibration.error(), "reliability": calibration.table()}
+    return total | ({"spin_error": float(np.median(spins))} if spins else {})

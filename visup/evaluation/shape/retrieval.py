@@ -1,0 +1,230 @@
+"""Shape retrieval against classes: leave one out over folders of silhouettes.
+
+Figures as the data's README defines them. The first line is the product as it is (shock graphs, then
+outlines and areas); the second, `graph_alone`, is the shock graph without these.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import SettingsError
+from visup.percepts.shape.building.build import PICTURES, read_silhouette
+from visup.percepts.shape.database.model_database import candidates_wanted
+from visup.percepts.shape.index.view_index import ViewIndex
+from visup.percepts.shape.matching.graph_matching import WEIGHTS, match_nodes
+from visup.percepts.shape.matching.shape_similarity import (
+    GRAPH_SHARE,
+    Shape,
+    compare_outlines_and_areas,
+    shape_of,
+)
+from visup.percepts.shape.silhouette.area_overlap import AreaIndex
+from visup.percepts.shape.silhouette.silhouette import normalise
+
+RANKS = 10
+"""How many of the best matches the rank table counts."""
+
+_PROCESSES = 2
+_ROWS = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Similarities of some queries with all shapes before them."""
+
+    rows: list[int]
+    graphs: list[NDArray[np.float64]]
+    looks: list[NDArray[np.float64]]
+    seconds: float
+
+
+def evaluate_shapes(
+    folder: Path, *, limit: int | None = None, progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Figures of leaving one out over `<class>/*.png` below a folder.
+
+    Args:
+        folder: Folder of classes. Polarity of the pictures is found out.
+        limit: Shapes of each class, for a quick look; all by default.
+        progress: Told a line now and then.
+
+    Returns:
+        {"total": {...}, "items": {class: {...}}}: shares `nn1`, `bullseye`, `lost` and `compared` are
+        0 to 1; `ranks` counts queries with a shape of their class at ranks 1 to 10 and `rank_sum` is
+        their sum; `ms_shape` and `ms_pair` are milliseconds in one process; `graph_alone` holds
+        `nn1`, `ranks`, `rank_sum`, `bullseye` of the shock graph by itself.
+
+    Raises:
+        SettingsError: There are no classes with at least two shapes in all.
+    """
+    labels, files = _listed(folder, limit)
+    shapes, ms_shape = _shapes(files, progress)
+    graphs, looks, ms_pair = _similarities(shapes, progress)
+    both = GRAPH_SHARE * graphs + looks
+    np.fill_diagonal(both, 1.0)
+    compared, lost = _pruning(shapes, both)
+    items = _figures(both, labels)
+    alone = _figures(graphs, labels)
+    for name, figures in items.items():
+        figures["graph_alone"] = alone[name]
+        own = labels == name if name else np.ones(len(labels), dtype=bool)
+        figures["compared"], figures["lost"] = float(compared[own].mean()), float(lost[own].mean())
+    total = items.pop("")
+    return {"total": {**total, "ms_shape": ms_shape, "ms_pair": ms_pair}, "items": items}
+
+
+def _listed(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Path]]:
+    """Classes and picture files, by name."""
+    found = [
+        (sub.name, file)
+        for sub in sorted(p for p in folder.iterdir() if p.is_dir())
+        for file in sorted(f for f in sub.iterdir() if f.suffix.lower() in PICTURES)[:limit]
+    ]
+    if len(found) < 2:
+        raise SettingsError(
+            "there are no shapes to compare here",
+            where=str(folder),
+            expected="<class>/*.png with at least two pictures",
+        )
+    return np.array([name for name, _ in found]), [file for _, file in found]
+
+
+def _shapes(
+    files: Sequence[Path], progress: Callable[[str], None] | None
+) -> tuple[list[Shape], float]:
+    """Shapes of all pictures, and the milliseconds that one takes from mask to shock graph."""
+    if progress:
+        progress(f"{len(files)} silhouettes")
+    spent, shapes = [], []
+    for file in files:
+        mask = read_silhouette(file)
+        begin = time.perf_counter()
+        silhouette = normalise(mask)
+        if silhouette is None:
+            raise SettingsError("this picture shows no shape", where=str(file))
+        shapes.append(shape_of(silhouette))
+        spent.append(time.perf_counter() - begin)
+    return shapes, 1e3 * float(np.median(spent))
+
+
+def _similarities(
+    shapes: list[Shape], progress: Callable[[str], None] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Similarities of graphs of all pairs, what the second looks add, and milliseconds a pair."""
+    size = len(shapes)
+    graphs, looks = np.eye(size), np.eye(size)
+    begins = list(range(1, size, _ROWS))
+    seconds = 0.0
+    with ProcessPoolExecutor(
+        _PROCESSES, get_context("spawn"), initializer=_set_shapes, initargs=(shapes,)
+    ) as pool:
+        for done in pool.map(_compare_rows, begins):
+            seconds += done.seconds
+            for i, g, o in zip(done.rows, done.graphs, done.looks, strict=True):
+                graphs[i, :i] = graphs[:i, i] = g
+                looks[i, :i] = looks[:i, i] = o
+            if progress:
+                progress(f"{done.rows[-1] + 1} of {size} queries")
+    return graphs, looks, 1e3 * seconds / (size * (size - 1) / 2)
+
+
+class _Shared:
+    """What each process of the pool works on."""
+
+    shapes: list[Shape]
+    index: ViewIndex
+    areas: AreaIndex
+
+
+def _set_shapes(shapes: list[Shape]) -> None:
+    _Shared.shapes = shapes
+    _Shared.index = ViewIndex(shapes)
+    _Shared.areas = AreaIndex(np.stack([s.areas for s in shapes]))
+    for shape in shapes:
+        _ = shape.heights
+
+
+def _compare_rows(begin: int) -> _Rows:
+    start = time.perf_counter()
+    rows = list(range(begin, min(begin + _ROWS, len(_Shared.shapes))))
+    graphs = [_graph_row(i) for i in rows]
+    looks = [_looks_row(i) for i in rows]
+    return _Rows(rows, graphs, looks, time.perf_counter() - start)
+
+
+def _graph_row(i: int) -> NDArray[np.float64]:
+    """Similarities of one graph with all before it, each pair matched in its own order."""
+    query = _Shared.shapes[i].graph
+    _, similar = _Shared.index.bounds(query, np.arange(i))
+    out = np.empty(i)
+    for j in range(i):
+        other = _Shared.shapes[j].graph
+        if other.key < query.key:
+            out[j] = match_nodes(other, query, similar[j].T, WEIGHTS.root).similarity
+        else:
+            out[j] = match_nodes(query, other, similar[j], WEIGHTS.root).similarity
+    return out
+
+
+def _looks_row(i: int) -> NDArray[np.float64]:
+    """What outlines and areas give to the similarities of one shape with all before it."""
+    query = _Shared.shapes[i]
+    overlaps = _Shared.areas.overlaps(query.areas, np.arange(i))
+    return compare_outlines_and_areas(query, _Shared.shapes[:i], overlaps).worth
+
+
+def _pruning(
+    shapes: list[Shape], both: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """For each query the share of the others that the index lets through, and 1 where it loses the best."""
+    index = ViewIndex(shapes)
+    everyone = np.arange(len(shapes))
+    most = candidates_wanted(len(shapes) - 1)
+    compared, lost = np.zeros(len(shapes)), np.zeros(len(shapes))
+    for i, shape in enumerate(shapes):
+        others = everyone[everyone != i]
+        found = index.candidates(shape, others, most).numbers
+        compared[i] = len(found) / len(others)
+        lost[i] = float(others[int(np.argmax(both[i, others]))] not in found)
+    return compared, lost
+
+
+def _figures(
+    similarity: NDArray[np.float64], labels: NDArray[np.str_]
+) -> dict[str, dict[str, Any]]:
+    """Figures for each class, and for all under the empty name."""
+    hits, bullseye = np.zeros((len(labels), RANKS), dtype=int), np.zeros(len(labels))
+    for i, label in enumerate(labels):
+        order = np.argsort(-similarity[i], kind="stable")
+        size = int((labels == label).sum())
+        # The query itself is among its best matches; ties must not push it out.
+        others = order[order != i]
+        ranked = labels[others[:RANKS]] == label
+        hits[i, : len(ranked)] = ranked
+        best = np.concatenate([[i], others])[: 2 * size]
+        bullseye[i] = (labels[best] == label).sum() / size
+    groups = {
+        "": np.ones(len(labels), dtype=bool),
+        **{str(c): labels == c for c in np.unique(labels)},
+    }
+    return {name: _summary(hits[own], bullseye[own]) for name, own in groups.items()}
+
+
+def _summary(hits: NDArray[np.int_], bullseye: NDArray[np.float64]) -> dict[str, Any]:
+    ranks = [int(h) for h in hits.sum(axis=0)]
+    return {
+        "nn1": float(hits[:, 0].mean()),
+        "ranks": ranks,
+        "rank_sum": sum(ranks),
+        "bullseye": float(bullseye.mean()),
+    }

@@ -1,0 +1,189 @@
+"""Recognition of views: silhouettes from unseen directions against a database of views of all models.
+
+Figures as the data's README defines them (`visup eval views`). The direction of a view is held against
+all directions from which the true object looks the same (`symmetry.py`).
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import SettingsError
+from visup.evaluation.shape.descriptors import Descriptor, descriptors, nearest
+from visup.evaluation.shape.symmetry import angle_to, silhouette_symmetries
+from visup.evaluation.shape.view_queries import CONDITIONS, Query, draw_queries
+from visup.percepts.shape.building.build import build_database
+from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
+from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
+
+TOP = 5
+"""Different objects that are looked at for `top5`."""
+
+MESHES = (".ply", ".stl", ".obj", ".off", ".glb")
+"""Endings of the files that are read as meshes."""
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class _QueryResult:
+    """What came of one query in one condition."""
+
+    name: str
+    condition: str
+    rank: int | None
+    angle: float | None
+    seconds: float
+    compared: float
+
+
+def evaluate_views(
+    folder: Path,
+    *,
+    views: int = 32,
+    queries: int = 12,
+    seed: int = 0,
+    limit: int | None = None,
+    progress: Tell | None = None,
+) -> dict[str, Any]:
+    """Figures of recognising meshes from unseen directions.
+
+    Args:
+        folder: Folder of mesh files.
+        views: Views of each mesh in the database.
+        queries: Silhouettes of each mesh that are asked for.
+        seed: Of the queries' directions, rolls, sizes and damage.
+        limit: Meshes, for a quick look; all by default.
+        progress: Told a line now and then.
+
+    Returns:
+        {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
+        and `top5` (shares of queries whose object is the first of all, or among the five best) and
+        `angle_deg` (median angle between the best view of the right object and the true direction);
+        `ms_query` from mask to ranking, `compared` as a share of all views, `build_views_per_s`; under
+        `baseline`, `top1` of other descriptors on the same views and queries.
+
+    Raises:
+        SettingsError: There are no meshes, or a number is out of range.
+        ExtraMissingError: What renders meshes, or the baselines, are not installed.
+    """
+    if views < 1 or queries < 1:
+        raise SettingsError("views and queries are counted from 1", expected="at least 1 of each")
+    tell = progress or (lambda line: None)
+    meshes = _listed(folder, limit)
+    others = descriptors()
+    with tempfile.TemporaryDirectory() as scratch:
+        tell(f"views of {len(meshes)} meshes")
+        begin = time.perf_counter()
+        database = build_database(
+            Path(scratch) / "views.models", meshes, views=views, jobs=os.cpu_count() or 1
+        )
+        rate = len(meshes) * views / (time.perf_counter() - begin)
+        asked = list(_asked(meshes, queries, seed, tell))
+        answers = [a for query, alike in asked for a in _answers(database, query, alike)]
+        tell("other descriptors")
+        baseline = _baselines(others, meshes, views, [query for query, _ in asked])
+    items = {m.stem: _figures([a for a in answers if a.name == m.stem]) for m in meshes}
+    total = {**_figures(answers), "build_views_per_s": rate, "baseline": baseline}
+    return {"total": total, "items": items}
+
+
+def _listed(folder: Path, limit: int | None) -> list[Path]:
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in MESHES)[:limit]
+    if not found:
+        raise SettingsError(
+            "there are no meshes here",
+            where=str(folder),
+            expected=f"mesh files ({', '.join(MESHES)})",
+        )
+    return found
+
+
+def _asked(
+    meshes: Sequence[Path], queries: int, seed: int, tell: Tell
+) -> Iterator[tuple[Query, NDArray[np.float64]]]:
+    """All queries, each with the symmetries of its object."""
+    for path in meshes:
+        tell(f"{path.stem}: {queries} queries")
+        mesh = load_mesh(path)
+        alike = silhouette_symmetries(mesh)
+        for query in draw_queries(path.stem, mesh, queries, seed):
+            yield query, alike
+
+
+def _answers(
+    database: ModelDatabase, query: Query, alike: NDArray[np.float64]
+) -> Iterator[_QueryResult]:
+    """One query in all conditions."""
+    for condition in CONDITIONS:
+        mask, cut = query.masks[condition], condition in ("cut", "both")
+        begin = time.perf_counter()
+        ranking = database.query(mask, cut=cut, top=TOP, per_name=1)
+        seconds = time.perf_counter() - begin
+        names = [m.view.name for m in ranking.matches]
+        own = database.query(mask, cut=cut, top=1, restrict={query.name}).matches
+        yield _QueryResult(
+            query.name,
+            condition,
+            names.index(query.name) if query.name in names else None,
+            _angle(own, query, alike),
+            seconds,
+            ranking.compared / len(database.views),
+        )
+
+
+def _angle(own: Sequence[ViewMatch], query: Query, alike: NDArray[np.float64]) -> float | None:
+    if not own or own[0].direction is None:
+        return None
+    return angle_to(np.asarray(own[0].direction), query.direction, alike)
+
+
+def _figures(answers: Sequence[_QueryResult]) -> dict[str, Any]:
+    figures: dict[str, Any] = {}
+    for condition in CONDITIONS:
+        own = [a for a in answers if a.condition == condition]
+        angles = [a.angle for a in own if a.angle is not None]
+        figures[condition] = {
+            "top1": float(np.mean([a.rank == 0 for a in own])),
+            "top5": float(np.mean([a.rank is not None for a in own])),
+            "angle_deg": float(np.median(angles)) if angles else None,
+        }
+    figures["ms_query"] = 1e3 * float(np.median([a.seconds for a in answers]))
+    figures["compared"] = float(np.mean([a.compared for a in answers]))
+    return figures
+
+
+def _baselines(
+    others: dict[str, Descriptor], meshes: Sequence[Path], views: int, asked: Sequence[Query]
+) -> dict[str, dict[str, float]]:
+    """Share of queries whose nearest view, by each other descriptor, is of the right object."""
+    seen = [
+        (path.stem, v.mask)
+        for path in meshes
+        for v in render_views(load_mesh(path), half_sphere_directions(views))
+    ]
+    names = [name for name, _ in seen]
+    table: dict[str, dict[str, float]] = {}
+    for name, describe in others.items():
+        known = np.stack([describe(mask) for _, mask in seen])
+        table[name] = {
+            condition: float(
+                np.mean(
+                    [
+                        names[nearest(known, describe(q.masks[condition]))[0]] == q.name
+                        for q in asked
+                    ]
+                )
+            )
+            for condition in CONDITIONS
+        }
+    return table

@@ -1,0 +1,290 @@
+"""Percepts made from the truth of a mission, with the faults that real ones have.
+
+What reasons is measured on these apart from what sees: outlines are off by pixels, regions are missing
+now and then, alone and in runs, and of the names told of a region the first one is often wrong, again in
+runs. Truth goes nowhere else: the agent is given these percepts as it would be given others.
+
+Read next: `hypotheses.py` (what is reported of one region), then `reasoning/simulated_missions.py` (what is
+measured).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import (
+    Depth,
+    Directive,
+    Frame,
+    Health,
+    HealthStatus,
+    Hypothesis,
+    Observation,
+    Percept,
+    Region,
+)
+from visup.agent.contract.behaviour import Behaviour, Contract
+from visup.agent.execution.pipeline import ordered_slots, perceive
+from visup.evaluation.simulation.hypotheses import HypothesisSource
+from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, region_from_mask, shaken
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptNoise:
+    """How percepts differ from the truth.
+
+    Attributes:
+        seed: Of all chance.
+        contour_px: Standard deviation of an outline's place along its normal.
+        contour_length_px: Distance along the outline over which its error is alike.
+        contour_tau_s: How long the lasting half of that error lasts.
+        missing: Share of an object's frames without its region.
+        in_bursts: Share of these that come in runs; the others come alone.
+        burst_s: Mean length of such a run.
+        velocity: Standard deviation of each component of a region's velocity, pixels per second.
+        velocity_share: The same as a share of its speed, added.
+        velocity_tau_s: How long that error lasts.
+        wrong: Share of times at which the first name is wrong.
+        wrong_run_s: Mean length of a run of wrong names.
+        listed: How often the right name is among the others while the first one is wrong.
+        depth: Standard deviation of depth, as a share of it.
+        names_every_s: Least time between two times at which names are told.
+        least_px: An object of which less shows has no region.
+        fresh_id_s: After so long without a region, a tracker takes the next one for a new region.
+        merge_coupled: Whether the regions of coupled objects become one, as those of a camera do that
+            sees what moves alike as one.
+    """
+
+    seed: int = 0
+    contour_px: float = 2.0
+    contour_length_px: float = 15.0
+    contour_tau_s: float = 1.0
+    missing: float = 0.15
+    in_bursts: float = 0.5
+    burst_s: float = 0.2
+    velocity: float = 0.7
+    velocity_share: float = 0.1
+    velocity_tau_s: float = 0.2
+    wrong: float = 0.3
+    wrong_run_s: float = 0.4
+    listed: float = 0.7
+    depth: float = 0.03
+    names_every_s: float = 0.2
+    least_px: int = 150
+    fresh_id_s: float = 0.8
+    merge_coupled: bool = False
+
+
+class Dropouts:
+    """When an object's region is missing: alone, or in runs.
+
+    Args:
+        noise: How often.
+        dt: Seconds between frames.
+        rng: Source of chance.
+    """
+
+    def __init__(self, noise: PerceptNoise, dt: float, rng: np.random.Generator) -> None:
+        share = noise.missing * noise.in_bursts
+        self._end = min(1.0, dt / noise.burst_s)
+        self._begin = self._end * share / max(1.0 - share, 1e-9)
+        self._alone = (noise.missing - share) / max(1.0 - share, 1e-9)
+        self._rng = rng
+        self._within = rng.random() < share
+
+    def missing(self) -> bool:
+        """Whether it is missing in the next frame."""
+        chance = self._rng.random()
+        self._within = chance >= self._end if self._within else chance < self._begin
+        return self._within or self._rng.random() < self._alone
+
+
+@dataclass(slots=True)
+class _ObjectNoise:
+    """What is kept of one object, or of several that are one region."""
+
+    contour: ContourNoise
+    gaps: Dropouts
+    rng: np.random.Generator
+    number: int = 0
+    last: float = -1.0
+    off: tuple[float, float] = (0.0, 0.0)
+
+    def velocity(
+        self, true: tuple[float, float] | None, noise: PerceptNoise, dt: float
+    ) -> tuple[tuple[float, float], float]:
+        """A velocity that is not quite the true one, and its deviation; 0 when it is not known."""
+        keep = float(np.exp(-dt / noise.velocity_tau_s))
+        x, y = np.sqrt(1 - keep**2) * self.rng.standard_normal(2) + keep * np.array(self.off)
+        self.off = (float(x), float(y))
+        if true is None or noise.velocity <= 0.0:
+            return (0.0, 0.0), 0.0
+        sigma = float(noise.velocity + noise.velocity_share * np.hypot(*true))
+        return (true[0] + sigma * self.off[0], true[1] + sigma * self.off[1]), sigma
+
+
+@dataclass(slots=True)
+class SimulatedSegmenter:
+    """A behaviour that reports the regions of a mission.
+
+    Attributes:
+        mission: What is in view.
+        noise: How wrong it is seen.
+        who: Region id -> names of the true objects that it shows, filled as they are reported.
+    """
+
+    mission: Mission
+    noise: PerceptNoise = field(default_factory=PerceptNoise)
+    who: dict[int, tuple[str, ...]] = field(default_factory=dict, init=False)
+    contract: Contract = field(default=Contract("truth", gives=("region", "health")), init=False)
+    _seen: dict[str, _ObjectNoise] = field(default_factory=dict, init=False)
+    _coupled: tuple[tuple[float, frozenset[str]], ...] = field(default=(), init=False)
+
+    def __post_init__(self) -> None:
+        seeds = np.random.SeedSequence([self.noise.seed, 1]).spawn(
+            len(self.mission.truth["labels"])
+        )
+        n, dt = self.noise, 1.0 / self.mission.fps
+        for name, seed in zip(sorted(self.mission.truth["labels"]), seeds, strict=True):
+            rng = np.random.default_rng(seed)
+            contour = ContourNoise(
+                n.contour_px, n.contour_length_px, n.contour_tau_s, self.mission.size, rng
+            )
+            self._seen[name] = _ObjectNoise(contour, Dropouts(n, dt, rng), rng)
+        self._coupled = tuple(
+            (e["frame"] / self.mission.fps, frozenset(e["objects"]))
+            for e in self.mission.truth["events"]
+            if e["kind"] == "coupled"
+        )
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report one frame; see `Behaviour`."""
+        yield Percept("health", Health(HealthStatus.OK), frame.time, "truth")
+        for names, mask in self._groups(frame).items():
+            kept = self._seen[names[0]]
+            if int(np.count_nonzero(mask)) < self.noise.least_px or kept.gaps.missing():
+                continue
+            true = self.mission.masks[frame.index][names[0]].velocity
+            # Motion is what changed since the last frames: it is not known of what was not in them.
+            known = true if frame.time - kept.last < 0.1 else None
+            velocity, sigma = kept.velocity(known, self.noise, 1.0 / self.mission.fps)
+            number = self._number(names, frame.time)
+            region = region_from_mask(number, mask, velocity=velocity, velocity_sigma=sigma)
+            self.who[region.id] = names
+            yield Percept("region", region, frame.time, "truth", region.confidence)
+
+    def _groups(self, frame: Frame) -> dict[tuple[str, ...], NDArray[np.bool_]]:
+        """Whole-image masks; no pixel belongs to two, that which is farther inside has it."""
+        width, height = self.mission.size
+        deepest = np.zeros((height, width), np.float32)
+        owner = np.full((height, width), -1, np.int8)
+        names = list(self.mission.masks[frame.index])
+        for k, name in enumerate(names):
+            mask, kept = self.mission.masks[frame.index][name], self._seen[name]
+            (x, y), shape = mask.at, mask.inside.shape
+            depth = shaken(mask, kept.contour.at(frame.time, mask.at, (shape[0], shape[1])))
+            part = (slice(y, y + shape[0]), slice(x, x + shape[1]))
+            mine = depth > deepest[part]
+            deepest[part][mine] = depth[mine]
+            owner[part][mine] = k
+        return {
+            group: np.isin(owner, [names.index(n) for n in group])
+            for group in self._grouped(names, frame.time)
+        }
+
+    def _grouped(self, names: list[str], time: float) -> list[tuple[str, ...]]:
+        merged = [c for t, c in self._coupled if self.noise.merge_coupled and time >= t]
+        groups = {next((c for c in merged if n in c), frozenset({n})) for n in names}
+        return sorted(tuple(n for n in sorted(g) if n in names) for g in groups)
+
+    def _number(self, names: tuple[str, ...], time: float) -> int:
+        """The id that a tracker would give."""
+        kept = max((self._seen[n] for n in names), key=lambda s: (s.last, s.number))
+        fresh = not kept.number or time - kept.last > self.noise.fresh_id_s
+        number = max(s.number for s in self._seen.values()) + 1 if fresh else kept.number
+        for name in names:
+            self._seen[name].number, self._seen[name].last = number, time
+        return number
+
+
+@dataclass(slots=True)
+class SimulatedRecogniser:
+    """A behaviour that says of each region what it looks like, and how far it is.
+
+    Attributes:
+        seeing: What reports the regions.
+    """
+
+    seeing: SimulatedSegmenter
+    contract: Contract = field(init=False)
+    _namers: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        noise, mission = self.seeing.noise, self.seeing.mission
+        self.contract = Contract(
+            "truth_names", ("hypothesis", "depth"), ("region",), noise.names_every_s
+        )
+        seeds = np.random.SeedSequence([noise.seed, 2]).spawn(len(mission.truth["labels"]))
+        for name, seed in zip(sorted(mission.truth["labels"]), seeds, strict=True):
+            self._namers[name] = HypothesisSource(
+                mission,
+                name,
+                wrong=noise.wrong,
+                run=max(1.0, noise.wrong_run_s / noise.names_every_s),
+                listed=noise.listed,
+                depth=noise.depth,
+                rng=np.random.default_rng(seed),
+            )
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report one frame; see `Behaviour`."""
+        for region in observation.of("region"):
+            for value in self._said(region, frame.index):
+                kind = "hypothesis" if isinstance(value, Hypothesis) else "depth"
+                yield Percept(kind, value, frame.time, "truth_names")
+
+    def _said(self, region: Region, index: int) -> Iterator[Hypothesis | Depth]:
+        masks = self.seeing.mission.masks[index]
+        names = self.seeing.who[region.id]
+        # What two bodies look like together is taken for the larger one, or for anything else.
+        name = max(names, key=lambda n: masks[n].visible_px if n in masks else 0)
+        yield from self._namers[name].says(region, index, alone=len(names) == 1)
+
+
+def behaviours_of(
+    mission: Mission, noise: PerceptNoise
+) -> tuple[list[Behaviour], Mapping[int, tuple[str, ...]]]:
+    """What sees a mission's truth.
+
+    Returns:
+        The behaviours for an agent; and region id -> names of true objects, filled as it runs.
+    """
+    seeing = SimulatedSegmenter(mission, noise)
+    return [seeing, SimulatedRecogniser(seeing)], seeing.who
+
+
+def frames_of(mission: Mission, *, every: int = 1) -> Iterator[Frame]:
+    """Frames without a picture, for behaviours that see the truth."""
+    width, height = mission.size
+    blank = np.broadcast_to(np.zeros((1, 1, 1), np.uint8), (height, width, 3))
+    for row in mission.truth["frames"][::every]:
+        yield Frame(row["index"], row["index"] / mission.fps, blank)
+
+
+def observations_of(
+    mission: Mission, noise: PerceptNoise, *, every: int = 1
+) -> Iterator[tuple[Observation, dict[int, tuple[str, ...]]]]:
+    """What an agent would observe, each with the truth: region id -> names of true objects."""
+    behaviours, who = behaviours_of(mission, noise)
+    slots = ordered_slots(behaviours)
+    for frame in frames_of(mission, every=every):
+        seen = perceive(slots, frame, ())
+        yield seen, {r.id: who[r.id] for r in seen.of("region")}
