@@ -42,7 +42,7 @@ def _rule(contract: Contract) -> Rule:
         (rule,) = parse_rules(text, "awake")
     except (VisupError, ValueError) as fault:
         raise BehaviourError(
-            f"`awake` is no condition about an object `a`: {fault}",
+            f"`awake` is not a condition about an object `a`: {fault}",
             where=f"contract of '{contract.name}'",
             expected='a condition of the rule language, such as "expected(a)"',
             hint="see docs/rules.md; a choice of others is `exists b: ...`",

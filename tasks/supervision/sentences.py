@@ -38,13 +38,13 @@ def evidence(
             what = _say(monitor.contrary, actions)
             return (
                 f"{who} {have} been {what} since {monitor.contrary_since:.1f} s; "
-                f"`{step.stage}` requires {them} to be {meaning.text}"
+                f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.FAILING | Status.FAILED if monitor.fault is not None:
             was, what = ("was" if alone else "were"), _say(monitor.fault, actions)
             return (
                 f"{who} {was} {what} at {monitor.fault_since:.1f} s and {have} not recovered; "
-                f"`{step.stage}` requires {them} to be {meaning.text}"
+                f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.PROGRESSING if monitor.helped_since is not None:
             what = _say(monitor.helped_by or "", actions)

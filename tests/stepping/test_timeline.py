@@ -189,7 +189,7 @@ def test_an_answer_stays_when_going_back_over_it() -> None:
 def test_a_snapshot_belongs_to_its_course() -> None:
     it = plain_stepper()
     it.step(5)
-    with pytest.raises(SettingsError, match="another course"):
+    with pytest.raises(SettingsError, match="another timeline"):
         it.branch().restore(it.snapshot())
 
 
