@@ -15,7 +15,7 @@ from visup.tasks.supervision.open_transitions import OpenTransition
 from visup.tasks.supervision.sentences import outcome
 from visup.tasks.supervision.step_model import StepModel
 from visup.tasks.verification.observe import ActionObservation
-from visup.tasks.verification.step_monitor import BAD, StepMonitor, entered
+from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
 
@@ -162,7 +162,7 @@ class Advance:
         """A step that begins now, with what is seen of it at once."""
         if opened:
             leaf = replace(leaf, payload=replace(leaf.payload, opened=True))
-        return self.steps.looked_at(leaf, self.observe(leaf.step), self.now, 0.0, False)
+        return self.steps.looked_at(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
 
     def _past(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, under_way: set[str]

@@ -29,7 +29,7 @@ from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransitions
 from visup.tasks.supervision.step_model import StepModel
 from visup.tasks.verification.settings import TaskSettings
-from visup.tasks.verification.step_monitor import BAD
+from visup.tasks.verification.step_monitor import BAD, Moment
 
 LEAST = 1e-13  # a hypothesis with less of the mass is given up
 
@@ -214,10 +214,9 @@ class MonitoredPhases:
         finished = hypothesis.finished
         if finished is not None and now - finished > self.settings.regret_s:
             return hypothesis, 1.0
-        done = finished is not None
+        done, moment = finished is not None, Moment(now, dt)
         new = [
-            self.steps.looked_at(x, observe(x.step), now, dt, done)
-            for x in leaves(hypothesis.state)
+            self.steps.looked_at(x, observe(x.step), moment, done) for x in leaves(hypothesis.state)
         ]
         fit = math.prod(self.steps.fit(x, observe(x.step), done, dt) for x in new)
         lost = any(x.payload.status in BAD for x in new)

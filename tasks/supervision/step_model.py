@@ -13,7 +13,7 @@ from visup.tasks.automaton.derivatives import Leaf
 from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
 from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
-from visup.tasks.verification.step_monitor import BAD, StepMonitor, over, update
+from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class StepModel:
     hmm: StageHmm
 
     def looked_at(
-        self, leaf: Leaf[StepMonitor], seen: ActionObservation, now: float, dt: float, done: bool
+        self, leaf: Leaf[StepMonitor], seen: ActionObservation, moment: Moment, done: bool
     ) -> Leaf[StepMonitor]:
         """A step with what is seen of it in its monitor; `done` when the task is."""
         # A `within` no longer matters once the task is done.
         step = replace(leaf.step, deadlines=()) if done else leaf.step
         meaning = self.actions[step.action]
-        monitor = update(leaf.payload, step, meaning, seen, now, dt, self.settings)
+        monitor = update(leaf.payload, step, meaning, seen, moment, self.settings)
         return replace(leaf, payload=monitor)
 
     def fit(self, leaf: Leaf[StepMonitor], seen: ActionObservation, done: bool, dt: float) -> float:
