@@ -42,8 +42,8 @@ class Stepper(Timeline):
         agent: The agent, new or after any step; or a history of its steps, to go on with.
         frames: Frames for its behaviours; an `ObservationSource`, such as of a recorded run; or the
             timeline that this one branches off.
-        spacing: Steps between two minds that are kept; more of them is less to keep and longer to
-            go back.
+        spacing: Steps between two minds that are kept; more means less memory and longer ways
+            back.
         latest: How many steps are kept whole.
 
     Attributes:
@@ -257,7 +257,7 @@ class Stepper(Timeline):
         """
         parent = self.parent
         if parent is None:
-            raise SettingsError("this is no branch: there is nothing to compare it with")
+            raise SettingsError("this is not a branch: there is nothing to compare it with")
         while parent.made < self.at and parent._look_ahead():
             continue  # it was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at
@@ -295,12 +295,10 @@ class Stepper(Timeline):
         Raises:
             VisupError: Nothing is known of it.
         """
-        reasoners = self.agent.reasoners
-        every = (*reasoners.update, *reasoners.cogitate, *reasoners.match)
         made = self.at > self.begin
         before = self.mind_at(self.at - 1) if made else None
         seen = self.observation_at(self.at) if made else None
-        return asking.why_not(LastStep(self.mind, before, seen, every), text)
+        return asking.why_not(LastStep(self.mind, before, seen, tuple(self.agent.reasoners)), text)
 
     def close(self) -> None:
         """Let go of what the agent's behaviours have started."""
