@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.report.records import KeyFrame, ReportedObject, RunData, StateSpan
 
 VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {

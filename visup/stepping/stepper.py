@@ -295,12 +295,10 @@ class Stepper(Timeline):
         Raises:
             VisupError: Nothing is known of it.
         """
-        reasoners = self.agent.reasoners
-        every = (*reasoners.update, *reasoners.cogitate, *reasoners.match)
         made = self.at > self.begin
         before = self.mind_at(self.at - 1) if made else None
         seen = self.observation_at(self.at) if made else None
-        return asking.why_not(LastStep(self.mind, before, seen, every), text)
+        return asking.why_not(LastStep(self.mind, before, seen, tuple(self.agent.reasoners)), text)
 
     def close(self) -> None:
         """Let go of what the agent's behaviours have started."""

@@ -37,8 +37,8 @@ class Command:
 
 _WHERE = """\
 WHAT is one of
-  a phase            update, cogitate, match, act: stops inside the step after
-                     it, with the half-made mind to look at
+  a phase            update, cogitate, match, attend, act: stops inside the step
+                     after it, with the half-made mind to look at
   an event           alert, entry, coupled, stage_failing, ...
   a rule             collision_course: when it becomes true of anybody;
                      'rule NAME changes': whenever its verdict changes

@@ -10,7 +10,7 @@ from visup.agent import Mind, Presence, Truth
 from visup.agent.cycle.agent import Reasoners
 from visup.agent.cycle.answers import resolve_answer
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.rules.language.parser import load_rules
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.what_if import (
