@@ -23,7 +23,7 @@ from visup.rules.formula.nodes import (
     children,
 )
 from visup.rules.formula.terms import Measure, WindowFunction
-from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
+from visup.rules.formula.units import NOWHERE, SHARE, TIME, Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
 from visup.rules.language.dimensions import check_dimensions
 from visup.rules.language.transform import Fault
@@ -81,6 +81,7 @@ class TypeChecker:
 
     def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
         """A fault as an error with its line."""
+        span = Span(1, 1, 1, 2) if span == NOWHERE else span
         line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
         where = Place(self.file, span.line, span.column, line, span.length)
         return RuleError(what, where=where, expected=expected, hint=hint)

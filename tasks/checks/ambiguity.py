@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from visup.rules.formula.units import Span
 from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
@@ -22,7 +23,6 @@ from visup.tasks.grammar.nodes import (
     Reference,
     Repeated,
     Sequence,
-    Span,
     Task,
     Timed,
     Together,

@@ -133,7 +133,7 @@ class CourseCheck:
         one, other = self.actions.get(a.name), self.actions.get(b.name)
         if one is None or other is None:
             return False
-        return {str(x) for x in a.actors} == {str(x) for x in b.actors} and contradict(one, other)
+        return set(a.words) == set(b.words) and contradict(one, other)
 
     def invariants(self) -> Iterator[Diagnostic]:
         """Invariants that the task itself breaks."""
@@ -159,7 +159,7 @@ class CourseCheck:
         if not isinstance(said, Action) or not isinstance(fact, Action):
             return invariant.when == "never" and str(said) == str(fact)
         if invariant.when == "never":
-            return (fact.name, {*fact.actors}) == (said.name, {*said.actors})
+            return (fact.name, {*fact.words}) == (said.name, {*said.words})
         return self.contradict(said, fact)
 
     def conditions(self) -> Iterator[Diagnostic]:

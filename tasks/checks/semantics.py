@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
+from visup.rules.formula.units import Span
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.courses import CourseCheck
@@ -20,7 +21,7 @@ from visup.tasks.checks.names import NameCheck
 from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, closest, did_you_mean
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
-from visup.tasks.grammar.conditions import action_of, facts_of
+from visup.tasks.grammar.conditions import action_of, actors_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
@@ -29,7 +30,6 @@ from visup.tasks.grammar.nodes import (
     Course,
     Name,
     Reference,
-    Span,
     Stage,
     walk,
 )
@@ -87,8 +87,7 @@ class _Semantics:
         signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
         facts += [f for c in conditions for f in facts_of(c)]
-        actions = map(action_of, facts)
-        asked = [(a.name, a.actors, a.span) for a in actions]
+        asked = [(action_of(f).name, actors_of(f), action_of(f).span) for f in facts]
         asked += [
             (s.name, s.body.names, s.span)
             for s in task.stages

@@ -7,7 +7,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 from visup.agent.model.errors import Place, TaskError
-from visup.tasks.grammar.nodes import Span
+from visup.rules.formula.units import Span
 
 CODES = {
     "E101": "text that is not part of the language",

@@ -188,7 +188,7 @@ BAD = [
     (wrap("touching(a, b)", say="near"), "'near' does not belong", "double quotes", 3, 9),
     ("rule r(a): info\n    when seen(a)\n", "ends too early", "'say'", 2, 17),
     (wrap("gap(a, b) + 3 s < 3 px"), "a length is added to a time", "a length: px", 2, 10),
-    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "a time is compared with a length", "a time: s", 2, 10),
+    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "a time is compared with a length", "a time: ms, s, min", 2, 10),
     (wrap("gap(a, b) + 3 px"), "is a quantity, neither true nor false", "compare it", 2, 10),
     (wrap("touching(a, b) + 3 px < 5 px"), "no quantity 'touching'", "true or false", 2, 10),
     (wrap("(seen(a) and seen(b)) < 5 px"), "is true or false, and no quantity", "a quantity", 2, 11),
@@ -299,3 +299,16 @@ def test_a_rule_in_python_is_checked_as_one_of_a_file_is() -> None:
 
 def test_every_relation_is_a_word() -> None:
     assert set(RELATION_NAMES) <= set(PREDICATES)
+
+
+def test_both_languages_know_the_same_units_and_print_numbers_alike() -> None:
+    from visup.tasks.grammar.conditions import bound_of
+    from visup.tasks.grammar.parser import read
+
+    for unit in ("ms", "s", "min", "h"):
+        formula = parse_formula(f"x() > 1 for 2 {unit}", signals("x"))
+        assert str(formula) == f"x() > 1 for 2 {unit}"
+        assert UNITS[unit] == (Number(1.0, unit).dimension, Number(1.0, unit).base)
+    body = read("<t> ::= gap(a, b) < 2.5 px").stages[0].body
+    assert isinstance(body, Comparison)
+    assert bound_of(body) == Number(2.5, Unit.PX)
