@@ -188,7 +188,7 @@ BAD = [
     (wrap("touching(a, b)", say="near"), "'near' does not belong", "double quotes", 3, 9),
     ("rule r(a): info\n    when seen(a)\n", "ends too early", "'say'", 2, 17),
     (wrap("gap(a, b) + 3 s < 3 px"), "a length is added to a time", "a length: px", 2, 10),
-    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "a time is compared with a length", "ms, s, min, h", 2, 10),
+    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "time is compared with a length", "s, min, h", 2, 10),
     (wrap("gap(a, b) + 3 px"), "is a quantity, neither true nor false", "compare it", 2, 10),
     (wrap("touching(a, b) + 3 px < 5 px"), "no quantity 'touching'", "true or false", 2, 10),
     (wrap("(seen(a) and seen(b)) < 5 px"), "is true or false, and no quantity", "a quantity", 2, 11),
