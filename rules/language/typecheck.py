@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from difflib import get_close_matches
 
-from visup.agent.model.errors import Place, RuleError
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,
@@ -23,8 +22,9 @@ from visup.rules.formula.nodes import (
     children,
 )
 from visup.rules.formula.terms import Measure, WindowFunction
-from visup.rules.formula.units import NOWHERE, SHARE, TIME, Number, Span, Unit
+from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.dimensions import check_dimensions
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.snapshot import RELATION_NAMES
@@ -75,18 +75,14 @@ class TypeChecker:
     """
 
     def __init__(self, text: str, file: str, vocabulary: Vocabulary = RULES) -> None:
-        self.lines = text.splitlines() or [""]
-        self.file = file
+        self.source = Source(text, file)
         self.vocabulary = vocabulary
 
-    def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
-        """A fault as an error with its line."""
-        span = Span(1, 1, 1, 2) if span == NOWHERE else span
-        line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
-        where = Place(self.file, span.line, span.column, line, span.length)
-        return RuleError(what, where=where, expected=expected, hint=hint)
+    def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> Diagnostic:
+        """An error at the place of a node."""
+        return self.source.fault("", what, span, expected, hint)
 
-    def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:
+    def twice(self, rules: Iterable[Rule]) -> Iterator[Diagnostic]:
         """Rules that bear one name."""
         names: set[str] = set()
         for rule in rules:
@@ -95,12 +91,12 @@ class TypeChecker:
                 yield self.fault(rule.span, what, None, "rename one of them")
             names.add(rule.name)
 
-    def formula(self, formula: Formula) -> Iterator[RuleError]:
+    def formula(self, formula: Formula) -> Iterator[Diagnostic]:
         """The faults of a formula that stands by itself."""
         for fault in _FormulaChecker(self.vocabulary, ()).node(formula):
             yield self.fault(*fault)
 
-    def rule(self, rule: Rule) -> Iterator[RuleError]:
+    def rule(self, rule: Rule) -> Iterator[Diagnostic]:
         """The faults of one rule."""
         reader = _FormulaChecker(self.vocabulary, rule.variables)
         found = [f for formula in rule.formulas for f in reader.node(formula)]
@@ -198,7 +194,7 @@ class _FormulaChecker:
         table = words if fact else quantities
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
-            hint = _close(call.name, table)
+            hint = did_you_mean(call.name, table)
             if call.name in (quantities if fact else words):
                 hint = "compare it with a number" if fact else "it is true or false"
             yield call.span, f"there is no {kind} '{call.name}'", _listed(table), hint
@@ -222,7 +218,7 @@ class _FormulaChecker:
         }.get(wanted, (word,))
         if word not in known:
             what = f"'{word}' is no {'variable of the rule' if wanted == 'object' else wanted}"
-            yield call.span, what, _listed(known), _close(word, known)
+            yield call.span, what, _listed(known), did_you_mean(word, known)
         elif wanted != "object" and word in self.scope:
             what = f"'{word}' is a variable of the rule, and '{call.name}' wants a {wanted}"
             yield call.span, what, None, "rename the variable"
@@ -257,11 +253,6 @@ def _often(node: MOfN) -> Iterator[Fault]:
     yield from _time(of, "of")
     if least.dimension != SHARE or not 0 < least.base <= 1:
         yield least.span, f"'{least}' is no share of a time", "such as 60 %", None
-
-
-def _close(word: str, known: Iterable[str]) -> str | None:
-    close = get_close_matches(word, list(known), 1, 0.6)
-    return f"did you mean '{close[0]}'?" if close else None
 
 
 def _listed(words: Iterable[str]) -> str:

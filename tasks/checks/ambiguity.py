@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from visup.rules.formula.units import Span
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
 from visup.tasks.grammar.graphs import dependencies_first

@@ -7,8 +7,8 @@ from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
 
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition, contradict
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
 from visup.tasks.grammar.graphs import reachable

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isinf
 
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import Comparison
 from visup.rules.formula.units import Number, Span
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, did_you_mean
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.conditions import Amount, Name, ParameterRef, action_of, bound_of, facts_of
 from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
@@ -96,7 +97,7 @@ class NameCheck:
                 yield from self.amount(amount, wanted)
             elif amount.name not in known:
                 if not self.parsed.lacking and amount.name not in self.parsed.defined:
-                    hint = did_you_mean(amount.name, known) if len(known) < MANY else None
+                    hint = did_you_mean(amount.name, known, "`{}`") if len(known) < MANY else None
                     what = f"parameter `{amount}` is not declared"
                     expected = f"`parameter {amount} is 90 s`"
                     yield self.source.fault("E223", what, amount.span, expected, hint)
@@ -161,7 +162,7 @@ class NameCheck:
                 known = said in zones or said in self.parsed.defined or self.parsed.lacking
                 if kind == "zone" and not known:
                     what = f"`{name}` speaks of a zone, and `{said}` is none"
-                    hint = did_you_mean(said, zones)
+                    hint = did_you_mean(said, zones, "`{}`")
                     yield self.source.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
                 elif kind == "object" and said in zones:
                     what = f"`{said}` is a zone, and `{name}` speaks of an actor here"

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
+from visup.agent.model.suggestions import closest, did_you_mean
 from visup.rules.formula.units import Span
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.courses import CourseCheck
 from visup.tasks.checks.names import NameCheck
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, closest, did_you_mean
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import action_of, actors_of, facts_of
@@ -300,7 +301,7 @@ class _Semantics:
                 continue  # an included file may offer more than is used
             if not any(_slip(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
-                hint = did_you_mean(actor.name, named)
+                hint = did_you_mean(actor.name, named, "`{}`")
                 yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.diagnostics.course_error_patterns import (
     action_in_angles,
     any_order,
@@ -26,7 +27,6 @@ from visup.tasks.diagnostics.course_error_patterns import (
     signs,
     times,
 )
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.statement import (
     NAME,
     RESERVED_WORDS,

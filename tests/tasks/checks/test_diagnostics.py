@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 
 from tests.paths import ROOT
 from visup.agent.model.errors import ManyErrors, Place, TaskError
+from visup.agent.model.suggestions import closest
 from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
+from visup.rules.language.diagnostics import Diagnostic
 from visup.tasks import load_task, parse_task, shipped_tasks
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.load import read_text
-from visup.tasks.diagnostics.diagnostic import CODES, Diagnostic, closest
+from visup.tasks.diagnostics.codes import CODES
 from visup.tasks.grammar.structure import stage_names, task_actors
 
 HERE = ROOT / "tests/tasks"

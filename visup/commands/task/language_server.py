@@ -12,9 +12,9 @@ from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 from visup.agent.model.errors import Place, VisupError
 from visup.commands.task.task import laid_out
 from visup.rules.formula.units import Span
+from visup.rules.language.diagnostics import Diagnostic
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
-from visup.tasks.diagnostics.diagnostic import Diagnostic
 from visup.tasks.diagnostics.explain import explain
 from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at, references
 from visup.version import __version__

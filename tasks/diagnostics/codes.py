@@ -1,13 +1,6 @@
-"""Faults of task files: each has a stable code, a place, and a word on how to mend it."""
+"""The stable codes of errors in task files."""
 
 from __future__ import annotations
-
-from collections.abc import Iterable
-from dataclasses import replace
-from difflib import get_close_matches
-
-from visup.agent.model.errors import Place, TaskError
-from visup.rules.formula.units import Span
 
 CODES = {
     "E101": "text that is not part of the language",
@@ -82,90 +75,3 @@ CODES = {
     "E235": "a sign said twice",
 }
 """Every code with what it stands for; a code never changes its meaning."""
-
-
-class Diagnostic(TaskError):
-    """A mistake in a task file.
-
-    Args:
-        code: One of `CODES`.
-        message: What is wrong, one clause.
-        where: Its place in the file.
-        expected: What was expected instead.
-        hint: How to mend it.
-    """
-
-    def __init__(
-        self,
-        code: str,
-        message: str,
-        where: Place,
-        *,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
-        super().__init__(f"[{code}] {message}", where=where, expected=expected, hint=hint)
-        self.code = code
-        self.message = message
-        self.place = where
-
-
-class Source:
-    """The lines of a file, to find the places of faults.
-
-    Args:
-        text: The whole text, as the user wrote it.
-        file: Its name, for messages.
-
-    Attributes:
-        included: The files that it includes, by name.
-    """
-
-    def __init__(self, text: str, file: str) -> None:
-        self.file = file
-        self.included: dict[str, Source] = {}
-        self._lines = text.split("\n")
-
-    def place(self, line: int, column: int, length: int = 1) -> Place:
-        """The place at a line and column, counted from 1; past the end it is the end."""
-        if line > len(self._lines) or line < 1:
-            line = len(self._lines)
-            column = len(self._line(line)) + 1
-        text = self._line(line)
-        column = max(1, min(column, len(text) + 1))
-        return Place(self.file, line, column, text, max(1, min(length, len(text) - column + 1)))
-
-    def at(self, span: Span) -> Place:
-        """The place of a node; of a node over several lines, its part of the first."""
-        if span.file:
-            return self.included[span.file].at(replace(span, file=""))
-        one_line = span.end_line == span.line
-        length = span.end_column - span.column if one_line else 10_000
-        return self.place(span.line, span.column, length)
-
-    def fault(
-        self,
-        code: str,
-        what: str,
-        span: Span,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> Diagnostic:
-        """A fault at the place of a node."""
-        return Diagnostic(code, what, self.at(span), expected=expected, hint=hint)
-
-    def _line(self, line: int) -> str:
-        return self._lines[line - 1].rstrip("\r")
-
-
-def did_you_mean(word: str, known: Iterable[str], form: str = "`{}`") -> str | None:
-    """The hint that names the nearest known word, or None when none is near."""
-    near = closest(word, known)
-    return f"did you mean {form.format(near)}?" if near else None
-
-
-def closest(word: str, known: Iterable[str]) -> str | None:
-    """The known word nearest to one, or None."""
-    by_folded = {k.casefold(): k for k in known}
-    near = get_close_matches(word.casefold(), by_folded, n=1, cutoff=0.6)
-    return by_folded[near[0]] if near else None
