@@ -12,7 +12,7 @@ from typing import cast
 
 from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 
-from visup.agent.model.errors import ManyErrors, Place, RuleError, VisupError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
@@ -110,7 +110,7 @@ def raise_all(errors: Sequence[VisupError]) -> None:
     if len(errors) == 1:
         raise errors[0]
     if errors:
-        raise ManyErrors(sorted(errors, key=_place))
+        raise ErrorGroup(sorted(errors, key=_place))
 
 
 def load_rules(path: str | Path) -> tuple[Rule, ...]:
@@ -162,7 +162,7 @@ def _blocks(text: str) -> list[str]:
 
 def _place(error: VisupError) -> tuple[int, int]:
     where = error.where
-    return (where.line, where.column) if isinstance(where, Place) else (0, 0)
+    return (where.line, where.column) if isinstance(where, SourceLocation) else (0, 0)
 
 
 def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
@@ -179,7 +179,7 @@ def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
         line, column = _end_before(lines, line)
     wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
     wanted = wanted or getattr(fault, "allowed", set()) or set()
-    where = Place(file, line, column, lines[line - 1], max(1, len(found)))
+    where = SourceLocation(file, line, column, lines[line - 1], max(1, len(found)))
     what = f"'{found}' does not belong here" if found else "the rule ends too early"
     return RuleError(what, where=where, expected=_expected(wanted), hint=_slip(found, wanted))
 

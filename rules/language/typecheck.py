@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 
-from visup.agent.model.errors import Place, RuleError
+from visup.agent.model.errors import RuleError, SourceLocation
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,
@@ -83,7 +83,7 @@ class TypeChecker:
         """A fault as an error with its line."""
         span = Span(1, 1, 1, 2) if span == NOWHERE else span
         line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
-        where = Place(self.file, span.line, span.column, line, span.length)
+        where = SourceLocation(self.file, span.line, span.column, line, span.length)
         return RuleError(what, where=where, expected=expected, hint=hint)
 
     def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AnySet
 
-from visup.agent.model.errors import ManyErrors, TaskError, VisupError
+from visup.agent.model.errors import ErrorGroup, TaskError, VisupError
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.files import read_beside
 from visup.tasks.checks.semantics import check_semantics
@@ -68,4 +68,4 @@ def raise_all(faults: Sequence[TaskError]) -> None:
         raise faults[0]
     if faults:
         many: list[VisupError] = list(faults)
-        raise ManyErrors(many)
+        raise ErrorGroup(many)

@@ -26,14 +26,14 @@ EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
     """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
-    from visup.agent.model.errors import ManyErrors, VisupError
+    from visup.agent.model.errors import ErrorGroup, VisupError
     from visup.rules.language.parser import load_rules, raise_all
 
     faults: list[VisupError] = []
     for file in files:
         try:
             found = load_rules(file)
-        except ManyErrors as errors:
+        except ErrorGroup as errors:
             faults += errors.errors
         except VisupError as error:
             faults.append(error)

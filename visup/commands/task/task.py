@@ -29,7 +29,7 @@ Without = Annotated[
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
     """Tell every mistake of some task files; exit code 2 when there is any."""
-    from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+    from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
     from visup.tasks.actions.actions import ALL_PERCEPTS
     from visup.tasks.checks.diagnose import diagnose
     from visup.tasks.checks.files import read_text
@@ -55,7 +55,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     if len(told) == 1:
         raise told[0]
     if told:
-        raise ManyErrors(told)
+        raise ErrorGroup(told)
 
 
 @app.command("format")
@@ -196,11 +196,11 @@ def laid_out(text: str, file: str) -> str:
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:
-    from visup.agent.model.errors import Place
+    from visup.agent.model.errors import SourceLocation
 
     where = error.where
     place: dict[str, Any] = {"file": str(where) if where else None}
-    if isinstance(where, Place):
+    if isinstance(where, SourceLocation):
         place = {
             "file": where.file,
             "line": where.line,
