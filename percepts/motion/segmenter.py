@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from visup.agent import Directive, Frame, Region
-from visup.agent.storage.checkpoint import held
+from visup.agent.contract.saving import saved_attributes
 from visup.percepts.motion.features.motion_constraints import (
     Constraints,
     Points,
@@ -104,7 +104,7 @@ class MotionSegmenter:
 
     def save(self) -> dict[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return held(self, "settings", "trace", "_beside", "_engine")
+        return saved_attributes(self, "settings", "trace", "_beside", "_engine")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a segmenter of the same settings remembered."""

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Concern, Contract, Directive, Mind, Observation, Outcome, Severity
+from visup.agent import AlertCondition, Contract, Directive, Mind, Observation, Outcome, Severity
 from visup.agent.model.errors import BehaviourError, VisupError
 from visup.agent.model.records import WAKE
 from visup.rules.formula.nodes import Rule, calls
@@ -89,10 +89,10 @@ class ActivationReasoner:
         own = mind.remember(SAFETY, mind.memory.get(ACTIVATION, RuleMemory()))
         asked = self._reasoner(own, observation)
         mind = mind.remember(ACTIVATION, asked.mind.memory[SAFETY])
-        return Outcome(mind, directives=tuple(_directives(mind, asked.concerns)))
+        return Outcome(mind, directives=tuple(_directives(mind, asked.conditions)))
 
 
-def _directives(mind: Mind, concerns: Sequence[Concern]) -> Iterator[Directive]:
+def _directives(mind: Mind, concerns: Sequence[AlertCondition]) -> Iterator[Directive]:
     for concern in concerns:
         (number,) = concern.objects
         region = mind.objects[number].region.id

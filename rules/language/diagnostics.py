@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from visup.agent.model.errors import ManyErrors, Place, VisupError
+from visup.agent.model.errors import ErrorGroup, SourceLocation, VisupError
 from visup.rules.formula.units import NOWHERE, Span
 
 
@@ -23,14 +23,16 @@ class Diagnostic:
 
     code: str
     message: str
-    place: Place
+    place: SourceLocation
     expected: str | None = None
     hint: str | None = None
 
     def error(self, kind: type[VisupError]) -> VisupError:
         """The exception that tells of it."""
         what = f"[{self.code}] {self.message}" if self.code else self.message
-        return kind(what, where=self.place, expected=self.expected, hint=self.hint)
+        error = kind(what, where=self.place, expected=self.expected, hint=self.hint)
+        error.code = self.code or None
+        return error
 
     def __str__(self) -> str:
         """The message with the line and a caret under the error."""
@@ -38,17 +40,21 @@ class Diagnostic:
 
 
 def raise_all(diagnostics: Sequence[Diagnostic], kind: type[VisupError]) -> None:
-    """Raise some diagnostics, if there are any.
+    """Raise some diagnostics, if there are any; see `raise_errors`."""
+    raise_errors([d.error(kind) for d in diagnostics])
+
+
+def raise_errors(errors: Sequence[VisupError]) -> None:
+    """Raise some errors, if there are any.
 
     Raises:
-        VisupError: The error, of that kind, when there is one.
-        ManyErrors: All of them, when there are several.
+        VisupError: The error, when there is one.
+        ErrorGroup: All of them, when there are several.
     """
-    errors = [d.error(kind) for d in diagnostics]
     if len(errors) == 1:
         raise errors[0]
     if errors:
-        raise ManyErrors(errors)
+        raise ErrorGroup(list(errors))
 
 
 class Source:
@@ -67,16 +73,18 @@ class Source:
         self.included: dict[str, Source] = {}
         self._lines = text.split("\n")
 
-    def place(self, line: int, column: int, length: int = 1) -> Place:
+    def place(self, line: int, column: int, length: int = 1) -> SourceLocation:
         """The place at a line and column, counted from 1; past the end it is the end."""
         if line > len(self._lines) or line < 1:
             line = len(self._lines)
             column = len(self._line(line)) + 1
         text = self._line(line)
         column = max(1, min(column, len(text) + 1))
-        return Place(self.file, line, column, text, max(1, min(length, len(text) - column + 1)))
+        return SourceLocation(
+            self.file, line, column, text, max(1, min(length, len(text) - column + 1))
+        )
 
-    def at(self, span: Span) -> Place:
+    def at(self, span: Span) -> SourceLocation:
         """The place of a node; of a node over several lines, its part of the first."""
         if span == NOWHERE:
             return self.place(1, 1)

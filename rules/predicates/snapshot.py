@@ -89,7 +89,7 @@ class Snapshot:
 
     def relations(self, names: tuple[str, ...]) -> Codes:
         """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
-        tables = self.mind.truths_of(names, self.ids)
+        tables = self.mind.truth_tables(names, self.ids)
         # An object is equal to itself, and nothing else.
         n = len(self.ids)
         tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)

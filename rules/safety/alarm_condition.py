@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from types import MappingProxyType
 
-from visup.agent import Concern, Truth
+from visup.agent import AlertCondition, Truth
 from visup.rules.formula.nodes import Rule
 from visup.rules.safety.compiled_rules import AlarmKey
 from visup.rules.safety.explain import evidence
@@ -28,7 +28,7 @@ class ActiveCondition:
         told: Seconds when its evidence was told.
     """
 
-    concern: Concern
+    concern: AlertCondition
     until: float
     told: float
 
@@ -104,21 +104,21 @@ def _oldest(
     return oldest[:MAX_UPDATED]
 
 
-def _raised(hit: int, values: Evaluation) -> Concern:
+def _raised(hit: int, values: Evaluation) -> AlertCondition:
     """One concern for each set of objects, in the order in which it is true of them."""
     rule, ids = values.prepared.choice(hit, values.facts.ids)
     words = with_names(rule.say, rule.variables)
     cause = sentence(values.facts.mind, words, *ids, confidence=confidence(rule, ids, values))
-    return Concern(rule.name, ids, rule.severity, cause, evidence(rule, ids, values))
+    return AlertCondition(rule.name, ids, rule.severity, cause, evidence(rule, ids, values))
 
 
-def _retold(concern: Concern, hit: int, values: Evaluation) -> Concern:
+def _retold(concern: AlertCondition, hit: int, values: Evaluation) -> AlertCondition:
     """The same with evidence of now; the cause keeps its first wording, as that of its alert does."""
     rule, ids = values.prepared.choice(hit, values.facts.ids)
     told = evidence(rule, ids, values)
     if told == concern.evidence:
         return concern
-    return Concern(concern.kind, concern.objects, concern.severity, concern.cause, told)
+    return AlertCondition(concern.kind, concern.objects, concern.severity, concern.cause, told)
 
 
 def confidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> float:

@@ -19,7 +19,7 @@ from math import isinf
 from typing import Any, cast
 
 from visup.agent import Mind, Truth
-from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
 from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
@@ -159,10 +159,10 @@ def expression(text: str) -> Expression:
     written, variables = _with_variables(text)
     try:
         return Expression(text, _rule(written, variables), False)
-    except (RuleError, ManyErrors) as fault:
+    except (RuleError, ErrorGroup) as fault:
         try:
             rule = _rule(f"({written}) >= ({written})", variables)
-        except (RuleError, ManyErrors):
+        except (RuleError, ErrorGroup):
             raise fault from None
         return Expression(text, rule, True)
 
@@ -193,7 +193,7 @@ def _rule(text: str, variables: tuple[str, ...]) -> Rule:
     try:
         (rule,) = parse_rules(lines, "<expression>")
     except RuleError as fault:
-        if isinstance(fault.where, Place) and fault.where.line > text.count("\n") + 2:
+        if isinstance(fault.where, SourceLocation) and fault.where.line > text.count("\n") + 2:
             # It was the wrapping that did not fit: the user wrote too little.
             raise RuleError(f"'{text}' ends too early", expected=fault.expected) from None
         raise

@@ -70,7 +70,7 @@ class RuleReasoner:
         if not same or (old.now is not None and now < old.now):
             old = RuleMemory(self.rules)
         if old.now is not None and now - old.now < MIN_SPACING:
-            return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
+            return Outcome(mind, conditions=tuple(h.concern for h in old.held.values()))
         prepared, facts = self._prepared, Snapshot(mind)
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
@@ -91,7 +91,7 @@ class RuleReasoner:
                 cooling,
             ),
         )
-        return Outcome(mind, concerns=tuple([h.concern for h in held.values()]))
+        return Outcome(mind, conditions=tuple([h.concern for h in held.values()]))
 
 
 def rule_memory(mind: Mind) -> RuleMemory:

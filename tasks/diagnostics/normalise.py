@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from visup.agent.model.errors import Place
+from visup.agent.model.errors import SourceLocation
 from visup.rules.language.diagnostics import Diagnostic, Source
 
 COMMENT = re.compile(r"#.*")
@@ -104,7 +104,7 @@ def _meant(char: str) -> str:
     return LOOKALIKES.get(char, " ")
 
 
-def _odd_fault(code: str, char: str, place: Place) -> Diagnostic:
+def _odd_fault(code: str, char: str, place: SourceLocation) -> Diagnostic:
     if code == "E106":
         return Diagnostic(code, "a tab", place, expected="spaces", hint="use spaces")
     if code == "E104":

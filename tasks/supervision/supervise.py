@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from visup.agent import (
+    AlertCondition,
     Binding,
-    Concern,
     Event,
     Mind,
     Observation,
@@ -239,7 +239,7 @@ def _events(
     yield from invariant_events(tracker, memory, new, mind)
 
 
-def _concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[Concern]:
+def _concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[AlertCondition]:
     yield from stage_concerns(memory.belief)
     yield from invariant_concerns(tracker, memory)
 

@@ -26,14 +26,15 @@ EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
     """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
-    from visup.agent.model.errors import ManyErrors, VisupError
-    from visup.rules.language.parser import load_rules, raise_all
+    from visup.agent.model.errors import ErrorGroup, VisupError
+    from visup.rules.language.diagnostics import raise_errors
+    from visup.rules.language.parser import load_rules
 
     faults: list[VisupError] = []
     for file in files:
         try:
             found = load_rules(file)
-        except ManyErrors as errors:
+        except ErrorGroup as errors:
             faults += errors.errors
         except VisupError as error:
             faults.append(error)
@@ -41,7 +42,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
             typer.echo(f"{file}: ok")
             for rule in found:
                 typer.echo(f"  {rule.name}: {_cost(rule)}")
-    raise_all(faults)
+    raise_errors(faults)
 
 
 @app.command("list")

@@ -51,7 +51,7 @@ def test_the_campaign_sees_what_is_taken_for_known(
 
     class Careless(Agent):
         def __post_init__(self) -> None:
-            def forget(mind: Mind, seen: Observation) -> object:
+            def forget(mind: Mind, observation: Observation) -> object:
                 from visup.agent import Outcome
 
                 return Outcome(replace(mind, unknown=frozenset()))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.oracles.rule_formulas import random_formula
 from visup.agent import Severity
-from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
 from visup.rules.formula.nodes import (
     ZERO,
     And,
@@ -157,7 +157,7 @@ def _sound(formula: Formula) -> bool:
     """Whether its units fit: rates do not compare with plain numbers."""
     try:
         parse_formula(str(formula), signals("x", "y"))
-    except (RuleError, ManyErrors):
+    except (RuleError, ErrorGroup):
         return False
     return True
 
@@ -222,7 +222,7 @@ def test_a_mistake_is_told_with_its_place(
     message = str(caught.value)
     assert what in message
     assert more in message
-    assert isinstance(caught.value.where, Place)
+    assert isinstance(caught.value.where, SourceLocation)
     assert (caught.value.where.line, caught.value.where.column) == (line, column)
     assert "^" in message
 
@@ -230,9 +230,9 @@ def test_a_mistake_is_told_with_its_place(
 def test_all_mistakes_of_a_file_are_told_at_once_in_the_order_of_the_text() -> None:
     text = wrap("convergin(a, b)") + wrap("touching(a, b") + wrap("gap(a, b) < 1 s")
     text = text.replace("rule r(", "rule q(", 1)
-    with pytest.raises(ManyErrors) as caught:
+    with pytest.raises(ErrorGroup) as caught:
         parse_rules(text, "my.rules")
-    lines = [e.where.line for e in caught.value.errors if isinstance(e.where, Place)]
+    lines = [e.where.line for e in caught.value.errors if isinstance(e.where, SourceLocation)]
     assert lines == [2, 6, 8]
 
 

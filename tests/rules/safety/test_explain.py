@@ -93,7 +93,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
                 new = new.remember(SAFETY, mind.memory[SAFETY])
             outcome = reasoner(new, NOTHING)
             mind = outcome.mind
-            told.append(outcome.concerns)
+            told.append(outcome.conditions)
         return told
 
     kept: list[Mind] = []
@@ -123,7 +123,7 @@ def test_what_was_never_judged_cannot_be_explained() -> None:
 
 def concerns(text: str, mind: Mind) -> set[tuple[str, tuple[int, ...]]]:
     outcome = RuleReasoner(parse_rules(text))(mind, NOTHING)
-    return {(c.kind, c.objects) for c in outcome.concerns}
+    return {(c.kind, c.objects) for c in outcome.conditions}
 
 
 MIND = Mind(time=1.0, frame_size=(640, 480)).with_objects(
@@ -175,7 +175,7 @@ def test_cooldown_keeps_a_rule_quiet_after_its_concern_was_over() -> None:
         mind = replace(mind, time=k * 0.1).with_objects(believed(1, name))
         outcome = reasoner(mind, NOTHING)
         mind = outcome.mind
-        told += [k] if outcome.concerns else []
+        told += [k] if outcome.conditions else []
     assert told == [2, 15]
 
 
@@ -212,12 +212,19 @@ def test_a_zone_that_is_not_drawn_is_unknown() -> None:
 def spinning(rate: float, sigma: float, expectations: tuple[Expectation, ...] = ()) -> set[str]:
     reasoner, told, mind = RuleReasoner(shipped_rules()), set[str](), MIND
     for k in range(60):
-        spin = Pose("probe", 0, (0.0, 0.0, 1.0), None, 0.0, spin=Spin(rate, sigma, (0.0, 1.0, 0.0)))
+        spin = Pose(
+            "probe",
+            0,
+            (0.0, 0.0, 1.0),
+            None,
+            0.0,
+            spin=Spin(rate, sigma, (0.0, 1.0, 0.0)),
+        )
         task = TaskBelief("t", Verdict.IN_PROGRESS, expected=expectations)
         mind = replace(mind, time=1.0 + k / 25, tasks=(task,))
         mind = mind.with_objects(replace(mind.objects[1], pose=spin))
         outcome: Outcome = reasoner(mind, NOTHING)
-        mind, told = outcome.mind, told | {c.kind for c in outcome.concerns}
+        mind, told = outcome.mind, told | {c.kind for c in outcome.conditions}
     return told
 
 
@@ -246,7 +253,7 @@ def touching_at(depths: dict[int, tuple[str, float]], expected: bool) -> set[str
 
     rules = default_reasoners()
     thoughts = think((*rules.update, *rules.cogitate, task), (approach(i) for i in range(110)))
-    return {c.kind for t in thoughts for c in t.concerns}
+    return {c.kind for t in thoughts for c in t.conditions}
 
 
 def test_contact_is_told_where_depths_agree_and_no_task_brought_the_two_together() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.paths import ROOT
-from visup.agent.model.errors import ManyErrors, Place, TaskError
+from visup.agent.model.errors import ErrorGroup, SourceLocation, TaskError
 from visup.agent.model.suggestions import closest
 from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
 from visup.rules.language.diagnostics import Diagnostic
@@ -80,12 +80,12 @@ def test_an_action_that_needs_percepts_which_nothing_gives_is_told() -> None:
 
 
 def test_three_mistakes_are_raised_together() -> None:
-    with pytest.raises(ManyErrors) as caught:
+    with pytest.raises(ErrorGroup) as caught:
         load_task(HERE / "bad" / "three_mistakes.task")
-    codes = [e.code for e in caught.value.errors if isinstance(e, Diagnostic)]
+    codes = [e.code for e in caught.value.errors]
     assert codes == ["E102", "E201", "E117"]
     for error in caught.value.errors:
-        assert isinstance(error.where, Place)
+        assert isinstance(error.where, SourceLocation)
         assert error.where.caret() in str(caught.value)
 
 

@@ -9,7 +9,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
-from visup.agent.model.errors import Place, VisupError
+from visup.agent.model.errors import SourceLocation, VisupError
 from visup.commands.task.task import laid_out
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic
@@ -126,7 +126,7 @@ def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
     place = fault.place
     if place.file != _file(document):
         said.insert(0, f"in {place}")
-        place = Place(_file(document), 1, 1)
+        place = SourceLocation(_file(document), 1, 1)
     span = Span(place.line, place.column, place.line, place.column + place.length)
     return lsp.Diagnostic(
         _range(document, span),

@@ -29,7 +29,8 @@ Without = Annotated[
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
     """Tell every mistake of some task files; exit code 2 when there is any."""
-    from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+    from visup.agent.model.errors import SettingsError, TaskError, VisupError
+    from visup.rules.language.diagnostics import raise_errors
     from visup.tasks.actions.actions import ALL_PERCEPTS
     from visup.tasks.checks.diagnose import diagnose
     from visup.tasks.checks.files import read_text
@@ -42,7 +43,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     for file in files:
         try:
             faults = diagnose(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
-            found[file] = [*faults]
+            found[file] = [f.error(TaskError) for f in faults]
         except VisupError as e:
             found[file] = [e]
     told = [e for errors in found.values() for e in errors]
@@ -52,10 +53,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     for file, errors in found.items():
         if not errors:
             typer.echo(f"{file}: ok")
-    if len(told) == 1:
-        raise told[0]
-    if told:
-        raise ManyErrors(told)
+    raise_errors(told)
 
 
 @app.command("format")
@@ -183,6 +181,7 @@ def laid_out(text: str, file: str) -> str:
         TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
         ManyErrors: The same, for several reasons.
     """
+    from visup.agent.model.errors import TaskError
     from visup.rules.language.diagnostics import Source, raise_all
     from visup.tasks.diagnostics.normalise import normalise
     from visup.tasks.diagnostics.recovery import parse
@@ -195,11 +194,11 @@ def laid_out(text: str, file: str) -> str:
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:
-    from visup.agent.model.errors import Place
+    from visup.agent.model.errors import SourceLocation
 
     where = error.where
     place: dict[str, Any] = {"file": str(where) if where else None}
-    if isinstance(where, Place):
+    if isinstance(where, SourceLocation):
         place = {
             "file": where.file,
             "line": where.line,
@@ -207,7 +206,7 @@ def _as_data(error: VisupError) -> dict[str, Any]:
             "length": where.length,
         }
     return {
-        "code": getattr(error, "code", None),
+        "code": error.code,
         "what": error.what,
         **place,
         "expected": error.expected,

@@ -26,7 +26,7 @@ import numpy as np
 from visup.agent import Contract, Depth, Health, HealthStatus, Hypothesis
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.model.records import BROKEN, ReportState
+from visup.agent.model.records import FAULT_STATES, ReportState
 from visup.agent.model.step import Step
 from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
@@ -163,7 +163,7 @@ def _watch(trial: BehaviourFaultTrial, agent: Agent) -> None:
 
 def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
     """Look for what is taken for known in one step although it is unknown."""
-    broken = _report(step).state in BROKEN
+    broken = _report(step).state in FAULT_STATES
     if broken and (trial.kind not in step.mind.unknown or step.observation.observed(trial.kind)):
         trial.problems.append(f"unknown: '{trial.kind}' counts as observed")
     if broken and not _told(step):
@@ -184,7 +184,7 @@ def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
 
 def _told(step: Step) -> bool:
     open_now = any(a.kind == "behaviour_failed" and a.key == "culprit" for a in step.mind.alerts)
-    return open_now and _report(step).state in BROKEN
+    return open_now and _report(step).state in FAULT_STATES
 
 
 def _report(step: Step) -> Any:

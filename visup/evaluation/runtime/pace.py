@@ -23,7 +23,7 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.evaluation.runtime.endurance import SIZE, resident_mb, script
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
@@ -132,7 +132,7 @@ def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> 
     """Cost of steps and of writing them down; the journal is left in the folder."""
     folder.mkdir()
     journal = Journal(folder / JOURNAL)
-    journal.note(settings=plain(settings))
+    journal.note(settings=to_jsonable(settings))
     agent = reasoning_agent(settings)
     thought, whole, alerts = [], [], []
     for one in seen:

@@ -19,7 +19,7 @@ import numpy as np
 from visup.agent import Mind, Observation, Region
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.agent.storage.checkpoint import frozen
+from visup.agent.storage.checkpoint import dump_state
 from visup.evaluation.runtime.soak import rss_mb, scripted
 from visup.rules.relations.reasoner import RELATIONS
 from visup.runs.settings import WatchSettings
@@ -117,7 +117,7 @@ def _agent() -> Any:
     return reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
 
 
-def _own(seen: Observation) -> Observation:
+def _own(observation: Observation) -> Observation:
     """The same with masks and outlines that no other frame shares."""
 
     def owned(value: object) -> object:
@@ -127,9 +127,9 @@ def _own(seen: Observation) -> Observation:
 
     reports = tuple(
         replace(r, percepts=tuple(replace(p, value=owned(p.value)) for p in r.percepts))
-        for r in seen.reports
+        for r in observation.reports
     )
-    return replace(seen, reports=reports)
+    return replace(observation, reports=reports)
 
 
 def _slower() -> float:
@@ -171,7 +171,7 @@ def whole(mind: Mind) -> Mind:
 
 def _print(step: Step) -> bytes:
     return hashlib.sha256(
-        frozen((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
+        dump_state((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
     ).digest()
 
 
