@@ -20,6 +20,7 @@ from visup.agent.contract.phases import Phase, Snapshot
 from visup.agent.contract.saving import Saveable
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.mind import (
     Binding,
     Candidate,
@@ -92,6 +93,7 @@ __all__ = [
     "HealthStatus",
     "Hypothesis",
     "Limits",
+    "MemoryKey",
     "Mind",
     "ObjectBelief",
     "Observation",

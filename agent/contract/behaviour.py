@@ -60,4 +60,4 @@ class Outcome:
 
 Reasoner = Callable[[Mind, Observation], Outcome]
 """A pure function of the mind and of what was observed. It keeps nothing to itself: what it must
-remember goes into `Mind.memory` under its own name, so that minds can be kept and restored."""
+remember goes into the mind under its own `MemoryKey`, so that minds can be saved and restored."""

@@ -17,6 +17,7 @@ class Phase(StrEnum):
     UPDATE = "update"
     COGITATE = "cogitate"
     MATCH = "match"
+    ATTEND = "attend"
     ACT = "act"
 
 

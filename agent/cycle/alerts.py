@@ -32,7 +32,7 @@ def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
             "behaviour_failed",
             (),
             Severity.WARNING,
-            f"The behaviour '{r.behaviour}' {_ails(r.state)}; what it gives is unknown.",
+            f"The behaviour '{r.behaviour}' {_ails(r.state)}; its output is unavailable.",
             (r.error,),
             key=r.behaviour,
             needs=(),
@@ -89,7 +89,7 @@ def alert_events(
     """The events that tell of alerts that opened or closed."""
     told = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
     over = [
-        _event("alert_closed", f"No longer so: {a.cause}", a, time, frame_index, Severity.INFO)
+        _event("alert_closed", f"Resolved: {a.cause}", a, time, frame_index, Severity.INFO)
         for a in closed
     ]
     return (*told, *over)

@@ -1,7 +1,7 @@
 """A behaviour in its place in an agent: when it runs, and what comes of its conduct.
 
 After three failures in a row a behaviour is suspended for a while, twice as long each time; what
-hangs, dies or takes too much memory is suspended at once. Whatever it gives is unknown from its
+hangs, dies or takes too much memory is suspended at once. Its output is unavailable from its
 failure until it has run again, also in the steps in which it would not have run.
 """
 

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey, Remembered
 from visup.agent.model.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
 from visup.agent.model.relation_columns import Relation
 from visup.agent.model.relation_table import RelationTable
@@ -322,7 +323,7 @@ class Mind:
         zones: Parts of the scene that rules can name.
         questions: Those that wait for the operator's answer.
         answers: Object id -> what the operator said it is.
-        memory: What reasoners remember, by reasoner; immutable values only.
+        memory: What reasoners remember, by the names of their keys (`MemoryKey`); immutable values only.
     """
 
     time: float = 0.0
@@ -342,15 +343,20 @@ class Mind:
     answers: Mapping[int, str] = field(default_factory=lambda: NO_ANSWERS)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
-    def remember(self, reasoner: str, value: object, **changes: Any) -> Mind:
+    def recall(self, key: MemoryKey[Remembered]) -> Remembered:
+        """What a reasoner remembers, or the default of its key."""
+        found: Remembered = self.memory.get(key.name, key.default)
+        return found
+
+    def remember(self, key: MemoryKey[Remembered], value: Remembered, **changes: Any) -> Mind:
         """The same mind with one reasoner's memory replaced, and other fields with it.
 
         Args:
-            reasoner: Its name.
+            key: Of the reasoner.
             value: What it remembers; must be immutable.
             changes: Field -> value.
         """
-        memory = MappingProxyType({**self.memory, reasoner: value})
+        memory = MappingProxyType({**self.memory, key.name: value})
         return replace(self, memory=memory, **changes)
 
     def with_objects(self, *beliefs: ObjectBelief) -> Mind:

@@ -303,7 +303,7 @@ class Event:
     Attributes:
         kind: 'entry', 'noticed' (it was in view before it was seen to move), 'exit', 'occlusion',
             'reappearance', 'coupled', 'decoupled', 'relation', 'identified', 'stage_started',
-            'stage_progressing', 'stage_failing', 'stage_done', 'verdict', 'health', 'fault', ...
+            'stage_progressing', 'stage_failing', 'stage_done', 'verdict', 'health', ...
         time: Seconds.
         frame_index: Frame at which it was told.
         text: The sentence for the narrative, complete, with full stop.

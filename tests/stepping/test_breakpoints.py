@@ -202,8 +202,8 @@ BAD = {
     "when gap(1, 2) < 3 s": "a length is compared with a time",
     "when foo(1)": "foo",
     "when gap(1,": "ends too early",
-    "object one": "is no number",
-    "frame x": "is no number",
+    "object one": "is not a number",
+    "frame x": "is not a number",
     "two words": "nothing is meant",
 }
 

@@ -11,7 +11,6 @@ CORE = (
     "numpy",
     "scipy",
     "opencv-python-headless",
-    "scikit-image",
     "networkx",
     "lark",
     "pydantic",

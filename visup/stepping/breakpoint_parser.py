@@ -41,7 +41,6 @@ EVENT_KINDS = (
     "alert",
     "alert_closed",
     "health",
-    "fault",
     "invariant_broken",
     "stage_started",
     "stage_progressing",
@@ -132,7 +131,7 @@ def _number(text: str, kind: str) -> float:
     try:
         return float(text.removesuffix("s").strip())
     except ValueError:
-        raise SettingsError(f"'{text}' is no number", expected=f"such as: {kind} 12") from None
+        raise SettingsError(f"'{text}' is not a number", expected=f"such as: {kind} 12") from None
 
 
 _READERS: Mapping[str, Callable[[str, Mind], StopCondition]] = {

@@ -37,8 +37,8 @@ class Command:
 
 _WHERE = """\
 WHAT is one of
-  a phase            update, cogitate, match, act: stops inside the step after
-                     it, with the half-made mind to look at
+  a phase            update, cogitate, match, attend, act: stops inside the step
+                     after it, with the half-made mind to look at
   an event           alert, entry, coupled, stage_failing, ...
   a rule             collision_course: when it becomes true of anybody;
                      'rule NAME changes': whenever its verdict changes
@@ -109,9 +109,9 @@ _COMMANDS = (
         _BRANCH,
         ("file",),
     ),
-    Command("branch", "another course from here, with nothing changed yet", _BRANCH),
+    Command("branch", "another timeline from here, with nothing changed yet", _BRANCH),
     Command("compare", "what this branch tells differently"),
-    Command("leave", "back to the course that this branch left"),
+    Command("leave", "back to the timeline that this branch left"),
     Command("mind", "all that is believed, in short"),
     Command("percepts", "what was perceived in this step, by behaviour"),
     Command("regions", "what moved in the last frame"),
@@ -139,6 +139,6 @@ HELP = "\n".join(
     [
         *(f"{c.usage:<22} {c.does}" for c in _COMMANDS),
         f"{'quit':<22} end",
-        "A unique beginning of a command will do; an empty line repeats the last one.",
+        "A unique beginning of a command is enough; an empty line repeats the last one.",
     ]
 )

@@ -233,7 +233,7 @@ def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, pl
 
 
 def test_a_bomb_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("visup.agent.storage.codec.LARGEST", 10**5)
+    monkeypatch.setattr("visup.agent.storage.codec.LARGEST_STEP_BYTES", 10**5)
     with pytest.raises(OutputError, match="too large"):
         unpack_observation(zlib.compress(b" " * 10**7))
 

@@ -72,7 +72,7 @@ def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
     for mind in minds(3, 60):
         mind = mind if memory is None else mind.remember(SAFETY, memory)
         outcome = reasoner(mind, NOTHING)
-        memory = outcome.mind.memory[SAFETY]
+        memory = outcome.mind.recall(SAFETY)
     values = evaluation_of(outcome.mind)
     raised = {(rule.name, ids) for rule, ids in values.true()}
     for rule in values.prepared.rules:
@@ -90,7 +90,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
         told: list[tuple[object, ...]] = []
         for new in rest:
             if mind is not None:
-                new = new.remember(SAFETY, mind.memory[SAFETY])
+                new = new.remember(SAFETY, mind.recall(SAFETY))
             outcome = reasoner(new, NOTHING)
             mind = outcome.mind
             told.append(outcome.conditions)
@@ -99,7 +99,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
     kept: list[Mind] = []
     mind = None
     for new in seen_minds:
-        new = new if mind is None else new.remember(SAFETY, mind.memory[SAFETY])
+        new = new if mind is None else new.remember(SAFETY, mind.recall(SAFETY))
         mind = reasoner(new, NOTHING).mind
         kept.append(mind)
     straight = run(None, seen_minds)

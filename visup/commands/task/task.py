@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from visup.commands.task.format import format_files
 from visup.commands.task.simulate import simulate
 
 if TYPE_CHECKING:
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Check, show, lay out and try task files.", no_args_is_help=True)
 app.command("simulate")(simulate)
+app.command("format")(format_files)
 
 Files = Annotated[list[str], typer.Argument(help="Task files, or names of shipped tasks.")]
 File = Annotated[str, typer.Argument(help="A task file or shipped task.")]
@@ -54,38 +54,6 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
         if not errors:
             typer.echo(f"{file}: ok")
     raise_errors(told)
-
-
-@app.command("format")
-def format_files(
-    files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
-    only_check: Annotated[
-        bool, typer.Option("--check", help="Change nothing; exit code 1 when a layout differs.")
-    ] = False,
-) -> None:
-    """Give task files one layout; words, comments and meaning stay as they are."""
-    from visup.agent.model.errors import OutputError, TaskError
-    from visup.tasks.checks.files import read_text
-
-    differ = False
-    for file in files:
-        text = sys.stdin.read() if file == "-" else read_text(file)
-        new = laid_out(text, "<stdin>" if file == "-" else file)
-        differ = differ or new != text
-        if file == "-" and not only_check:
-            typer.echo(new, nl=False)
-        elif new != text and only_check:
-            typer.echo(f"{file}: not laid out")
-        elif new != text:
-            if not Path(file).is_file():
-                raise TaskError("it ships with visup and is not changed", where=file)
-            try:
-                Path(file).write_text(new, encoding="utf-8")
-            except OSError as e:
-                what = f"cannot be written: {e.strerror or e}"
-                raise OutputError(what, where=file) from e
-            typer.echo(f"{file}: laid out")
-    raise typer.Exit(1 if only_check and differ else 0)
 
 
 @app.command()
@@ -172,25 +140,6 @@ def lsp() -> None:
             raise
         raise ExtraMissingError("`visup task lsp`", "lsp") from e
     serve()
-
-
-def laid_out(text: str, file: str) -> str:
-    """A text in the layout of visup.
-
-    Raises:
-        TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
-        ManyErrors: The same, for several reasons.
-    """
-    from visup.agent.model.errors import TaskError
-    from visup.rules.language.diagnostics import Source, raise_all
-    from visup.tasks.diagnostics.normalise import normalise
-    from visup.tasks.diagnostics.recovery import parse
-    from visup.tasks.tools.formatter import formatted
-
-    source = Source(text, file)
-    code, odd = normalise(text, source)
-    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults], TaskError)
-    return formatted(text)
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:

@@ -11,10 +11,11 @@ from __future__ import annotations
 import random
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.oracles import oracle
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.stage_hmm import ActionStatus, StageHmm
@@ -253,7 +254,7 @@ def evaluate_recognition(
     grammars: int = 2_000,
     tasks: int = 20,
     first: int = 0,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> tuple[dict[str, Any], dict[str, bool]]:
     """All figures of recognition, and whether each bar is held.
 
@@ -261,10 +262,9 @@ def evaluate_recognition(
         grammars: How many small grammars are compared with the oracle.
         tasks: How many large tasks are followed.
         first: The first seed.
-        progress: Told a line as each part is begun.
+        progress: Shows what is being done.
     """
-    tell = progress or (lambda _: None)
-    tell("comparing with the oracle")
+    progress("comparing with the oracle")
     agreed = compare(grammars, first)
     figures: dict[str, Any] = {
         "grammars": agreed.grammars,
@@ -274,9 +274,9 @@ def evaluate_recognition(
         "other_stage_or_status": len(agreed.other),
     }
     for mean_s in MEANS_S:
-        tell(f"following tasks with stages of {mean_s:g} s")
+        progress(f"following tasks with stages of {mean_s:g} s")
         figures |= _followed(tasks, first, mean_s)
-    tell("by the clock")
+    progress("by the clock")
     for stages in (50, 500):
         figures[f"steps_per_s_{stages}"] = round(speed(stages))
         figures[f"steps_per_s_{stages}_unsure"] = round(speed_unsure(stages))
