@@ -107,7 +107,7 @@ class CallResolver:
             return Measure(node.name, self._words(node), node.span)
         if isinstance(node, Term):
             return node
-        what = f"'{node}' is true or false, and no quantity"
+        what = f"'{node}' is true or false, not a quantity"
         self.fault((_place(node), what, "a quantity or a number", None))
         return Number(0.0, span=_place(node))
 
@@ -130,7 +130,7 @@ class CallResolver:
 
     def _unworded(self, argument: Any) -> Any:
         if isinstance(argument, NameArgument):
-            what = f"'{argument.name}' is a name, and no quantity"
+            what = f"'{argument.name}' is a name, not a quantity"
             self.fault((argument.span, what, "a quantity or a number", None))
             return Number(0.0, span=argument.span)
         return argument

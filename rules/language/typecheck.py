@@ -116,7 +116,7 @@ class TypeChecker:
             yield rule.span, f"a variable of '{rule.name}' is named twice", "distinct names", None
         for word in (rule.name, *rule.variables):
             if word in KEYWORDS:
-                yield rule.span, f"'{word}' is a word of the language", "another name", None
+                yield rule.span, f"'{word}' is a reserved word", "another name", None
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
                 what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
@@ -175,7 +175,7 @@ class _FormulaChecker:
         if name in outer:
             yield node.span, f"'{name}' is already the name of an object", "another name", None
         if name in KEYWORDS:
-            yield node.span, f"'{name}' is a word of the language", "another name", None
+            yield node.span, f"'{name}' is a reserved word", "another name", None
         self.scope = (*outer, name)
         found = list(self.node(node.part))
         yield from found
@@ -206,7 +206,7 @@ class _FormulaChecker:
             yield from self.argument(call, wanted, word)
         names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
         if len(set(names)) < len(names):
-            yield call.span, f"'{call.name}' is asked of one object twice", None, None
+            yield call.span, f"'{call.name}' is given the same object twice", None, None
 
     def argument(self, call: Predicate | Measure, wanted: str, word: str) -> Iterator[Fault]:
         known: Iterable[str] = {
@@ -215,10 +215,10 @@ class _FormulaChecker:
             "kind": (*PERCEPT_KINDS, word),
         }.get(wanted, (word,))
         if word not in known:
-            what = f"'{word}' is no {'variable of the rule' if wanted == 'object' else wanted}"
+            what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
             yield call.span, what, _listed(known), did_you_mean(word, known)
         elif wanted != "object" and word in self.scope:
-            what = f"'{word}' is a variable of the rule, and '{call.name}' wants a {wanted}"
+            what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
             yield call.span, what, None, "rename the variable"
 
 
@@ -226,15 +226,15 @@ def _time(number: Number | None, word: str) -> Iterator[Fault]:
     if number is None:
         return
     if number.dimension != TIME:
-        yield number.span, f"'{word}' wants a time", "such as 2 s", None
+        yield number.span, f"'{word}' needs a time", "such as 2 s", None
     elif number.value <= 0:
-        yield number.span, f"'{word}' wants a time above 0", None, None
+        yield number.span, f"'{word}' needs a time above 0", None, None
 
 
 def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
     yield from _time(window.high, word)
     if window.low.dimension != TIME:
-        yield window.low.span, f"'{word}' wants a time", "such as 2 s", None
+        yield window.low.span, f"'{word}' needs a time", "such as 2 s", None
     elif window.high.dimension == TIME and 0 < window.high.base <= window.low.base:
         what = f"a window from {window.low} to {window.high} is empty"
         yield window.high.span, what, "the shorter time first", None
@@ -250,7 +250,7 @@ def _often(node: MOfN) -> Iterator[Fault]:
         return
     yield from _time(of, "of")
     if least.dimension != SHARE or not 0 < least.base <= 1:
-        yield least.span, f"'{least}' is no share of a time", "such as 60 %", None
+        yield least.span, f"'{least}' is not a share of a time", "such as 60 %", None
 
 
 def _listed(words: Iterable[str]) -> str:

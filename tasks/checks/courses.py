@@ -97,7 +97,7 @@ class CourseCheck:
                 if len(clauses) > 1:
                     span = clauses[1].span
                     yield self.source.fault(
-                        "E208", f"`{word}` is said twice", span, f"one `{word}`"
+                        "E208", f"`{word}` is given twice", span, f"one `{word}`"
                     )
             least = self.grammar.min_duration(course)
             for deadline in deadlines[:1]:
@@ -170,7 +170,7 @@ class CourseCheck:
             told: set[str] = set()
             for sign in course.conditions:
                 if sign.kind in told:
-                    what = f"`{sign.kind} when` is said twice"
+                    what = f"`{sign.kind} when` is given twice"
                     hint = "join the conditions with `or` or `and`"
                     yield self.source.fault(
                         "E235", what, sign.span, f"one `{sign.kind} when`", hint

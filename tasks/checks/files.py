@@ -23,7 +23,7 @@ def read_text(path_or_name: str | Path) -> str:
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for
             raise TaskError(
-                "cannot be read: it is no file", where=str(path), expected="a task file"
+                "cannot be read: it is not a file", where=str(path), expected="a task file"
             )
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:

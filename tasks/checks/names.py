@@ -119,9 +119,9 @@ class NameCheck:
                 "E217", "the number is too large", amount.span, "a smaller number"
             )
         elif amount.value <= 0 and wanted == TIME:
-            yield self.source.fault("E217", f"`{amount}` is no time at all", amount.span)
+            yield self.source.fault("E217", f"`{amount}` is not a positive duration", amount.span)
         elif amount.value <= 0 and wanted == SIZE:
-            yield self.source.fault("E217", f"`{amount}` is no size at all", amount.span)
+            yield self.source.fault("E217", f"`{amount}` is not a positive size", amount.span)
         else:
             yield from self.of_kind(amount, wanted, amount)
 
@@ -129,9 +129,9 @@ class NameCheck:
         """A fault when an amount does not measure what is wanted where it is used."""
         measured = dimension(amount)
         if wanted in _MEASURED and measured and measured != wanted:
-            what = f"`{used}` is no {WORDS.get(wanted, wanted)}"
+            what = f"`{used}` is not {_a(WORDS.get(wanted, wanted))}"
             if isinstance(used, ParameterRef):
-                what = f"parameter `{used}` is `{amount}`, which is no {WORDS.get(wanted, wanted)}"
+                what = f"parameter `{used}` is `{amount}`, which is not {_a(WORDS.get(wanted, wanted))}"
             hint = "did you mean `min`?" if (wanted, amount.unit) == (TIME, "m") else None
             yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
 
@@ -146,7 +146,7 @@ class NameCheck:
                 what = f"`{name}` is a quantity and is not compared with anything"
                 yield self.source.fault("E227", what, span, f"such as `{written(meaning)}`")
             elif not meaning.measures and id(span) in compared:
-                what = f"`{name}` is no quantity, so it cannot be compared"
+                what = f"`{name}` is not a quantity, so it cannot be compared"
                 some = sorted(m.name for m in self.actions.values() if m.measures)
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
@@ -161,11 +161,11 @@ class NameCheck:
                 said = str(actor)
                 known = said in zones or said in self.parsed.defined or self.parsed.lacking
                 if kind == "zone" and not known:
-                    what = f"`{name}` speaks of a zone, and `{said}` is none"
+                    what = f"`{name}` takes a zone, but `{said}` is not one"
                     hint = did_you_mean(said, zones, "`{}`")
                     yield self.source.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
                 elif kind == "object" and said in zones:
-                    what = f"`{said}` is a zone, and `{name}` speaks of an actor here"
+                    what = f"`{said}` is a zone, but `{name}` takes an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
 
     def declared(self) -> Iterator[Diagnostic]:
@@ -210,3 +210,7 @@ WORDS = {
     "size": "real size",
 }
 _MEASURED = frozenset(d for d, _ in UNITS.values())
+
+
+def _a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"

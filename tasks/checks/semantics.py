@@ -164,7 +164,7 @@ class _Semantics:
         named += [Name(a.name, a.span) for a in task.declared]
         for name in named:
             if str(name) in RESERVED_WORDS:
-                what = f"`{name}` is a word of the language"
+                what = f"`{name}` is a reserved word"
                 yield self.source.fault("E123", what, name.span, "another name")
 
     def unknown_actions(self) -> Iterator[Diagnostic]:
@@ -180,7 +180,7 @@ class _Semantics:
             hint = f"did you mean `{near}`?" if near else None
             what = f"unknown action `{name}`"
             if self.is_head(span):
-                what = f"`<{name}>` is given actors, but `{name}` is no action"
+                what = f"`<{name}>` is given actors, but `{name}` is not an action"
             yield self.source.fault("E201", what, at, shown, hint)
 
     def is_head(self, span: Span) -> bool:
@@ -268,9 +268,9 @@ class _Semantics:
         roots = self.parsed.task.roots
         for stage in self.grammar.unreachable():
             if stage.name not in missing | misread and not stage.span.file:
-                what = f"task `{roots[0]}` never comes to stage `<{stage.name}>`"
+                what = f"task `{roots[0]}` never reaches stage `<{stage.name}>`"
                 if len(roots) > 1:
-                    what = f"no task of the file comes to stage `<{stage.name}>`"
+                    what = f"no task of the file reaches stage `<{stage.name}>`"
                 hint = "refer to it from another stage, or take it out; the first rule is the task"
                 yield self.source.fault("E204", what, stage.span, hint=hint)
 
