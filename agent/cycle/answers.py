@@ -7,8 +7,9 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.mind import UNKNOWN_OBJECT, Mind
-from visup.agent.model.records import Event
+from visup.agent.model.events import Event
+from visup.agent.model.mind import Mind
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.agent.model.suggestions import did_you_mean
 
 NOBODY = ("unknown", UNKNOWN_OBJECT)

@@ -78,7 +78,7 @@ class MotionSegmenter:
 
     Attributes:
         settings: As given.
-        looked: How the last frame was understood; None before the second one of a size.
+        trace: How the last frame was understood; None before the second one of a size.
     """
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
