@@ -10,40 +10,31 @@ Rooms, in the order in which to read them:
 6. `storage/`: journals and checkpoints.
 """
 
+from dataclasses import is_dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.contract.saving import Saveable
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
-from visup.agent.model.mind import (
-    Binding,
+from visup.agent.model.events import Alert, AlertCondition, Directive, Event, Severity
+from visup.agent.model.memory import MemoryKey
+from visup.agent.model.mind import Mind, Zone
+from visup.agent.model.object_beliefs import (
     Candidate,
     Coupling,
-    Expectation,
-    Mind,
     ObjectBelief,
     Pose,
     Presence,
-    Prospect,
     Question,
     Spin,
-    StageBelief,
-    Status,
-    TaskBelief,
-    Verdict,
-    Zone,
 )
 from visup.agent.model.records import (
-    Alert,
-    AlertCondition,
     Depth,
-    Directive,
-    Event,
     Frame,
     Health,
     HealthStatus,
@@ -54,12 +45,20 @@ from visup.agent.model.records import (
     Region,
     Report,
     ReportState,
-    Severity,
     Truth,
 )
 from visup.agent.model.relation_columns import Column, Relation
 from visup.agent.model.relation_table import RelationTable
 from visup.agent.model.step import Step
+from visup.agent.model.task_beliefs import (
+    Binding,
+    Expectation,
+    Prospect,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Verdict,
+)
 
 if TYPE_CHECKING:
     from visup.agent.cycle.agent import Agent, Reasoners
@@ -75,6 +74,7 @@ _LAZY = {
 
 __all__ = [
     "Agent",
+    "AgentSnapshot",
     "Alert",
     "AlertCondition",
     "Behaviour",
@@ -92,6 +92,7 @@ __all__ = [
     "HealthStatus",
     "Hypothesis",
     "Limits",
+    "MemoryKey",
     "Mind",
     "ObjectBelief",
     "Observation",
@@ -113,7 +114,6 @@ __all__ = [
     "ReportState",
     "Saveable",
     "Severity",
-    "Snapshot",
     "Spin",
     "StageBelief",
     "Status",
@@ -135,35 +135,7 @@ if not TYPE_CHECKING:  # else every name would be there for checkers
         return getattr(import_module(_LAZY[name]), name)
 
 
-_RECORDS = (
-    Alert,
-    Binding,
-    Candidate,
-    AlertCondition,
-    Coupling,
-    Depth,
-    Directive,
-    Event,
-    Expectation,
-    Frame,
-    Health,
-    Hypothesis,
-    Mind,
-    ObjectBelief,
-    Observation,
-    Outcome,
-    Percept,
-    Pose,
-    Question,
-    Region,
-    Prospect,
-    Relation,
-    RelationTable,
-    Report,
-    Spin,
-    StageBelief,
-    TaskBelief,
-    Zone,
-    Step,
+_NOT_SHOWN = {AgentSnapshot, Column, Contract, Limits, MemoryKey, PastFrame}
+enable_display(
+    *{k for k in list(vars().values()) if isinstance(k, type) and is_dataclass(k)} - _NOT_SHOWN
 )
-enable_display(*_RECORDS)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from visup.agent.model.events import Directive
 from visup.agent.model.mind import NO_ANSWERS, Mind
-from visup.agent.model.records import Directive
 
 
 class Phase(StrEnum):
@@ -17,11 +17,12 @@ class Phase(StrEnum):
     UPDATE = "update"
     COGITATE = "cogitate"
     MATCH = "match"
+    ATTEND = "attend"
     ACT = "act"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Snapshot:
+class AgentSnapshot:
     """All that an agent has come to believe and ask for: with what was perceived since, its later steps.
 
     What behaviours hold is not part of it: they are not needed to think again about what was

@@ -1,6 +1,6 @@
 """Running a behaviour on a frame: in the caller's thread, or in a thread that can be given up.
 
-`isolation.py` has the third way, a process of its own. All three keep one protocol, `Runner`.
+`process_runner.py` has the third way, a process of its own. All three keep one protocol, `Runner`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.execution.validation import check_percepts, collect_percepts
 from visup.agent.model.errors import BehaviourError
-from visup.agent.model.records import Directive, Frame, Observation, Percept
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, Percept
 
 STOPPING_S = 0.05
 """How long a step waits for a thread that it has just asked to stop, seconds."""

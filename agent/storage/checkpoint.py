@@ -31,14 +31,14 @@ _Node = Any
 
 
 class StateError(TypeError):
-    """A value is of a kind that cannot be kept."""
+    """A value is of a kind that cannot be saved."""
 
 
 def dump_state(value: Any) -> bytes:
     """A state as bytes.
 
     Raises:
-        StateError: It holds something that cannot be kept, such as a function or an open file.
+        StateError: It holds something that cannot be saved, such as a function or an open file.
     """
     writer = _StateWriter()
     root = writer.node(value)
@@ -62,7 +62,7 @@ def load_state(data: bytes) -> Any:
         table, root, shapes = json.loads(tree)
         return _StateReader(table, _arrays(shapes, body)).value(root)
     except (struct.error, ValueError, TypeError, KeyError, IndexError, AttributeError) as fault:
-        raise OutputError(f"a kept state cannot be read ({fault})") from fault
+        raise OutputError(f"a saved state cannot be read ({fault})") from fault
 
 
 @dataclass(slots=True)
@@ -182,7 +182,7 @@ class _StateReader:
     def named(self, name: str, nodes: list[_Node]) -> Any:
         kind = _class(name)
         if not issubclass(kind, tuple):
-            raise ValueError(f"{name} is no tuple")
+            raise ValueError(f"{name} is not a tuple")
         return tuple.__new__(kind, self.many(nodes))
 
     def csr(self, *parts: _Node) -> Any:
@@ -194,7 +194,7 @@ class _StateReader:
     def enum(self, name: str, node: _Node) -> Any:
         kind = _class(name)
         if not issubclass(kind, Enum):
-            raise ValueError(f"{name} is no enumeration")
+            raise ValueError(f"{name} is not an enumeration")
         return kind(self._of(node))
 
 
@@ -224,7 +224,7 @@ def _class(name: str) -> type:
     for part in path.split("."):
         found = vars(found)[part]
     if not isinstance(found, type) or found.__module__ != module:
-        raise ValueError(f"{name} is no class")
+        raise ValueError(f"{name} is not a class")
     return found
 
 

@@ -35,6 +35,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
@@ -48,8 +49,6 @@ from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics
 from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
 from visup.rules.wording.sentences import sentence
-
-COUPLING = "rules.coupling"
 
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
@@ -107,6 +106,11 @@ class CouplingEvidence:
     relative_track: RelativeTrack | None = None
 
 
+COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
+    "rules.coupling", MappingProxyType({})
+)
+
+
 NO_EVIDENCE = CouplingEvidence()
 
 
@@ -157,7 +161,7 @@ class CouplingReasoner:
         return log
 
     def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
-        old: Mapping[Pair, CouplingEvidence] = mind.memory.get(COUPLING, MappingProxyType({}))
+        old = mind.recall(COUPLING)
         coupled = {c.objects: c for c in mind.couplings}
         table = _table(mind)
         observed = _observed_pairs(table, mind)

@@ -45,14 +45,14 @@ from visup.agent import (
     Presence,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.memory import MemoryKey
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
 from visup.rules.wording.sentences import called, seems, spaced
 
-VOTES = "rules.votes"
 VoteCounts = tuple[tuple[str, float], ...]
 
 
@@ -128,9 +128,12 @@ class VoteMemory:
     of: Mapping[int, ObjectVotes] = field(default_factory=lambda: MappingProxyType({}))
 
 
+VOTES: MemoryKey[VoteMemory | None] = MemoryKey("rules.votes", None)
+
+
 def object_votes(mind: Mind, object_id: int) -> ObjectVotes:
     """What is remembered of the votes on an object."""
-    memory: VoteMemory = mind.memory.get(VOTES, VoteMemory(mind.time))
+    memory = mind.recall(VOTES) or VoteMemory(mind.time)
     return memory.of.get(object_id, ObjectVotes())
 
 
@@ -262,7 +265,7 @@ class IdentityReasoner:
         return log
 
     def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
-        old: VoteMemory = mind.memory.get(VOTES, VoteMemory(observation.time))
+        old = mind.recall(VOTES) or VoteMemory(observation.time)
         dt = max(0.0, observation.time - old.time)
         hypotheses = hypotheses_by_object(mind, observation)
         every: dict[int, ObjectVotes] = {}

@@ -13,14 +13,14 @@ from types import MappingProxyType
 
 from visup.agent import Hypothesis, Mind, Observation, Region
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 
-OWNERS = "rules.objects"
+OWNERS: MemoryKey[Mapping[int, int]] = MemoryKey("rules.objects", MappingProxyType({}))
 
 
 def region_owners(mind: Mind) -> Mapping[int, int]:
     """Region id -> object id, for all regions that are remembered."""
-    found: Mapping[int, int] = mind.memory.get(OWNERS, MappingProxyType({}))
-    return found
+    return mind.recall(OWNERS)
 
 
 def hypotheses_by_object(

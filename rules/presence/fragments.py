@@ -17,14 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from visup.agent import Mind, ObjectBelief, Presence, Region
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.outlines import outline_gap, prepared_outline
 from visup.rules.geometry.regions import DIRECTIONS, box_intersection, expanded, image_diagonal
 from visup.rules.presence.object_tracks import ObjectTrack, border_sides, predicted_box
-
-FRAGMENTS = "rules.fragments"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +67,11 @@ class FragmentHypothesis:
     def holds(self) -> bool:
         """Whether the region may be a part of a body now."""
         return self.body is not None and not self.rejected
+
+
+FRAGMENTS: MemoryKey[Mapping[int, FragmentHypothesis]] = MemoryKey(
+    "rules.fragments", MappingProxyType({})
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,9 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Region
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.regions import Box, box_intersection, expanded, shared_pixels, shifted
 
-TRACKS = "rules.presence"
 EXIT_HORIZON_S = 6.0
 """What is leaving is out of sight after so long, seconds."""
 
@@ -82,13 +82,12 @@ class PresenceMemory:
     of: Mapping[int, ObjectTrack] = field(default_factory=lambda: MappingProxyType({}))
 
 
-EMPTY_MEMORY = PresenceMemory()
+TRACKS = MemoryKey("rules.presence", PresenceMemory())
 
 
 def presence_memory(mind: Mind) -> PresenceMemory:
     """The tracks that the mind remembers."""
-    found: PresenceMemory = mind.memory.get(TRACKS, EMPTY_MEMORY)
-    return found
+    return mind.recall(TRACKS)
 
 
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome, Presence
-from visup.agent.model.fast_replace import replace
 from visup.rules.presence.fragments import FRAGMENTS, FragmentSettings, FragmentTest
 from visup.rules.presence.initiation import confirm_new
 from visup.rules.presence.merging import merge
@@ -86,7 +85,7 @@ class PresenceReasoner:
     ) -> StepContext:
         old = presence_memory(mind)
         known = {i: t for i, t in old.of.items() if i in mind.objects}
-        fragments = mind.memory.get(FRAGMENTS, MappingProxyType({}))
+        fragments = mind.recall(FRAGMENTS)
         start = observation.time if old.start is None else old.start
         return StepContext(mind, observation, known, fragments, self.settings, start, log)
 
@@ -118,11 +117,8 @@ def _not_considered(
 def _remembered(context: StepContext) -> Mind:
     """The mind with what is remembered of objects that are still known."""
     kept = {i: t for i, t in context.of.items() if i in context.mind.objects}
-    new = {
-        TRACKS: PresenceMemory(context.start, MappingProxyType(kept)),
-        FRAGMENTS: MappingProxyType(dict(context.fragments)),
-    }
-    return replace(context.mind, memory=MappingProxyType({**context.mind.memory, **new}))
+    mind = context.mind.remember(TRACKS, PresenceMemory(context.start, MappingProxyType(kept)))
+    return mind.remember(FRAGMENTS, MappingProxyType(dict(context.fragments)))
 
 
 def _update_tracks(context: StepContext) -> None:

@@ -162,7 +162,8 @@ def test_what_is_attached_keeps_its_place_on_the_tip() -> None:
     since = satellite.attach.from_s if satellite.attach else 0.0
     times = np.linspace(since, s.duration_s, 5)
     held = [
-        np.linalg.inv(renderer.grip(arm, t)) @ renderer.object_pose(satellite, t) for t in times
+        np.linalg.inv(renderer.scene.grip(arm, t)) @ renderer.scene.object_pose(satellite, t)
+        for t in times
     ]
     for pose in held[1:]:
         np.testing.assert_allclose(pose, held[0], atol=1e-9)

@@ -12,7 +12,9 @@ import pytest
 from tests.report.scene import END_S, FPS, TOLD, TOUCH_S, mind_at, run, step_at
 from visup.agent import Event, Relation, Severity, Truth, Verdict
 from visup.agent.model.errors import SettingsError
-from visup.report.collector import Collector, ReportLimits, cut_out, sample_of, shrunk, weight_of
+from visup.report.collector import Collector, ReportLimits
+from visup.report.crops import cut_out, shrunk
+from visup.report.moments import sample_of, weight_of
 
 
 def collected(limits: ReportLimits | None = None) -> Collector:

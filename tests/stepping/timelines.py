@@ -9,7 +9,7 @@ from visup.agent import Directive, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import dump_state
-from visup.evaluation.runtime.soak import scripted
+from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.evaluation.runtime.stepping import whole
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -43,7 +43,7 @@ def plain_stepper(count: int = COUNT) -> Stepper:
 
 def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> Stepper:
     """Three bodies that are recognised, a task, the shipped rules."""
-    feed = ScriptedObservations(scripted(count))
+    feed = ScriptedObservations(moving_ellipses(count))
     return Stepper(reasoning_agent(SETTINGS), feed, spacing=spacing, latest=latest)
 
 
@@ -63,11 +63,11 @@ def plain_course() -> tuple[bytes, ...]:
 def reasoning_course(count: int = COUNT) -> tuple[Step, ...]:
     """The steps of `reasoning_stepper` when they are simply made."""
     agent = reasoning_agent(SETTINGS)
-    return tuple(agent.reason(seen) for seen in scripted(count))
+    return tuple(agent.reason(seen) for seen in moving_ellipses(count))
 
 
 @cache
 def reasoning_bytes() -> tuple[bytes, ...]:
     """What the steps of `reasoning_stepper` come to when they are simply made, and not looked into."""
     agent = reasoning_agent(SETTINGS)
-    return tuple(told(agent.reason(seen)) for seen in scripted(COUNT))
+    return tuple(told(agent.reason(seen)) for seen in moving_ellipses(COUNT))

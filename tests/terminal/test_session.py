@@ -15,12 +15,12 @@ from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL
 from visup.agent.storage.jsonable import to_jsonable
 from visup.cli import app
-from visup.evaluation.runtime.soak import scripted
+from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.runs.wiring import reasoning_agent
 from visup.stepping import ScriptedObservations
 from visup.terminal.prompt import completions, toolbar
-from visup.terminal.session import HELP, Session
-from visup.terminal.session_commands import COMMANDS
+from visup.terminal.session import Session
+from visup.terminal.session_commands import COMMANDS, HELP
 
 
 def session(count: int = 30) -> tuple[Session, io.StringIO]:
@@ -76,7 +76,7 @@ def reasoning_session(width: int = 80) -> tuple[Session, io.StringIO]:
     out = io.StringIO()
     it = Session(
         reasoning_agent(SETTINGS),
-        ScriptedObservations(scripted(60)),
+        ScriptedObservations(moving_ellipses(60)),
         Console(file=out, width=width),
     )
     return it, out
@@ -182,7 +182,7 @@ def test_the_toolbar_is_one_line() -> None:
 def test_a_recorded_run_is_stepped_from_a_pipe(tmp_path: Path) -> None:
     agent, journal = reasoning_agent(SETTINGS), Journal(tmp_path / JOURNAL)
     journal.note(settings=to_jsonable(SETTINGS))
-    for seen in scripted(40):
+    for seen in moving_ellipses(40):
         journal.record(agent.reason(seen))
     journal.close()
     done = CliRunner().invoke(

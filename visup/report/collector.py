@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
-
-import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from visup.agent import (
     Alert,
     Event,
     Frame,
-    Hypothesis,
     Mind,
-    ObjectBelief,
-    Presence,
     ReportState,
     Verdict,
 )
@@ -27,9 +18,10 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.report.annotate import annotate
 from visup.report.bounded import Heaviest, SpanRecorder, Thinned
+from visup.report.crops import cut_out, jpeg_of, shrunk
+from visup.report.moments import matches_of, sample_of, state_of, weight_of
 from visup.report.records import (
     BehaviourCost,
-    Distance,
     KeyFrame,
     MatchRow,
     RegionCloseup,
@@ -37,35 +29,13 @@ from visup.report.records import (
     RunData,
     Sample,
 )
-from visup.rules.geometry.outlines import outline_gap
 from visup.tasks.tools.outline import Branch
 from visup.wording import worded_once
 
 __all__ = ["Collector", "ReportLimits", "RunData"]
 
 PICTURE_WIDTH = 720
-LOOK_SIZE = 112
-JPEG_QUALITY = 82
-BEST_MATCHES = 5
 MOST_LOOKS = 4
-MOST_SUBJECTS = 8
-MOST_PAIRED = 5
-MOST_CANDIDATES = 8
-MOVES = ("converging", "diverging", "keeping_distance")
-KIND_WEIGHTS: Mapping[str, int] = {
-    "verdict": 6,
-    "stage_failing": 6,
-    "stage_done": 5,
-    "stage_started": 4,
-    "coupled": 5,
-    "decoupled": 5,
-    "entry": 3,
-    "noticed": 3,
-    "reappearance": 3,
-    "exit": 2,
-    "occlusion": 2,
-    "identified": 2,
-}
 ENDS_WEIGHT = 2
 
 
@@ -268,99 +238,3 @@ class Collector:
             picture = jpeg_of(cut_out(frame.image, b))
             looks.append(RegionCloseup(b.region.id, b.id, b.name, b.strength, picture, matches, at))
         return looks
-
-
-def weight_of(events: Sequence[Event]) -> int:
-    """How much a moment matters for the report; 0 when nothing worth a picture happened."""
-    return max((KIND_WEIGHTS.get(e.kind, 0) + 4 * int(e.severity) for e in events), default=0)
-
-
-def sample_of(mind: Mind) -> Sample:
-    """The series' values at one moment: votes of objects in view, distances between them.
-
-    Distances are those of the relation 'distance' where rules report it, else the gap between the
-    outlines of objects that are both seen; of the hidden nothing is known.
-    """
-    objects = sorted(mind.present(), key=lambda b: -b.region.area)[:MOST_SUBJECTS]
-    votes = {
-        b.id: {c.name: c.votes for c in b.candidates[:MOST_CANDIDATES]}
-        for b in objects
-        if b.candidates
-    }
-    pairs = itertools.combinations(sorted(objects[:MOST_PAIRED], key=lambda b: b.id), 2)
-    distances = {(a.id, b.id): _distance(mind, a, b) for a, b in pairs}
-    return Sample(mind.time, votes, {k: d for k, d in distances.items() if d is not None})
-
-
-def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:
-    told = mind.relation("distance", a.id, b.id)
-    if told is not None and told.value is not None:
-        return Distance(told.value, told.sigma)
-    if not (a.presence is b.presence is Presence.SEEN):
-        return None
-    gap = outline_gap(a.region, b.region, math.inf)
-    return None if gap is None else Distance(gap)
-
-
-def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
-    """What the timelines follow: stages, how pairs move, who is in view."""
-    now: dict[tuple[str, ...], str] = {}
-    for task in mind.tasks:
-        now |= {("stage", task.task, s.stage): s.status.value for s in task.stages}
-    for belief in mind.present():
-        now["presence", str(belief.id)] = belief.presence.value
-    for relation in mind.holding(*MOVES):
-        if len(relation.objects) == 2:
-            low, high = sorted(relation.objects)
-            now["relation", str(low), str(high)] = relation.name
-    for coupling in mind.couplings:
-        low, high = coupling.objects
-        now["relation", str(low), str(high)] = "coupled"
-    return now
-
-
-def matches_of(hypotheses: Sequence[Hypothesis]) -> dict[int, tuple[MatchRow, ...]]:
-    """The most similar views of each region, best first."""
-    found: dict[int, list[MatchRow]] = {}
-    for h in sorted(hypotheses, key=lambda h: (-h.similarity, h.name, h.view)):
-        held = found.setdefault(h.region_id, [])
-        if len(held) < BEST_MATCHES:
-            held.append(MatchRow(h.name, h.view, h.similarity))
-    return {region: tuple(matches) for region, matches in found.items()}
-
-
-def cut_out(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]:
-    """An object cut out of a frame with a little of what is round it, which is dimmed.
-
-    Args:
-        image: (H, W, 3) uint8 BGR.
-        belief: An object that is seen in it.
-
-    Returns:
-        (h, w, 3) uint8 BGR, its longer side at most `LOOK_SIZE` pixels.
-    """
-    x, y, w, h = belief.region.bbox
-    margin = max(4, round(0.12 * max(w, h)))
-    x0, y0 = max(0, x - margin), max(0, y - margin)
-    x1, y1 = min(image.shape[1], x + w + margin), min(image.shape[0], y + h + margin)
-    inside = belief.region.full_mask((image.shape[1], image.shape[0]))[y0:y1, x0:x1, None]
-    part = image[y0:y1, x0:x1]
-    dimmed = np.where(inside, part, part // 4)
-    scale = LOOK_SIZE / max(part.shape[:2])
-    size = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
-    way = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    return np.asarray(cv2.resize(dimmed, size, interpolation=way), np.uint8)
-
-
-def shrunk(image: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
-    """The image no wider than `width` pixels, its proportions kept."""
-    if image.shape[1] <= width:
-        return image
-    height = max(1, round(image.shape[0] * width / image.shape[1]))
-    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def jpeg_of(image: NDArray[np.uint8]) -> bytes:
-    """An image as a JPEG file."""
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return bytes(data)

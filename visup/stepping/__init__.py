@@ -1,10 +1,10 @@
 """Stepping: the debugger of an agent. Forth, back, inside a step, aside, and why.
 
->>> from visup.evaluation.runtime.soak import scripted
+>>> from visup.evaluation.runtime.scripted_observations import moving_ellipses
 >>> from visup.runs.settings import WatchSettings
 >>> from visup.stepping import ScriptedObservations, Stepper
 >>> from visup.runs.wiring import reasoning_agent
->>> stepper = Stepper(reasoning_agent(WatchSettings("script")), ScriptedObservations(scripted(100)))
+>>> stepper = Stepper(reasoning_agent(WatchSettings("script")), ScriptedObservations(moving_ellipses(100)))
 >>> stepper.step(until="entry").reasons
 ('entry: An object, believed to be the spartan, is in view.',)
 >>> stepper.back(3).frame_index

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from visup.agent import Observation, Outcome
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.model.display import enable_display
 from visup.agent.model.step import Step
 from visup.stepping.history import StepHistory
@@ -56,13 +56,13 @@ class Bookmark:
 
     Attributes:
         number: How many steps led there.
-        was: What the agent was.
-        course: The history that it belongs to.
+        snapshot: What the agent was.
+        history: The history that it belongs to.
     """
 
     number: int
-    was: Snapshot
-    course: StepHistory = field(repr=False)
+    snapshot: AgentSnapshot
+    history: StepHistory = field(repr=False)
 
 
 enable_display(PausedStep, StepResult)

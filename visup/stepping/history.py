@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from visup.agent import Alert, Event, Observation, Outcome
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.step import Step
 from visup.stepping.observation_log import ObservationLog
@@ -25,13 +25,13 @@ LATEST = 100
 
 @dataclass(slots=True)
 class StepHistory:
-    """One course of steps, and a place in it.
+    """The steps of one timeline, and a place among them.
 
     Attributes:
         agent: Thinks; between two steps it is what it was after step `at`.
-        tape: What was perceived; a branch shares it with the course that it left.
+        observations: What was perceived; a branch shares it with the timeline that it left.
         at: The place: how many steps led here.
-        begin: The number of steps before this course began: 0 but for branches.
+        begin: The number of steps before this timeline began: 0 but for branches.
         answers: What the operator said before the step after each number.
         spacing: Steps between two minds that are kept.
         latest: How many steps are kept whole.
@@ -46,8 +46,10 @@ class StepHistory:
     answers: dict[int, Mapping[int, str]] = field(default_factory=dict)
     spacing: int = SPACING
     latest: int = LATEST
-    _minds: dict[int, Snapshot] = field(default_factory=dict, init=False)
-    _whole: OrderedDict[int, tuple[Step, Snapshot]] = field(default_factory=OrderedDict, init=False)
+    _minds: dict[int, AgentSnapshot] = field(default_factory=dict, init=False)
+    _whole: OrderedDict[int, tuple[Step, AgentSnapshot]] = field(
+        default_factory=OrderedDict, init=False
+    )
     _told: list[tuple[tuple[Event, ...], tuple[Alert, ...]]] = field(
         default_factory=list, init=False
     )
@@ -56,8 +58,17 @@ class StepHistory:
         self.begin = self.made = self.at
         self._minds[self.at] = self.agent.snapshot()
 
+    def branch(self, agent: Agent) -> StepHistory:
+        """The history of a branch from here: another agent, which perceives and is told the same.
+
+        Args:
+            agent: As it is to be here.
+        """
+        answers = {n: given for n, given in self.answers.items() if n >= self.at}
+        return StepHistory(agent, self.observations, self.at, answers, self.spacing, self.latest)
+
     @property
-    def here(self) -> Snapshot:
+    def here(self) -> AgentSnapshot:
         """What the agent is now."""
         return self.agent.snapshot()
 
@@ -82,7 +93,7 @@ class StepHistory:
         return step
 
     def forward(self) -> Step:
-        """One step on along the tape."""
+        """One step on along what was perceived."""
         seen = self.observations.seen(self.at)
         *_, (_, thought) = self.phases(seen)
         return self.conclude(seen, thought)
@@ -91,7 +102,7 @@ class StepHistory:
         """Be after step `number`, one that was made.
 
         Returns:
-            That step; None where the course begins.
+            That step; None where the timeline begins.
         """
         self._note_answers()
         step = None
@@ -103,11 +114,11 @@ class StepHistory:
         return step
 
     def step(self, number: int) -> Step | None:
-        """Step `number`, one that was made, without going there; None where the course begins."""
+        """Step `number`, one that was made, without going there; None where the timeline begins."""
         with self.elsewhere():
             return self.go(number)
 
-    def snapshot(self, number: int) -> Snapshot:
+    def snapshot(self, number: int) -> AgentSnapshot:
         """What the agent was after step `number`, one that was made."""
         with self.elsewhere():
             self.go(number)
@@ -123,7 +134,7 @@ class StepHistory:
             self.at = at
             self.agent.restore(was)
 
-    def jump(self, number: int, was: Snapshot) -> None:
+    def jump(self, number: int, was: AgentSnapshot) -> None:
         """Be after step `number`, at which the agent was this."""
         self._note_answers()
         self.at = number

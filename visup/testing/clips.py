@@ -32,30 +32,35 @@ class LabelledFrame:
 
 
 def region_of(
-    mask: NDArray[np.bool_], region_id: int = 1, velocity: tuple[float, float] = (0.0, 0.0)
+    mask: NDArray[np.bool_],
+    region_id: int = 1,
+    velocity: tuple[float, float] = (0.0, 0.0),
+    *,
+    at: tuple[int, int] = (0, 0),
+    size: Size | None = None,
 ) -> Region:
-    """A region from its mask.
+    """A region from its mask; its contour is that of the largest part.
 
     Args:
-        mask: (height, width) bool, of the whole image, with at least one pixel.
+        mask: (height, width) bool with at least one pixel.
         region_id: Its number.
         velocity: (x, y) pixels per second.
-
-    Returns:
-        The region with its box, outline, centroid and area.
+        at: (x, y) of the mask's corner in the image, pixels.
+        size: (width, height) of the image; the mask is the whole image when left out.
     """
-    ys, xs = np.nonzero(mask)
-    x, y = int(xs.min()), int(ys.min())
-    w, h = int(xs.max()) - x + 1, int(ys.max()) - y + 1
-    outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    outline = max(outlines, key=len).reshape(-1, 2).astype(np.float32)
-    height, width = mask.shape
+    x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
+    crop = np.ascontiguousarray(mask[y : y + h, x : x + w])
+    outlines, _ = cv2.findContours(crop.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    ys, xs = np.nonzero(crop)
+    width, height = size or (mask.shape[1], mask.shape[0])
+    x, y = x + at[0], y + at[1]
     return Region(
         id=region_id,
         bbox=(x, y, w, h),
-        mask=mask[y : y + h, x : x + w],
-        contour=outline,
-        centroid=(float(xs.mean()), float(ys.mean())),
+        mask=crop,
+        contour=max(outlines, key=len).reshape(-1, 2).astype(np.float32)
+        + np.array([x, y], np.float32),
+        centroid=(float(xs.mean()) + x, float(ys.mean()) + y),
         area=float(len(xs)),
         velocity=velocity,
         cut=x == 0 or y == 0 or x + w == width or y + h == height,

@@ -20,7 +20,7 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.evaluation.runtime.soak import scripted
+from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.percepts.shape.behaviour import _rest_intervals
 from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.reasoners import default_reasoners
@@ -82,7 +82,7 @@ def test_without_attention_nothing_is_asked_and_nothing_else_changes() -> None:
     plain = reasoning_agent(WatchSettings("script"))
     attentive = reasoning_agent(WatchSettings("script", attention=True))
     rested = 0
-    for seen in scripted(90):
+    for seen in moving_ellipses(90):
         a, b = plain.reason(seen), attentive.reason(seen)
         assert a.directives == ()
         assert a.events == b.events
@@ -101,7 +101,7 @@ def test_only_directives_for_the_behaviour_count() -> None:
 
 def test_attention_is_a_reasoner_like_any_other() -> None:
     rules = default_reasoners()
-    agent = Agent([], Reasoners(rules.update, rules.cogitate, (AttentionReasoner(),)))
-    last = [agent.reason(seen) for seen in scripted(90)][-1]
+    agent = Agent([], Reasoners(rules.update, rules.cogitate, attend=(AttentionReasoner(),)))
+    last = [agent.reason(seen) for seen in moving_ellipses(90)][-1]
     assert last.directives
     assert {d.data["region"] for d in last.directives} <= {1, 2, 3}

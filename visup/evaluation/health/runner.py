@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 
 from visup.agent import Frame, HealthStatus, Observation
 from visup.agent.model.errors import SettingsError, VisupError
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.health.camera_faults import EXPECTED, inject
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.video import open_source
@@ -73,7 +74,7 @@ def evaluate_health(
     faults: int = FAULTS,
     seed: int = 0,
     limit: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Put faults into video below a folder, and run it unharmed too.
 
@@ -82,7 +83,7 @@ def evaluate_health(
         faults: How many faults; they go round the kinds and the videos.
         seed: Of the campaign.
         limit: Most frames of each video when it is run unharmed, or None for all.
-        progress: Told what is run.
+        progress: Shows what is being done.
 
     Returns:
         `items` by kind of fault, and `total`, with the keys `clips`, `found` (share reported within
@@ -97,8 +98,7 @@ def evaluate_health(
     told: list[TrialResult] = []
     missed: list[dict[str, Any]] = []
     for number, trial in enumerate(plan(sources, faults, seed)):
-        if progress is not None:
-            progress(f"fault {number + 1} of {faults}")
+        progress(f"fault {number + 1} of {faults}")
         told.append(result := run_trial(trial))
         if not (result.found and result.named):
             name = str(trial.source.relative_to(folder)) if trial.source != folder else folder.name
@@ -189,15 +189,12 @@ def statuses(frames: Iterator[Frame] | Sequence[Frame]) -> Iterator[tuple[Frame,
             yield frame, percept.value.status
 
 
-def _unharmed(
-    sources: Sequence[Path], limit: int | None, progress: Callable[[str], None] | None
-) -> dict[str, Any]:
+def _unharmed(sources: Sequence[Path], limit: int | None, progress: Progress) -> dict[str, Any]:
     """False reports (each run of frames that are not well is one) and the time of a frame."""
     reports, seconds = 0, 0.0
     ms: list[float] = []
     for path in sources:
-        if progress is not None:
-            progress(f"{path.name}, unharmed")
+        progress(f"{path.name}, unharmed")
         before = HealthStatus.OK
         with open_source(str(path)) as source:
             last = 0.0

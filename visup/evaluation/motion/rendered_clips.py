@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from importlib import resources
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import OutputError, SettingsError
+from visup.evaluation.figures import Progress, silent
 from visup.render.scenario.library import bench_names, shipped_scenario
 
 MARK = "made-of.txt"
@@ -49,7 +50,7 @@ def evaluate_clips(
     names: Sequence[str] = (),
     *,
     workers: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Render what is not yet rendered, score the segmenter on it, and compare with the bars.
 
@@ -57,7 +58,7 @@ def evaluate_clips(
         cache: Folder for the clips; made when missing.
         names: Which clips; all when empty.
         workers: Processes that share the work; as many as there are cores when None.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` by clip: what `evaluate_motion` says of it, `bar`, and `missed`, what it fell short of in
@@ -71,8 +72,7 @@ def evaluate_clips(
     found: dict[str, dict[str, Any]] = {}
     for name, figures in _scored(wanted, cache, workers or os.cpu_count() or 1):
         found[name] = figures
-        if progress is not None:
-            progress(f"{len(found)} of {len(wanted)} clips")
+        progress(f"{len(found)} of {len(wanted)} clips")
     items = {name: judged(found[name], bar_of(name)) for name in wanted}
     return {"total": _total(items), "items": items}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame, Region
 from visup.agent.model.errors import SettingsError, SourceError
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.motion.mask_scores import (
     UNSCORED,
     MaskOverlaps,
@@ -72,7 +73,7 @@ def evaluate_motion(
     *,
     every: int = 1,
     limit: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Score the segmenter on every sequence below a folder.
 
@@ -81,7 +82,7 @@ def evaluate_motion(
             `truth.json`), MOT folders (`img1`, `gt`), or is one of these.
         every: Use every n-th frame only.
         limit: Most frames of each sequence, or None for all.
-        progress: Told the name of each sequence before it is run.
+        progress: Shows what is being done.
 
     Returns:
         `total` and `items` by name, with the keys J, F, J_object, ghost, id_switches, mota, idf1,
@@ -95,8 +96,7 @@ def evaluate_motion(
     """
     items: dict[str, dict[str, Any]] = {}
     for sequence in find_sequences(folder):
-        if progress is not None:
-            progress(sequence.name)
+        progress(sequence.name)
         items[sequence.name] = _scores(sequence, _run(sequence, every, limit))
     return {"total": _total(list(items.values())), "items": items}
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.oracles import oracle
 from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
 from visup.rules.geometry.regions import RCC8, Floats
@@ -17,7 +17,6 @@ from visup.rules.relations.rcc8 import rcc8
 
 by_definition = oracle("relation_oracles")
 
-Progress = Callable[[str], None]
 FPS = 25.0
 OBJECTS = (2, 10, 50)
 
@@ -27,7 +26,7 @@ def evaluate_relations(
     seed: int = 0,
     draws: int = 10_000,
     minutes: float = 10.0,
-    progress: Progress = lambda _: None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """All figures.
 
@@ -35,7 +34,7 @@ def evaluate_relations(
         seed: Of all that is drawn.
         draws: Random pairs of boxes, and of moving points, that are compared with the oracles.
         minutes: How long boxes at rest are watched.
-        progress: Told what is being done.
+        progress: Shows what is being done.
 
     Returns:
         `items`: for each number of objects `fps`, `fps_cpu` (by processor time, where others share the

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import isclose
 from random import Random
@@ -12,6 +12,7 @@ from statistics import median
 from typing import Any
 
 from visup.agent import Mind, Observation
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.oracles import oracle
 from visup.evaluation.reasoning.rule_scenes import FPS, minds, twenty_rules
 from visup.rules.formula.nodes import Formula, Rule
@@ -37,18 +38,17 @@ ROUNDS = 5
 SNAPSHOTS = 10_000
 PEER_SHARE = 10
 """One formula is compared with rtamt for so many that are compared with the oracle."""
-Progress = Callable[[str], None]
 
 
 def evaluate_rules(
-    *, formulas: int = 10_000, seed: int = 0, progress: Progress = lambda _: None
+    *, formulas: int = 10_000, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
     """Compare and time the rule language.
 
     Args:
         formulas: How many random formulas are compared with the oracle.
         seed: Of all that is drawn.
-        progress: Is told what is being done.
+        progress: Shows what is being done.
 
     Returns:
         Items `oracle`, `rtamt` (left out when it is not installed), `window N`, `N objects` and
@@ -196,7 +196,7 @@ def _timed(rules: tuple[Rule, ...], seen: list[Mind]) -> tuple[list[float], list
         outcome = reasoner(mind, nothing)
         taken.append(time.perf_counter() - begin)
         concerns.append(len(outcome.conditions))
-        memory = outcome.mind.memory[SAFETY]
+        memory = outcome.mind.recall(SAFETY)
     return taken, concerns
 
 
@@ -208,7 +208,7 @@ def _snapshots(count: int = SNAPSHOTS) -> dict[str, Any]:
     tracemalloc.start()
     for k in range(count):
         mind = reasoner(replace(mind, time=2.0 + k / FPS), nothing).mind
-        kept.append(mind.memory[SAFETY])
+        kept.append(mind.recall(SAFETY))
     held, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     return {"kept": len(kept), "kb_each": held / count / 1024}

@@ -6,7 +6,7 @@ Seeing is left out, so that what is measured is reasoning alone: from percepts a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -19,15 +19,12 @@ import numpy as np
 from visup.agent import Frame, Mind, ObjectBelief, Presence
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.files import mission_folders
+from visup.evaluation.missions.overlaps import COVERING_IOU, SMALLEST_SCORED_PX
 from visup.evaluation.missions.pose_errors import true_spin
-from visup.evaluation.missions.runner import (
-    COVERING_IOU,
-    SMALLEST_SCORED_PX,
-    MissionRecorder,
-    mission_total,
-    report_scores,
-)
+from visup.evaluation.missions.recorder import MissionRecorder
+from visup.evaluation.missions.runner import mission_total, report_scores
 from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth, parse_truth
 from visup.evaluation.reasoning.calibration import Calibration
 from visup.evaluation.simulation.percepts import PerceptNoise, behaviours_of, frames_of
@@ -218,7 +215,7 @@ def evaluate_reasoning(
     every: int = 1,
     jobs: int = 2,
     noise: PerceptNoise | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Figures over all missions below a folder, each seen with the noise of several seeds.
 
@@ -229,7 +226,7 @@ def evaluate_reasoning(
         every: Use every n-th frame.
         jobs: Processes.
         noise: How wrong percepts are; its seed is not used.
-        progress: Told a line as each mission is done.
+        progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {mission: {...}}}; counts are summed over the seeds.
@@ -249,8 +246,7 @@ def evaluate_reasoning(
     with ProcessPoolExecutor(max_workers=jobs, mp_context=get_context("spawn")) as pool:
         for mission, found in zip(missions, pool.map(run, missions, chances), strict=True):
             runs[mission.name] = found
-            if progress:
-                progress(mission.name)
+            progress(mission.name)
     items = {name: _summed(found) for name, found in runs.items()}
     return {"total": _summed([r for found in runs.values() for r in found]), "items": items}
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -28,6 +28,7 @@ from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.records import FAULT_STATES, ReportState
 from visup.agent.model.step import Step
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
@@ -74,14 +75,14 @@ def evaluate_faults(
     *,
     count: int = COUNT,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Inject faults, one a run.
 
     Args:
         count: How many; they go round the kinds of fault.
         seed: Of all that is drawn.
-        progress: Told what is tried.
+        progress: Shows what is being done.
 
     Returns:
         `items` by kind of fault and `total`, with the keys `trials`, `isolated`, `ended`,
@@ -91,8 +92,7 @@ def evaluate_faults(
     trials = []
     for number in range(count):
         trial = draw(number, seed)
-        if progress:
-            progress(f"{number + 1} of {count}, {trial.fault}")
+        progress(f"{number + 1} of {count}, {trial.fault}")
         run(trial)
         trials.append(trial)
     names = [name for name in FAULTS if any(t.fault == name for t in trials)]

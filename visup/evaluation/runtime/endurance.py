@@ -6,50 +6,37 @@ under other ids, called by names that change. What is measured is the reasoners 
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from visup.agent import (
-    Health,
-    HealthStatus,
-    Hypothesis,
     Mind,
-    Observation,
-    Percept,
     Reasoner,
-    Region,
-    Report,
-    ReportState,
 )
-from visup.evaluation.simulation.truth_masks import region_from_mask
+from visup.evaluation.figures import Progress, resident_mb, silent
+from visup.evaluation.runtime.scripted_observations import FPS, drifting_boxes
 from visup.rules.reasoners import default_reasoners
 
-SIZE = (640, 480)
-FPS = 25.0
 SETTLED = 10_000
 """Frames after which memory is to stay as it is."""
 
 KEPT = 10_000
 """Minds that are kept to learn what one takes."""
 
-_NAMES = ("arm", "satellite", "guitar", "barrel", "drill", "engine")
-
 
 def evaluate_endurance(
-    frames: int, *, seed: int = 0, progress: Callable[[str], None] | None = None
+    frames: int, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
     """Run a script with three objects for so many frames, and one with ten for a tenth of them.
 
     Args:
         frames: How many.
         seed: Of the script.
-        progress: Told now and then.
+        progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {}}: `ms` and `ms_ten` (median per step), `rss_mb` at the end and
@@ -65,7 +52,7 @@ def evaluate_endurance(
             spent.append(took)
         if k == settled:
             at_rest = resident_mb()
-        if progress and k % 5000 == 0:
+        if k % 5000 == 0:
             progress(f"{k} of {frames} frames")
     end = resident_mb()
     ten = [took for took, _ in _thought(10, max(200, min(frames // 10, 2000)), seed, Mind())]
@@ -84,23 +71,12 @@ def evaluate_endurance(
     }
 
 
-def resident_mb() -> float:
-    """Resident memory of this process, MB."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-    except OSError:  # not Linux: the most that it ever was
-        import resource
-
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
 def _thought(count: int, frames: int, seed: int, mind: Mind) -> Iterator[tuple[float, Mind]]:
     """Seconds that each step took, and the mind after it."""
     rules = default_reasoners()
     reasoners: tuple[Reasoner, ...] = (*rules.update, *rules.cogitate)
     start = mind.time + 1.0 / FPS if mind.frame_index >= 0 else 0.0
-    for seen in script(count, frames, seed, start):
+    for seen in drifting_boxes(count, frames, seed, start):
         begin = time.perf_counter()
         mind = replace(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
@@ -108,54 +84,3 @@ def _thought(count: int, frames: int, seed: int, mind: Mind) -> Iterator[tuple[f
         for reasoner in reasoners:
             mind = reasoner(mind, seen).mind
         yield time.perf_counter() - begin, mind
-
-
-def script(count: int, frames: int, seed: int, start: float = 0.0) -> Iterator[Observation]:
-    """Observations of boxes that come and go.
-
-    Args:
-        count: How many boxes there are; each in turn is out of the image for a while.
-        frames: How many observations.
-        seed: Of flicker, jitter and names.
-        start: Seconds of the first one.
-    """
-    rng = np.random.default_rng(seed)
-    masks = [np.ones((40 + 4 * k, 60 + 6 * k), dtype=bool) for k in range(count)]
-    pace = 20.0 + 7.0 * np.arange(count)
-    for index in range(frames):
-        now = start + index / FPS
-        regions = []
-        for k, mask in enumerate(masks):
-            span = SIZE[0] + 2 * mask.shape[1]
-            lap, along = divmod(pace[k] * now, span)
-            x = round(along - mask.shape[1] + rng.normal(0, 0.5))
-            y = 20 + round((37 * k) % (SIZE[1] - 120) + 20 * np.sin(now / 3 + k))
-            region = _box(1 + k + count * int(lap), mask, x, y)
-            if region is not None and rng.random() > 0.1:
-                regions.append(region)
-        yield _observation(index, now, regions, rng)
-
-
-def _box(number: int, mask: np.ndarray, x: int, y: int) -> Region | None:
-    w = mask.shape[1]
-    left, right = max(0, x), min(SIZE[0], x + w)
-    if right - left < 4:
-        return None
-    return region_from_mask(number, mask[:, : right - left], at=(left, y), size=SIZE)
-
-
-def _observation(
-    index: int, now: float, regions: list[Region], rng: np.random.Generator
-) -> Observation:
-    percepts = [Percept("region", r, now, "script") for r in regions]
-    percepts.append(Percept("health", Health(HealthStatus.OK), now, "script"))
-    if index % 5 == 0:
-        for r in regions:
-            own = _NAMES[(r.id - 1) % 3]
-            other = _NAMES[int(rng.integers(len(_NAMES)))]
-            for name, similarity in ((own, 0.7), (other, 0.65 + 0.1 * rng.random())):
-                said = Hypothesis(r.id, name, 0, similarity)
-                percepts.append(Percept("hypothesis", said, now, "script"))
-    gives = ("region", "health", "hypothesis") if index % 5 == 0 else ("region", "health")
-    report = Report("script", ReportState.RAN, gives, tuple(percepts))
-    return Observation(index, now, SIZE, (report,))

@@ -1,6 +1,6 @@
 """How fast an agent thinks: a step without perception, observers, replay, and minds that are kept.
 
-Scripted percepts (`endurance.py`), twenty rules, two tasks, the journal on. Times are processor time of the
+Scripted observations, twenty rules, two tasks, the journal on. Times are processor time of the
 process, and of each figure the median as well as the lowest decile is told: what else a busy machine
 does makes steps slower, never faster.
 """
@@ -10,7 +10,6 @@ from __future__ import annotations
 import gc
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -24,7 +23,8 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.agent.storage.jsonable import to_jsonable
-from visup.evaluation.runtime.endurance import SIZE, resident_mb, script
+from visup.evaluation.figures import Progress, resident_mb, silent
+from visup.evaluation.runtime.scripted_observations import SIZE, drifting_boxes
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -82,14 +82,14 @@ rule was_apart(a, b): info
 
 
 def evaluate_pace(
-    steps: int = 2000, *, kept: int = 10_000, progress: Callable[[str], None] | None = None
+    steps: int = 2000, *, kept: int = 10_000, progress: Progress = silent
 ) -> dict[str, Any]:
     """Measure the pace of reasoning.
 
     Args:
         steps: Of each script.
         kept: Minds that are kept in a row.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` for '3 objects' and '10 objects' with `ms` and `ms_low` (median and lowest decile of
@@ -103,20 +103,19 @@ def evaluate_pace(
     """
     if steps < LEAST_STEPS:
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
-    tell = progress or (lambda _: None)
     items: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as scratch:
         settings = _settings(Path(scratch))
         for count in COUNTS:
-            tell(f"{count} objects")
+            progress(f"{count} objects")
             items[f"{count} objects"] = _stepped(
-                settings, list(script(count, steps, count)), Path(scratch) / str(count)
+                settings, list(drifting_boxes(count, steps, count)), Path(scratch) / str(count)
             )
-        tell("replay")
+        progress("replay")
         fps = _replay_fps(Path(scratch) / str(COUNTS[0]))
-        tell("observers")
+        progress("observers")
         share = _observers(settings, Path(scratch) / "alerts.jsonl")
-    tell(f"{kept} minds")
+    progress(f"{kept} minds")
     total = {"observers": share, "replay_fps": fps, "mind_kb": _mind_kb(kept)}
     return {"items": items, "total": total}
 
@@ -167,7 +166,7 @@ def _observers(settings: WatchSettings, place: Path) -> float:
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     agent = reasoning_agent(settings)
     thought, told = [], []
-    for one in script(COUNTS[0], LEAST_STEPS, 2):
+    for one in drifting_boxes(COUNTS[0], LEAST_STEPS, 2):
         begin = time.thread_time()
         step = agent.reason(one)
         middle = time.thread_time()
@@ -181,7 +180,7 @@ def _observers(settings: WatchSettings, place: Path) -> float:
 def _mind_kb(count: int) -> float:
     agent: Agent = reasoning_agent(WatchSettings("scripted"))
     minds: list[Mind] = []
-    for k, one in enumerate(script(COUNTS[0], WARM + count, 1)):
+    for k, one in enumerate(drifting_boxes(COUNTS[0], WARM + count, 1)):
         if k == WARM:
             gc.collect()
             before = resident_mb()

@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from rich.console import Console
 
 from visup.agent.model.errors import OutputError, SettingsError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text
+from visup.evaluation.figures import Progress, silent, sums_of
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import Audience, supervise
 from visup.runs.settings import RunOptions, WatchSettings
@@ -41,7 +43,7 @@ def evaluate_resume(
     kills: int = 200,
     seed: int = 0,
     state_every_s: float = STATE_EVERY_S,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Kill runs and resume them.
 
@@ -50,7 +52,7 @@ def evaluate_resume(
         kills: How many runs are killed.
         seed: Of the moments.
         state_every_s: Seconds between states, in the runs that keep them.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` 'with states' and 'without', each with `kills`, `early` (killed before anything was
@@ -65,27 +67,22 @@ def evaluate_resume(
     if not hasattr(os, "fork"):
         raise SettingsError("runs can only be killed where processes can be forked")
     rng = np.random.default_rng(seed)
-    tally: dict[str, _ResumeCounts] = {"with states": _ResumeCounts(), "without": _ResumeCounts()}
+    counts: dict[str, _ResumeCounts] = {"with states": _ResumeCounts(), "without": _ResumeCounts()}
     failures: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
         place = Path(scratch)
         settings = settings or WatchSettings(source=str(crossing(place / "clip.avi", seed)))
-        child = _begin(settings, place / "whole", state_every_s)
-        begin = time.perf_counter()
-        _wait(child)
-        whole_s = time.perf_counter() - begin
-        expected = _outcome(place / "whole")
+        unbroken = _unbroken_run(settings, place / "whole", state_every_s)
         for trial in range(kills):
-            if progress:
-                progress(f"{trial} of {kills} runs killed")
+            progress(f"{trial} of {kills} runs killed")
             stateless = rng.random() < STATELESS
             every = 0.0 if stateless else state_every_s
-            one = tally["without" if stateless else "with states"]
-            said = _trial(settings, place / f"{trial}", every, whole_s, expected, rng, one)
+            one = counts["without" if stateless else "with states"]
+            said = _trial(unbroken, place / f"{trial}", every, rng, one)
             failures += [f"run {trial}: {text}" for text in said]
-    items = {name: t.figures() for name, t in tally.items() if t.kills}
-    total = {k: sum(i[k] for i in items.values()) for k in ("kills", "early", "equal", "lost")}
-    return {"items": items, "total": {**total, "whole_s": whole_s}, "failures": failures}
+    items = {name: t.figures() for name, t in counts.items() if t.kills}
+    total = sums_of(list(items.values()), ("kills", "early", "equal", "lost"))
+    return {"items": items, "total": {**total, "whole_s": unbroken.seconds}, "failures": failures}
 
 
 def crossing(path: Path, seed: int) -> Path:
@@ -121,24 +118,38 @@ class _ResumeCounts:
         return {**figures, "resume_s": float(np.median(self.seconds or [0.0]))}
 
 
+@dataclass(frozen=True, slots=True)
+class _UnbrokenRun:
+    """The run that killed ones are compared with: its settings, how long it took, its outcome."""
+
+    settings: WatchSettings
+    seconds: float
+    outcome: object
+
+
+def _unbroken_run(settings: WatchSettings, folder: Path, every: float) -> _UnbrokenRun:
+    child = _begin(settings, folder, every)
+    begin = time.perf_counter()
+    _wait(child)
+    return _UnbrokenRun(settings, time.perf_counter() - begin, _outcome(folder))
+
+
 def _trial(
-    settings: WatchSettings,
+    unbroken: _UnbrokenRun,
     folder: Path,
     every: float,
-    whole_s: float,
-    expected: object,
     rng: np.random.Generator,
-    tally: _ResumeCounts,
+    counts: _ResumeCounts,
 ) -> Sequence[str]:
     """Kill one run and go on with it to its end; what is wrong with it."""
-    tally.kills += 1
-    _kill(_begin(settings, folder, every), float(rng.uniform(0.0, whole_s)))
+    counts.kills += 1
+    _kill(_begin(unbroken.settings, folder, every), float(rng.uniform(0.0, unbroken.seconds)))
     try:
         interrupted_run(folder)
     except OutputError as nothing:
         if "is over" not in nothing.what:
-            tally.early += 1
-            tally.equal += not _printed(folder)
+            counts.early += 1
+            counts.equal += not _printed(folder)
             return [f"{nothing.what}, but events were printed"] if _printed(folder) else []
     missing = _missing(folder)
     for _ in range(MOST_RESUMES):
@@ -146,16 +157,16 @@ def _trial(
         child = _resume(folder, every)
         if child is None:
             break
-        tally.resumed += 1
+        counts.resumed += 1
         if rng.random() < KILLED_AGAIN:
-            _kill(child, float(rng.uniform(0.0, whole_s)))
+            _kill(child, float(rng.uniform(0.0, unbroken.seconds)))
         else:
             _wait(child)
-            tally.seconds.append(time.perf_counter() - begin)
+            counts.seconds.append(time.perf_counter() - begin)
         missing += _missing(folder)
-    tally.lost += missing
-    same = _outcome(folder) == expected
-    tally.equal += same
+    counts.lost += missing
+    same = _outcome(folder) == unbroken.outcome
+    counts.equal += same
     said = [] if same else ["another outcome than the unbroken run's"]
     return [*said, *([f"{missing} printed events are missing"] if missing else [])]
 

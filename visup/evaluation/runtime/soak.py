@@ -7,57 +7,42 @@ same percepts again must tell the same events, and sinks must cost the cycle nex
 from __future__ import annotations
 
 import hashlib
-import math
-import os
 import tempfile
 import time
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import (
-    Depth,
     Frame,
-    Health,
-    HealthStatus,
-    Hypothesis,
     Observation,
-    Percept,
-    Region,
-    Report,
-    ReportState,
 )
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal, JournalLimits, segments
 from visup.agent.storage.journal_reader import JOURNAL, Recording, export_events
+from visup.evaluation.figures import Progress, resident_mb, silent
+from visup.evaluation.runtime.scripted_observations import SIZE, moving_ellipses
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 from visup.sinks import Sinks
 
-FPS = 25.0
-SIZE = (640, 480)
-OBJECTS = 3
 LEAST_FRAMES = 2000
 LIMITS = JournalLimits(segment_bytes=32 * 2**20, keep_bytes=128 * 2**20)
-NAMES = ("arm", "spartan", "hubble")
 PAIRS = 12  # blocks with and without sinks, in turn
 
 
-def evaluate_soak(
-    frames: int = 200_000, *, progress: Callable[[str], None] | None = None
-) -> dict[str, Any]:
+def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict[str, Any]:
     """Measure a long run.
 
     Args:
         frames: Its length.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` for the run's 'start' and 'end' (a tenth of the run each, the first hundredth left out)
@@ -73,17 +58,16 @@ def evaluate_soak(
     """
     if frames < LEAST_FRAMES:
         raise SettingsError(f"--frames is {frames}", expected=f"at least {LEAST_FRAMES}")
-    tell = progress or (lambda _: None)
     with tempfile.TemporaryDirectory() as scratch:
         place = Path(scratch)
-        tell("the same twice")
+        progress("the same twice")
         prints = [_events_of(place / name, LEAST_FRAMES) for name in ("once", "twice")]
         rate = _replay_fps(place / "once")
-        tell("sinks")
+        progress("sinks")
         ratio = sinks_ratio(place, LEAST_FRAMES)
         folder = place / "long"
         folder.mkdir()
-        costs, beside, memory = _long(folder, frames, tell)
+        costs, beside, memory = _long(folder, frames, progress)
         disk = sum(p.stat().st_size for p in segments(folder / JOURNAL))
     tenth = frames // 10
     start, end = costs[frames // 100 : tenth], costs[-tenth:]
@@ -105,70 +89,6 @@ def evaluate_soak(
     return {"items": items, "total": total}
 
 
-def scripted(count: int, begin: int = 0) -> Iterator[Observation]:
-    """What would be perceived of three ellipses that move to and fro, meet and part.
-
-    Args:
-        count: Frames.
-        begin: Number of the first.
-    """
-    shapes = [_ellipse(20 + 6 * k, 14 + 4 * k) for k in range(OBJECTS)]
-    for index in range(begin, begin + count):
-        yield _seen(index, shapes)
-
-
-def _seen(index: int, shapes: list[tuple[Any, Any]]) -> Observation:
-    t = index / FPS
-    regions = [_region(k + 1, t, *shapes[k]) for k in range(OBJECTS)]
-    looks = [
-        Hypothesis(r.id, NAMES[(r.id + n) % 3], 4 * n + r.id, 0.9 - 0.2 * n, 0.1, 30.0)
-        for r in regions
-        for n in range(2)
-    ]
-    depths = [Depth(r.id, NAMES[r.id % 3], 10.0 + r.id, 0.5) for r in regions]
-    health = [Health(HealthStatus.OK)]
-    told: dict[str, list[Any]] = {
-        "health": health,
-        "region": regions,
-        "hypothesis": looks,
-        "depth": depths,
-    }
-    return Observation(
-        index, t, SIZE, tuple(_report(kind, values, t) for kind, values in told.items())
-    )
-
-
-def _report(kind: str, values: list[Any], t: float) -> Report:
-    percepts = tuple(Percept(kind, v, t, kind) for v in values)
-    return Report(kind, ReportState.RAN, (kind,), percepts)
-
-
-def _ellipse(a: int, b: int) -> tuple[Any, Any]:
-    y, x = np.mgrid[-b : b + 1, -a : a + 1]
-    mask = (x / a) ** 2 + (y / b) ** 2 <= 1.0
-    outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return mask, np.asarray(outlines[0][:, 0], np.float32)
-
-
-def _region(number: int, t: float, mask: Any, outline: Any) -> Region:
-    period, reach = 16.0 + 5 * number, 200.0
-    turn = 2 * math.pi * t / period
-    cx, cy = 320 + reach * math.sin(turn), 120.0 * number + 30 * math.cos(turn)
-    h, w = mask.shape
-    x, y = round(cx - w / 2), round(cy - h / 2)
-    speed = 2 * math.pi / period
-    return Region(
-        id=number,
-        bbox=(x, y, w, h),
-        mask=mask,
-        contour=outline + np.array([x, y], np.float32),
-        centroid=(x + (w - 1) / 2, y + (h - 1) / 2),
-        area=float(mask.sum()),
-        velocity=(reach * speed * math.cos(turn), -30 * speed * math.sin(turn)),
-        velocity_sigma=0.5,
-    )
-
-
 def _journal(folder: Path, limits: JournalLimits | None = None) -> Journal:
     from visup.agent.storage.jsonable import to_jsonable
 
@@ -178,23 +98,23 @@ def _journal(folder: Path, limits: JournalLimits | None = None) -> Journal:
 
 
 def _long(
-    folder: Path, frames: int, tell: Callable[[str], None]
+    folder: Path, frames: int, progress: Progress
 ) -> tuple[list[float], list[float], list[float]]:
     """Costs of the steps of a long run, of a fresh run beside its last tenth, and memory."""
     long, fresh = _JournaledAgent(folder, LIMITS), None
     last_tenth = frames - frames // 10
     memory: list[float] = []
-    for seen in scripted(frames):
+    for seen in moving_ellipses(frames):
         long.step(seen)
         if seen.frame_index == last_tenth:
-            memory.append(rss_mb())
+            memory.append(resident_mb())
             fresh = _JournaledAgent(folder / "fresh", LIMITS)
         if fresh:
             fresh.step(seen)
         if seen.frame_index == frames // 10:
-            memory.append(rss_mb())
+            memory.append(resident_mb())
         if seen.frame_index % 1000 == 0:
-            tell(f"{seen.frame_index} of {frames} frames")
+            progress(f"{seen.frame_index} of {frames} frames")
     long.journal.close()
     assert fresh is not None
     fresh.journal.close()
@@ -224,7 +144,7 @@ def _events_of(folder: Path, frames: int) -> str:
     folder.mkdir()
     agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
     journal = _journal(folder)
-    for seen in scripted(frames):
+    for seen in moving_ellipses(frames):
         journal.record(agent.reason(seen))
     journal.close()
     export_events(folder / JOURNAL, folder / "events.jsonl")
@@ -242,7 +162,7 @@ def _replay_fps(folder: Path) -> float:
 def _bytes_each(frames: int) -> float:
     from visup.agent.storage.codec import pack_observation
 
-    sizes = [len(pack_observation(seen)) for seen in scripted(frames // 20)]
+    sizes = [len(pack_observation(seen)) for seen in moving_ellipses(frames // 20)]
     return float(np.mean(sizes))
 
 
@@ -265,7 +185,7 @@ def sinks_ratio(place: Path, frames: int, also: tuple[str, ...] = ()) -> float:
     for number in range(2 * PAIRS):
         watched = number % 2
         observers: list[Callable[[Step, Frame], None]] = [sinks] if watched else []
-        seen = list(scripted(block, number * block))
+        seen = list(moving_ellipses(block, number * block))
         begin = time.perf_counter()
         for one in seen:
             step = agent.reason(one)
@@ -274,13 +194,3 @@ def sinks_ratio(place: Path, frames: int, also: tuple[str, ...] = ()) -> float:
         taken[watched].append(time.perf_counter() - begin)
     sinks.close()
     return float(np.percentile(taken[1], 25) / np.percentile(taken[0], 25))
-
-
-def rss_mb() -> float:
-    """Memory that this process takes, megabytes."""
-    pages = Path("/proc/self/statm")
-    if pages.exists():
-        return int(pages.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
-    import resource
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10

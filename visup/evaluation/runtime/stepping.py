@@ -1,6 +1,6 @@
 """`visup eval stepping`: what going back costs, what is kept for it, and whether it leads to the same.
 
-Three bodies that move, meet and part (as of `soak`), all reasoning, one task. Every region owns its mask
+Three ellipses that move, meet and part, all reasoning, one task. Every region owns its mask
 and outline, as regions that were seen do.
 """
 
@@ -15,12 +15,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import Mind, Observation, Region
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import dump_state
-from visup.evaluation.runtime.soak import rss_mb, scripted
+from visup.evaluation.figures import Progress, resident_mb, silent
+from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.rules.relations.reasoner import RELATIONS
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -33,18 +35,20 @@ KEPT_STEPS = 10_000
 LEAST_STEPS = 1000
 BLOCK = 50  # steps made in turn with and without a stepper
 BLOCKS = 12
-PLACES = 30
+VISITS = 30
+WARM = 100
+EVERY = 50  # steps between those whose digests are compared
 
 
 def evaluate_stepping(
-    steps: int = KEPT_STEPS, *, seed: int = 0, progress: Callable[[str], None] | None = None
+    steps: int = KEPT_STEPS, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
     """Measure a long course.
 
     Args:
         steps: How many are made.
         seed: Of the places from which one goes back.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` for going 'back' (by `BACK` steps, from anywhere), for `step` number n told without
@@ -59,43 +63,55 @@ def evaluate_stepping(
     """
     if steps < LEAST_STEPS:
         raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
-    tell = progress or (lambda _: None)
-    tell("by itself and stepped, in turn")
+    progress("by itself and stepped, in turn")
     slower = _slower()
-    it = _stepper(steps + 10)
-    prints: dict[int, bytes] = {}
-    it.step(100)
-    gc.collect()
-    before = rss_mb()
-    while it.at < steps:
-        step = it.step(50).step
-        assert step is not None
-        prints[it.at] = _print(step)
-        if it.at % 1000 == 0:
-            tell(f"{it.at} of {steps} steps")
-    gc.collect()
-    kept = rss_mb() - before
-    tell("going back")
-    places = np.random.default_rng(seed).integers(BACK + 1, steps, PLACES)
-    back, look, branch, same = [], [], [], []
-    for place in map(int, places):
-        it.go(place)
-        back.append(_ms(lambda: it.back(BACK)))
-        near = -(-it.at // 50) * 50
-        step = it.go(max(near, 150))
-        same.append(step is not None and _print(step) == prints[it.at])
-        it.go(place)
-        look.append(_ms(partial(it.at_step, place - BACK)))
-        it.back(BACK)
-        branch.append(_ms(lambda: it.branch().step(1)))
-    items = {"back": _times(back), "look": _times(look), "branch": _times(branch)}
+    stepper = _stepper(steps + 10)
+    digests, grown_mb = _stepped(stepper, steps, progress)
+    progress("going back")
+    items, same = _visits(
+        stepper, np.random.default_rng(seed).integers(BACK + 1, steps, VISITS), digests
+    )
     total = {
         "steps": steps,
-        "kept_mb": kept * KEPT_STEPS / (steps - 100),
+        "kept_mb": grown_mb * KEPT_STEPS / (steps - WARM),
         "same": float(np.mean(same)),
         "slower": slower,
     }
     return {"items": items, "total": total}
+
+
+def _stepped(stepper: Stepper, steps: int, progress: Progress) -> tuple[dict[int, bytes], float]:
+    """Digests of every 50th step on the way to the last, and by how much memory grew meanwhile, MB."""
+    digests: dict[int, bytes] = {}
+    stepper.step(WARM)
+    gc.collect()
+    before = resident_mb()
+    while stepper.at < steps:
+        step = stepper.step(EVERY).step
+        assert step is not None
+        digests[stepper.at] = _digest(step)
+        if stepper.at % 1000 == 0:
+            progress(f"{stepper.at} of {steps} steps")
+    gc.collect()
+    return digests, resident_mb() - before
+
+
+def _visits(
+    stepper: Stepper, places: NDArray[np.int64], digests: dict[int, bytes]
+) -> tuple[dict[str, dict[str, float]], list[bool]]:
+    """Times of going back, looking and branching from these steps; whether the steps after are the same."""
+    back, look, branch, same = [], [], [], []
+    for place in map(int, places):
+        stepper.go(place)
+        back.append(_ms(lambda: stepper.back(BACK)))
+        near = -(-stepper.at // EVERY) * EVERY
+        step = stepper.go(max(near, WARM + EVERY))
+        same.append(step is not None and _digest(step) == digests[stepper.at])
+        stepper.go(place)
+        look.append(_ms(partial(stepper.at_step, place - BACK)))
+        stepper.back(BACK)
+        branch.append(_ms(lambda: stepper.branch().step(1)))
+    return {"back": _times(back), "look": _times(look), "branch": _times(branch)}, same
 
 
 def missed(figures: dict[str, Any]) -> list[str]:
@@ -110,7 +126,7 @@ def missed(figures: dict[str, Any]) -> list[str]:
 
 
 def _stepper(steps: int) -> Stepper:
-    return Stepper(_agent(), ScriptedObservations(_own(seen) for seen in scripted(steps)))
+    return Stepper(_agent(), ScriptedObservations(_own(seen) for seen in moving_ellipses(steps)))
 
 
 def _agent() -> Any:
@@ -135,7 +151,7 @@ def _own(observation: Observation) -> Observation:
 def _slower() -> float:
     """Short blocks with and without take turns, so that what else the machine does meets both."""
     agent, it = _agent(), _stepper((BLOCKS + 1) * BLOCK)
-    frames: Iterator[Observation] = (_own(seen) for seen in scripted((BLOCKS + 1) * BLOCK))
+    frames: Iterator[Observation] = (_own(seen) for seen in moving_ellipses((BLOCKS + 1) * BLOCK))
     alone, stepped = [], []
     for _ in range(BLOCKS + 1):
         block = [next(frames) for _ in range(BLOCK)]
@@ -155,7 +171,7 @@ def _making() -> float:
     taken = []
     for _ in range(5):
         begin = time.process_time()
-        for seen in scripted(BLOCK):
+        for seen in moving_ellipses(BLOCK):
             _own(seen)
         taken.append(time.process_time() - begin)
     return float(np.percentile(taken, 25))
@@ -163,13 +179,11 @@ def _making() -> float:
 
 def whole(mind: Mind) -> Mind:
     """The same mind without where in memory its samples lie, which is no part of what is believed."""
-    kept = mind.memory.get(RELATIONS)
-    if kept is None:
-        return mind
+    kept = mind.recall(RELATIONS)
     return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
 
 
-def _print(step: Step) -> bytes:
+def _digest(step: Step) -> bytes:
     return hashlib.sha256(
         dump_state((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
     ).digest()

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.evaluation.figures import Progress, silent
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.index.view_records import ModelView, NewView
 from visup.percepts.shape.matching.shape_similarity import Shape
@@ -30,7 +31,7 @@ def augmented(
     path: Path,
     views: int,
     seed: int = 0,
-    progress: Callable[[int], None] | None = None,
+    progress: Progress = silent,
 ) -> ModelDatabase:
     """A database of so many views: those of another, then deformed ones of them in turn.
 
@@ -39,7 +40,7 @@ def augmented(
         path: Where the new database is written.
         views: How many views it gets.
         seed: Of the deformations.
-        progress: Told now and then how many views are written.
+        progress: Shows what is being done.
 
     Returns:
         The database; the same bytes for the same arguments.
@@ -47,8 +48,8 @@ def augmented(
 
     def every() -> Iterator[NewView]:
         for number in range(views):
-            if progress is not None and number % 1000 == 0:
-                progress(number)
+            if number % 1000 == 0:
+                progress(f"{number} of {views} views")
             source = number % len(database.views)
             view, shape = database.views[source], database.shapes[source]
             yield _new(view, shape if number == source else deformed(shape, seed, number))

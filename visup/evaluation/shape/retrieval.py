@@ -7,7 +7,7 @@ outlines and areas); the second, `graph_alone`, is the shock graph without these
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
+from visup.evaluation.figures import Progress, silent
 from visup.percepts.shape.building.build import PICTURES, read_silhouette
 from visup.percepts.shape.database.model_database import candidates_wanted
 from visup.percepts.shape.index.view_index import ViewIndex
@@ -49,14 +50,14 @@ class _Rows:
 
 
 def evaluate_shapes(
-    folder: Path, *, limit: int | None = None, progress: Callable[[str], None] | None = None
+    folder: Path, *, limit: int | None = None, progress: Progress = silent
 ) -> dict[str, Any]:
     """Figures of leaving one out over `<class>/*.png` below a folder.
 
     Args:
         folder: Folder of classes. Polarity of the pictures is found out.
         limit: Shapes of each class, for a quick look; all by default.
-        progress: Told a line now and then.
+        progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {class: {...}}}: shares `nn1`, `bullseye`, `lost` and `compared` are
@@ -99,12 +100,9 @@ def _listed(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Pat
     return np.array([name for name, _ in found]), [file for _, file in found]
 
 
-def _shapes(
-    files: Sequence[Path], progress: Callable[[str], None] | None
-) -> tuple[list[Shape], float]:
+def _shapes(files: Sequence[Path], progress: Progress) -> tuple[list[Shape], float]:
     """Shapes of all pictures, and the milliseconds that one takes from mask to shock graph."""
-    if progress:
-        progress(f"{len(files)} silhouettes")
+    progress(f"{len(files)} silhouettes")
     spent, shapes = [], []
     for file in files:
         mask = read_silhouette(file)
@@ -118,7 +116,7 @@ def _shapes(
 
 
 def _similarities(
-    shapes: list[Shape], progress: Callable[[str], None] | None
+    shapes: list[Shape], progress: Progress
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Similarities of graphs of all pairs, what the second looks add, and milliseconds a pair."""
     size = len(shapes)
@@ -133,8 +131,7 @@ def _similarities(
             for i, g, o in zip(done.rows, done.graphs, done.looks, strict=True):
                 graphs[i, :i] = graphs[:i, i] = g
                 looks[i, :i] = looks[:i, i] = o
-            if progress:
-                progress(f"{done.rows[-1] + 1} of {size} queries")
+            progress(f"{done.rows[-1] + 1} of {size} queries")
     return graphs, looks, 1e3 * seconds / (size * (size - 1) / 2)
 
 

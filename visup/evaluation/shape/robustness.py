@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import VisupError
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.shape.corrupt import (
     CORRUPTIONS,
     HARMLESS,
@@ -71,7 +71,7 @@ def evaluate_robustness(
     masks: int = ODD_MASKS,
     seed: int = 0,
     largest: int = LARGE,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run both campaigns on a database made here.
 
@@ -80,23 +80,22 @@ def evaluate_robustness(
         masks: How many odd masks; they go round the kinds.
         seed: Of both campaigns.
         largest: Side of the largest masks, pixels.
-        progress: Told what is tried.
+        progress: Shows what is being done.
 
     Returns:
         `items` by kind and `total`, with the keys `trials`, `refused`, `answered`, `nothing`,
         `failed` (counts) and `worst_s`; `failures` lists what failed: kind, number, what, seconds.
     """
-    tell = progress or (lambda _: None)
     outcomes: list[CorruptionOutcome] = []
     with tempfile.TemporaryDirectory() as scratch:
         database = sound_database(Path(scratch) / "sound.db", seed)
         for number in range(files):
             if number % 50 == 0:
-                tell(f"damaged file {number} of {files}")
+                progress(f"damaged file {number} of {files}")
             outcomes.append(try_file(database, Path(scratch) / "damaged.db", number, seed))
         for number in range(masks):
             if number % 50 == 0:
-                tell(f"odd mask {number} of {masks}")
+                progress(f"odd mask {number} of {masks}")
             outcomes.append(try_mask(database, number, seed, largest))
     kinds = dict.fromkeys([*(o.kind for o in outcomes)])
     return {

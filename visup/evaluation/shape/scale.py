@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.shape.augment import augmented
 from visup.percepts.shape.building.build import build_database
 from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
+from visup.percepts.shape.silhouette.silhouette import normalise
 
 VIEWS_OF_A_MESH = 16
 SIZES = (1, 10)
@@ -45,7 +48,7 @@ def evaluate_scale(
     *,
     most: int = 100_000,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure databases of a folder's meshes, as they are, ten times as large, and as large as asked.
 
@@ -53,7 +56,7 @@ def evaluate_scale(
         folder: Meshes, `*.ply`.
         most: Views of the largest database.
         seed: Of the deformations and of the queries.
-        progress: Told what is done.
+        progress: Shows what is being done.
 
     Returns:
         `items` by number of views, each with `open_ms`, `first_ms` (the first query), `ms_query` (median
@@ -70,9 +73,8 @@ def evaluate_scale(
     meshes = sorted(folder.glob("*.ply"))
     if not meshes:
         raise SettingsError("there are no meshes here", where=str(folder), expected="*.ply")
-    tell = progress or (lambda _: None)
     with tempfile.TemporaryDirectory() as scratch:
-        tell(f"{len(meshes)} meshes")
+        progress(f"{len(meshes)} meshes")
         begin = time.perf_counter()
         base = build_database(Path(scratch) / "base.db", meshes, views=VIEWS_OF_A_MESH, jobs=2)
         rate = len(base.views) / (time.perf_counter() - begin)
@@ -82,8 +84,8 @@ def evaluate_scale(
         counts = [len(base.views) * k for k in SIZES]
         for views in (*counts, *([most] if most > counts[-1] else [])):
             path = Path(scratch) / f"{views}.db"
-            augmented(base, path, views, seed, lambda n, of=views: tell(f"{n} of {of} views"))  # type: ignore[misc]
-            tell(f"queries among {views} views")
+            augmented(base, path, views, seed, progress)
+            progress(f"queries among {views} views")
             items[f"{views} views"] = _probed(path, masks, exhaustive=views in counts)
             path.unlink()
     once, ten = (items[f"{views} views"]["ms_cpu"] for views in counts)
@@ -121,16 +123,24 @@ def _probed(path: Path, masks: Path, *, exhaustive: bool) -> dict[str, Any]:
 
 def probe(path: Path, masks: Sequence[NDArray[np.bool_]], *, exhaustive: bool) -> dict[str, Any]:
     """Figures of one database; see `evaluate_scale`."""
-    # What is imported when it is first needed is no part of opening or answering.
-    from visup.percepts.shape.matching.shape_similarity import shape_of
-    from visup.percepts.shape.silhouette.silhouette import normalise
-
     shapes = [shape_of(s) for m in masks if (s := normalise(m)) is not None]
     begin = time.perf_counter()
     database = ModelDatabase.open(path)
     opened = time.perf_counter() - begin
     database.query(shapes[0], top=_WANTED)
     first = time.perf_counter() - begin - opened
+    figures = {
+        "open_ms": 1e3 * opened,
+        "first_ms": 1e3 * first,
+        **_query_figures(database, masks),
+        # Kilobytes on Linux; taken before exhaustive search, which looks at everything.
+        "rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return figures | ({"lost": _lost(database, shapes)} if exhaustive else {})
+
+
+def _query_figures(database: ModelDatabase, masks: Sequence[NDArray[np.bool_]]) -> dict[str, float]:
+    """Times from mask to ranked list, and the share of views that was compared."""
     whole, search, spent, compared = [], [], [], []
     for mask in masks:
         begin, busy = time.perf_counter(), time.process_time()
@@ -143,26 +153,27 @@ def probe(path: Path, masks: Sequence[NDArray[np.bool_]], *, exhaustive: bool) -
         whole.append(time.perf_counter() - begin)
         search.append(time.perf_counter() - seen)
         spent.append(time.process_time() - busy)
-    figures = {
-        "open_ms": 1e3 * opened,
-        "first_ms": 1e3 * first,
+    return {
         "ms_query": 1e3 * float(np.median(whole)),
         "ms_search": 1e3 * float(np.median(search)),
         "ms_cpu": 1e3 * float(np.median(spent)),
         "ms_worst": 1e3 * max(whole),
-        # Kilobytes on Linux; taken before exhaustive search, which looks at everything.
-        "rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "compared": float(np.mean(compared)),
     }
-    if exhaustive:
-        some = shapes[:: max(1, round(len(shapes) * len(database.views) / _EXHAUSTIVE))]
-        lost = [
-            database.query(s, top=1).matches[0].view.id
-            != database.query(s, top=1, budget=1.0).matches[0].view.id
-            for s in some
-        ]
-        figures["lost"] = float(np.mean(lost))
-    return figures
+
+
+def _lost(database: ModelDatabase, shapes: Sequence[Shape]) -> float:
+    """Share of exhaustive search's best matches that the index loses; among many views, of a sample."""
+    some = shapes[:: max(1, round(len(shapes) * len(database.views) / _EXHAUSTIVE))]
+    return float(
+        np.mean(
+            [
+                database.query(s, top=1).matches[0].view.id
+                != database.query(s, top=1, budget=1.0).matches[0].view.id
+                for s in some
+            ]
+        )
+    )
 
 
 def main() -> None:

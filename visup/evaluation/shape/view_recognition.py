@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
+from visup.evaluation.figures import Progress, silent
 from visup.evaluation.shape.descriptors import Descriptor, descriptors, nearest
 from visup.evaluation.shape.symmetry import angle_to, silhouette_symmetries
 from visup.evaluation.shape.view_queries import CONDITIONS, Query, draw_queries
@@ -30,8 +31,6 @@ TOP = 5
 
 MESHES = (".ply", ".stl", ".obj", ".off", ".glb")
 """Endings of the files that are read as meshes."""
-
-Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,7 @@ def evaluate_views(
     queries: int = 12,
     seed: int = 0,
     limit: int | None = None,
-    progress: Tell | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Figures of recognising meshes from unseen directions.
 
@@ -63,7 +62,7 @@ def evaluate_views(
         queries: Silhouettes of each mesh that are asked for.
         seed: Of the queries' directions, rolls, sizes and damage.
         limit: Meshes, for a quick look; all by default.
-        progress: Told a line now and then.
+        progress: Shows what is being done.
 
     Returns:
         {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
@@ -78,19 +77,18 @@ def evaluate_views(
     """
     if views < 1 or queries < 1:
         raise SettingsError("views and queries are counted from 1", expected="at least 1 of each")
-    tell = progress or (lambda line: None)
     meshes = _listed(folder, limit)
     others = descriptors()
     with tempfile.TemporaryDirectory() as scratch:
-        tell(f"views of {len(meshes)} meshes")
+        progress(f"views of {len(meshes)} meshes")
         begin = time.perf_counter()
         database = build_database(
             Path(scratch) / "views.models", meshes, views=views, jobs=os.cpu_count() or 1
         )
         rate = len(meshes) * views / (time.perf_counter() - begin)
-        asked = list(_asked(meshes, queries, seed, tell))
+        asked = list(_asked(meshes, queries, seed, progress))
         answers = [a for query, alike in asked for a in _answers(database, query, alike)]
-        tell("other descriptors")
+        progress("other descriptors")
         baseline = _baselines(others, meshes, views, [query for query, _ in asked])
     items = {m.stem: _figures([a for a in answers if a.name == m.stem]) for m in meshes}
     total = {**_figures(answers), "build_views_per_s": rate, "baseline": baseline}
@@ -109,11 +107,11 @@ def _listed(folder: Path, limit: int | None) -> list[Path]:
 
 
 def _asked(
-    meshes: Sequence[Path], queries: int, seed: int, tell: Tell
+    meshes: Sequence[Path], queries: int, seed: int, progress: Progress
 ) -> Iterator[tuple[Query, NDArray[np.float64]]]:
     """All queries, each with the symmetries of its object."""
     for path in meshes:
-        tell(f"{path.stem}: {queries} queries")
+        progress(f"{path.stem}: {queries} queries")
         mesh = load_mesh(path)
         alike = silhouette_symmetries(mesh)
         for query in draw_queries(path.stem, mesh, queries, seed):

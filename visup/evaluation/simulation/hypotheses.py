@@ -10,7 +10,7 @@ farther they are from the true direction (`view_noise.py`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,29 +34,35 @@ _PERSISTS = 0.7  # how often a wrong name stays the same within a run of wrong n
 _TOLD = 4  # names told each time
 
 
-class HypothesisSource:
-    """Says what one object looks like, time after time.
+@dataclass(frozen=True, slots=True)
+class NamingNoise:
+    """How names and depths differ from the truth.
 
-    Args:
-        mission: The mission.
-        name: The object.
+    Attributes:
         wrong: Share of times at which the first name is wrong.
         run: Mean length of a run of wrong names, times.
         listed: How often the right name is among the others while the first one is wrong.
         depth: Standard deviation of depth, as a share of it.
+    """
+
+    wrong: float
+    run: float
+    listed: float
+    depth: float
+
+
+class HypothesisSource:
+    """Hypotheses and depths of one object, time after time.
+
+    Args:
+        mission: The mission.
+        name: The object.
+        noise: How they differ from the truth.
         rng: Source of chance.
     """
 
     def __init__(
-        self,
-        mission: Mission,
-        name: str,
-        *,
-        wrong: float,
-        run: float,
-        listed: float,
-        depth: float,
-        rng: np.random.Generator,
+        self, mission: Mission, name: str, noise: NamingNoise, rng: np.random.Generator
     ) -> None:
         self._frames, self._name, self._size = mission.truth["frames"], name, mission.size
         self._fov = np.deg2rad(float(mission.description.get("fov_vertical_deg", 40.0)))
@@ -65,8 +71,8 @@ class HypothesisSource:
         self._others = [str(o) for o in rng.permutation(sorted(others))]
         self._odds = 1.0 / np.arange(1, len(self._others) + 1)
         self._odds /= self._odds.sum()
-        self._end = 1.0 / run
-        self._wrong, self._listed, self._depth, self._rng = wrong, listed, depth, rng
+        self._end = 1.0 / noise.run
+        self._noise, self._rng = noise, rng
         self._views = NoisyViews(self.model, _DIRECTIONS, _NOISE, rng)
         self._mistaken: str | None = None
         self._off = 0.0
@@ -82,15 +88,15 @@ class HypothesisSource:
             alone: Whether the region shows this object only; else it looks like nothing known.
         """
         similarity = 0.72 + 0.05 * self._rng.standard_normal()
-        names = self._names(self._wrong if alone else min(0.9, 2 * self._wrong))
+        names = self._names(self._noise.wrong if alone else min(0.9, 2 * self._noise.wrong))
         true = self._frames[index].get(self._name, {})
         for name in names:
             yield from self._hypotheses(region, name, min(similarity, 0.99), true)
             similarity -= 0.01 + abs(0.05 + 0.03 * self._rng.standard_normal())
         self._off = 0.7 * self._off + 0.7 * self._rng.standard_normal()
         if true.get("range_m") and not region.cut and alone and self.model in names:
-            far = float(true["range_m"]) * (1 + self._depth * self._off)
-            yield Depth(region.id, self.model, far, self._depth * far)
+            far = float(true["range_m"]) * (1 + self._noise.depth * self._off)
+            yield Depth(region.id, self.model, far, self._noise.depth * far)
 
     def _names(self, wrong: float) -> list[str]:
         rng = self._rng
@@ -105,7 +111,7 @@ class HypothesisSource:
         if self._mistaken is None:
             return [self.model, *rest[: _TOLD - 1]]
         rest = [n for n in rest if n != self._mistaken][: _TOLD - 1]
-        if rng.random() < self._listed:
+        if rng.random() < self._noise.listed:
             rest[int(rng.integers(len(rest)))] = self.model
         return [self._mistaken, *rest]
 

@@ -11,7 +11,7 @@ measured).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,12 @@ from visup.agent import (
 )
 from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.execution.pipeline import ordered_slots, perceive
-from visup.evaluation.simulation.hypotheses import HypothesisSource
-from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, region_from_mask, shaken
+from visup.evaluation.simulation.hypotheses import HypothesisSource, NamingNoise
+from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, shaken
+from visup.testing import region_of
+
+CONFIDENCE = 0.9
+"""Confidence of a simulated region."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +179,9 @@ class SimulatedSegmenter:
             known = true if frame.time - kept.last < 0.1 else None
             velocity, sigma = kept.velocity(known, self.noise, 1.0 / self.mission.fps)
             number = self._number(names, frame.time)
-            region = region_from_mask(number, mask, velocity=velocity, velocity_sigma=sigma)
+            region = replace(
+                region_of(mask, number, velocity), velocity_sigma=sigma, confidence=CONFIDENCE
+            )
             self.who[region.id] = names
             yield Percept("region", region, frame.time, "truth", region.confidence)
 
@@ -223,24 +229,19 @@ class SimulatedRecogniser:
 
     seeing: SimulatedSegmenter
     contract: Contract = field(init=False)
-    _namers: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
+    _sources: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         noise, mission = self.seeing.noise, self.seeing.mission
         self.contract = Contract(
             "truth_names", ("hypothesis", "depth"), ("region",), noise.names_every_s
         )
+        run = max(1.0, noise.wrong_run_s / noise.names_every_s)
+        naming = NamingNoise(noise.wrong, run, noise.listed, noise.depth)
         seeds = np.random.SeedSequence([noise.seed, 2]).spawn(len(mission.truth["labels"]))
         for name, seed in zip(sorted(mission.truth["labels"]), seeds, strict=True):
-            self._namers[name] = HypothesisSource(
-                mission,
-                name,
-                wrong=noise.wrong,
-                run=max(1.0, noise.wrong_run_s / noise.names_every_s),
-                listed=noise.listed,
-                depth=noise.depth,
-                rng=np.random.default_rng(seed),
-            )
+            rng = np.random.default_rng(seed)
+            self._sources[name] = HypothesisSource(mission, name, naming, rng)
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
@@ -256,7 +257,7 @@ class SimulatedRecogniser:
         names = self.seeing.who[region.id]
         # What two bodies look like together is taken for the larger one, or for anything else.
         name = max(names, key=lambda n: masks[n].visible_px if n in masks else 0)
-        yield from self._namers[name].says(region, index, alone=len(names) == 1)
+        yield from self._sources[name].says(region, index, alone=len(names) == 1)
 
 
 def behaviours_of(

@@ -20,6 +20,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.files import read_json
 from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
 from visup.rules.geometry.regions import outline
+from visup.testing import region_of
 
 MARGIN = 8
 """Pixels round a mask in which its outline may move."""
@@ -129,7 +130,7 @@ def moved_since(
 
 
 def _region(mask: TrueMask, size: tuple[int, int]) -> Region:
-    return region_from_mask(0, mask.inside > 0, at=mask.at, size=size)
+    return region_of(mask.inside > 0, 0, at=mask.at, size=size)
 
 
 def _velocity(
@@ -230,45 +231,3 @@ class ContourNoise:
 def shaken(mask: TrueMask, shift: NDArray[Any]) -> NDArray[Any]:
     """How far inside the moved outline each pixel of the crop lies, pixels; positive inside."""
     return np.asarray(mask.inside * np.float32(_STEP) + shift)
-
-
-def region_from_mask(
-    number: int,
-    mask: NDArray[np.bool_],
-    *,
-    at: tuple[int, int] = (0, 0),
-    size: tuple[int, int] | None = None,
-    confidence: float = 0.9,
-    velocity: tuple[float, float] = (0.0, 0.0),
-    velocity_sigma: float = 0.0,
-) -> Region:
-    """A region with a mask; its contour is that of the largest part.
-
-    Args:
-        number: Its id.
-        mask: (h, w) bool with at least one pixel.
-        at: Where the mask's corner is in the image, pixels.
-        size: (width, height) of the image; the mask is the whole image when left out.
-        confidence: Of the segmenter.
-        velocity: (vx, vy) pixels per second.
-        velocity_sigma: Of each component; 0 when the velocity is not known.
-    """
-    x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
-    crop = np.ascontiguousarray(mask[y : y + h, x : x + w])
-    found, _ = cv2.findContours(crop.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    x, y = x + at[0], y + at[1]
-    contour = max(found, key=len).reshape(-1, 2).astype(np.float32) + np.array([x, y], np.float32)
-    ys, xs = np.nonzero(crop)
-    width, height = size or (mask.shape[1], mask.shape[0])
-    return Region(
-        id=number,
-        bbox=(x, y, w, h),
-        mask=crop,
-        contour=contour,
-        centroid=(float(xs.mean()) + x, float(ys.mean()) + y),
-        area=float(len(xs)),
-        cut=x == 0 or y == 0 or x + w == width or y + h == height,
-        velocity=velocity,
-        velocity_sigma=velocity_sigma,
-        confidence=confidence,
-    )

@@ -93,7 +93,8 @@ def spin_deg_per_s(renderer: Renderer, name: str) -> float:
     item = next(o for o in scenario.object if o.name == name)
     last, step = scenario.duration_s, 1.0 / scenario.camera.fps
     a, b = (
-        Rotation.from_matrix(renderer.object_pose(item, t)[:3, :3]) for t in (last - step, last)
+        Rotation.from_matrix(renderer.scene.object_pose(item, t)[:3, :3])
+        for t in (last - step, last)
     )
     return round(float(np.degrees((b * a.inv()).magnitude()) / step), 4)
 

@@ -1,0 +1,100 @@
+"""What the report notes of one moment: how much it matters, votes and distances, states, matches."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+
+from visup.agent import (
+    Event,
+    Hypothesis,
+    Mind,
+    ObjectBelief,
+    Presence,
+)
+from visup.report.records import (
+    Distance,
+    MatchRow,
+    Sample,
+)
+from visup.rules.geometry.outlines import outline_gap
+
+BEST_MATCHES = 5
+MOST_SUBJECTS = 8
+MOST_PAIRED = 5
+MOST_CANDIDATES = 8
+MOVES = ("converging", "diverging", "keeping_distance")
+KIND_WEIGHTS: Mapping[str, int] = {
+    "verdict": 6,
+    "stage_failing": 6,
+    "stage_done": 5,
+    "stage_started": 4,
+    "coupled": 5,
+    "decoupled": 5,
+    "entry": 3,
+    "noticed": 3,
+    "reappearance": 3,
+    "exit": 2,
+    "occlusion": 2,
+    "identified": 2,
+}
+
+
+def weight_of(events: Sequence[Event]) -> int:
+    """How much a moment matters for the report; 0 when nothing worth a picture happened."""
+    return max((KIND_WEIGHTS.get(e.kind, 0) + 4 * int(e.severity) for e in events), default=0)
+
+
+def sample_of(mind: Mind) -> Sample:
+    """The series' values at one moment: votes of objects in view, distances between them.
+
+    Distances are those of the relation 'distance' where rules report it, else the gap between the
+    outlines of objects that are both seen; of the hidden nothing is known.
+    """
+    objects = sorted(mind.present(), key=lambda b: -b.region.area)[:MOST_SUBJECTS]
+    votes = {
+        b.id: {c.name: c.votes for c in b.candidates[:MOST_CANDIDATES]}
+        for b in objects
+        if b.candidates
+    }
+    pairs = itertools.combinations(sorted(objects[:MOST_PAIRED], key=lambda b: b.id), 2)
+    distances = {(a.id, b.id): _distance(mind, a, b) for a, b in pairs}
+    return Sample(mind.time, votes, {k: d for k, d in distances.items() if d is not None})
+
+
+def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:
+    told = mind.relation("distance", a.id, b.id)
+    if told is not None and told.value is not None:
+        return Distance(told.value, told.sigma)
+    if not (a.presence is b.presence is Presence.SEEN):
+        return None
+    gap = outline_gap(a.region, b.region, math.inf)
+    return None if gap is None else Distance(gap)
+
+
+def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
+    """What the timelines follow: stages, how pairs move, who is in view."""
+    now: dict[tuple[str, ...], str] = {}
+    for task in mind.tasks:
+        now |= {("stage", task.task, s.stage): s.status.value for s in task.stages}
+    for belief in mind.present():
+        now["presence", str(belief.id)] = belief.presence.value
+    for relation in mind.holding(*MOVES):
+        if len(relation.objects) == 2:
+            low, high = sorted(relation.objects)
+            now["relation", str(low), str(high)] = relation.name
+    for coupling in mind.couplings:
+        low, high = coupling.objects
+        now["relation", str(low), str(high)] = "coupled"
+    return now
+
+
+def matches_of(hypotheses: Sequence[Hypothesis]) -> dict[int, tuple[MatchRow, ...]]:
+    """The most similar views of each region, best first."""
+    found: dict[int, list[MatchRow]] = {}
+    for h in sorted(hypotheses, key=lambda h: (-h.similarity, h.name, h.view)):
+        held = found.setdefault(h.region_id, [])
+        if len(held) < BEST_MATCHES:
+            held.append(MatchRow(h.name, h.view, h.similarity))
+    return {region: tuple(matches) for region, matches in found.items()}
