@@ -118,7 +118,7 @@ class ExtraMissingError(VisupError):
 
 
 class ErrorGroup(VisupError):
-    """All the faults of one file, told at once.
+    """All the faults of one file, reported together.
 
     Args:
         errors: At least one fault, in the order of their places.
