@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from visup.agent.contract.contract import Contract
+from visup.agent.model.events import AlertCondition, Directive, Event
 from visup.agent.model.mind import Mind
-from visup.agent.model.records import AlertCondition, Directive, Event, Frame, Observation, Percept
+from visup.agent.model.records import Frame, Observation, Percept
 
 __all__ = ["Behaviour", "Contract", "Outcome", "Reasoner"]
 

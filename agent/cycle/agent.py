@@ -17,15 +17,10 @@ from visup.agent.cycle.outcomes import merge_outcomes
 from visup.agent.execution.behaviour_slot import BehaviourSlot
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.execution.runners import error_line
+from visup.agent.model.events import AlertCondition, Directive, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.mind import Mind, Zone
-from visup.agent.model.records import (
-    AlertCondition,
-    Directive,
-    Frame,
-    Observation,
-    Severity,
-)
+from visup.agent.model.records import Frame, Observation
 from visup.agent.model.step import Observer, Step
 
 

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from visup.agent.model.events import Alert, AlertCondition, Event, Severity
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.records import (
-    FAULT_STATES,
-    Alert,
-    AlertCondition,
-    Event,
-    Observation,
-    ReportState,
-    Severity,
-)
+from visup.agent.model.records import FAULT_STATES, Observation, ReportState
 
 GRACE_S = 1.0
 """A concern may be silent this long before its alert closes: alerts must not flicker."""

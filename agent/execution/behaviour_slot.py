@@ -27,10 +27,9 @@ from visup.agent.execution.runners import (
     error_line,
     resident_mb,
 )
+from visup.agent.model.events import WAKE, Directive
 from visup.agent.model.records import (
     FAULT_STATES,
-    WAKE,
-    Directive,
     Frame,
     Observation,
     PastFrame,

@@ -14,7 +14,8 @@ from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.limits import Limits
 from visup.agent.execution.behaviour_slot import BehaviourSlot, make_slot, superseded
 from visup.agent.model.errors import BehaviourError
-from visup.agent.model.records import Directive, Frame, Observation, ReportState
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, ReportState
 
 
 def ordered_slots(

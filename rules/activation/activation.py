@@ -15,8 +15,8 @@ from types import MappingProxyType
 
 from visup.agent import AlertCondition, Contract, Directive, Mind, Observation, Outcome, Severity
 from visup.agent.model.errors import BehaviourError, VisupError
+from visup.agent.model.events import WAKE
 from visup.agent.model.memory import MemoryKey
-from visup.agent.model.records import WAKE
 from visup.rules.formula.nodes import Rule, calls
 from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.inputs_missing import percepts_read

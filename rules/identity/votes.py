@@ -46,7 +46,7 @@ from visup.agent import (
 )
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share

@@ -22,7 +22,7 @@ from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.live_source import LiveSource, Reconnection
 from visup.runs.checkpoints import CHECKPOINT
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.operator import HumanOperator
@@ -83,7 +83,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     assert (past.state is not None) == (state == "kept")
     result = supervise(past.settings, parts, options=options, past=past)
     assert outcome(parts) == outcome(whole)
-    assert any("looked at again" in n for n in result.notes) == (state != "kept")
+    assert any("perceived again" in n for n in result.notes) == (state != "kept")
     assert any("check sum" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is over"):
         interrupted_run(parts)
@@ -241,9 +241,9 @@ def test_a_camera_that_drops_comes_back_and_goes_on() -> None:
         "camera 0",
         FakeCapture(images[:3]),
         clock=lambda: next(clock),
-        reopen=lambda: later.pop(0) if later else FakeCapture([]),
-        patience_s=3.0,
-        wait=waited.append,
+        reconnection=Reconnection(
+            lambda: later.pop(0) if later else FakeCapture([]), 3.0, waited.append
+        ),
     )
     source.notify = said.append
     frames: list[Frame] = []
@@ -287,7 +287,7 @@ def test_a_camera_run_goes_on_with_new_numbers_and_later_times(
     assert before_ids
     assert after_ids
     assert min(after_ids) > max(before_ids)
-    assert any("not seen" in n for n in result.notes)
+    assert any("Nothing was seen in between" in n for n in result.notes)
 
 
 def times(*given: float) -> Iterator[Frame]:

@@ -204,7 +204,7 @@ BAD = {
     "when gap(1,": "ends too early",
     "object one": "is not a number",
     "frame x": "is not a number",
-    "two words": "nothing is meant",
+    "two words": "is not known",
 }
 
 

@@ -172,7 +172,7 @@ def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
             if zone in drawn:
                 continue
             raise SettingsError(
-                f"zone `{zone}` of task `{task.name}` is drawn nowhere",
+                f"zone `{zone}` of task `{task.name}` is not drawn anywhere",
                 where=task.file,
                 expected=f"`zone {zone} is (100, 50) (300, 50) (300, 200)`, or a zones file with it",
             )

@@ -99,7 +99,7 @@ def _event(kind: str, mind: Mind) -> StopCondition:
     close = get_close_matches(kind, known, 1, 0.8)
     if not kind.isidentifier() or (close and kind not in known):
         raise SettingsError(
-            f"nothing is meant by '{kind}'",
+            f"'{kind}' is not known",
             expected="a phase, event, rule, stage, object, time, frame or expression",
             hint=f"did you mean '{close[0]}'?" if close else None,
         )

@@ -42,8 +42,8 @@ class Stepper(Timeline):
         agent: The agent, new or after any step; or a history of its steps, to go on with.
         frames: Frames for its behaviours; an `ObservationSource`, such as of a recorded run; or the
             timeline that this one branches off.
-        spacing: Steps between two minds that are kept; more of them is less to keep and longer to
-            go back.
+        spacing: Steps between two minds that are kept; more means less memory and longer ways
+            back.
         latest: How many steps are kept whole.
 
     Attributes:
@@ -257,7 +257,7 @@ class Stepper(Timeline):
         """
         parent = self.parent
         if parent is None:
-            raise SettingsError("this is no branch: there is nothing to compare it with")
+            raise SettingsError("this is not a branch: there is nothing to compare it with")
         while parent.made < self.at and parent._look_ahead():
             continue  # it was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at

@@ -27,7 +27,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.cycle.agent import Reasoners
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.formula.nodes import Rule
 from visup.rules.safety.reasoner import RuleReasoner

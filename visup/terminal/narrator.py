@@ -25,10 +25,10 @@ VERDICT_STYLE = {
     Verdict.UNKNOWN: "bold magenta",
 }
 VERDICT_TEXT = {
-    Verdict.SUCCEEDED: "the task went as it should",
-    Verdict.IN_PROGRESS: "the task was still under way at the end, and nothing was wrong",
+    Verdict.SUCCEEDED: "the task went as intended",
+    Verdict.IN_PROGRESS: "the task was still in progress at the end, and nothing was wrong",
     Verdict.FAILED: "the task failed",
-    Verdict.INTERRUPTED: "something unsafe or unexpected came between",
+    Verdict.INTERRUPTED: "something unsafe or unexpected interrupted it",
     Verdict.UNKNOWN: "the task could not be followed",
 }
 

@@ -141,7 +141,7 @@ class Session:
                 lines.append(Text("the source has ended", style="yellow"))
         for watch in self.stepper.watches.values():
             values = [f"{_ids(r.objects)} {r}".strip() for r in watch.readings[:6]]
-            told = ", ".join(values) or "nobody is meant by it"
+            told = ", ".join(values) or "no object matches"
             lines.append(Text(f"watch {watch.id}  {watch.text}: {told}", style="cyan"))
         seen = sum(b.last_seen == mind.time for b in mind.objects.values())
         where = f"frame {mind.frame_index}, {mind.time:.2f} s, {seen} regions"
@@ -247,11 +247,11 @@ class Session:
         ]
         before, after = changed.verdicts
         verdict = Text(f"verdict: {before or 'none'} -> {after or 'none'}")
-        return Group(*(told or [Text("nothing is told differently")]), verdict)
+        return Group(*(told or [Text("no difference")]), verdict)
 
     def _leave(self, words: Sequence[str]) -> Answer:
         if len(self.timelines) == 1:
-            return refusal("this is no branch")
+            return refusal("this is not a branch")
         self.timelines.pop()
         return self._place()
 
@@ -265,7 +265,7 @@ class Session:
             branch.answer(number, name)
             return self._begin(branch)
         self.stepper.answer(number, name)
-        return Text("taken as a fact from the next step on", style="dim")
+        return Text("taken as fact from the next step on", style="dim")
 
 
 _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProxyType(

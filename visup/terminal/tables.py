@@ -95,10 +95,10 @@ def task_tree(task: TaskBelief) -> Tree:
         tree.add(Text(prose(told.rstrip())))
     for b in task.bindings:
         who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
-        tree.add(Text(f"  {b.actor} is played by {who}"))
+        tree.add(Text(f"  {b.actor} is bound to {who}"))
     tree.add(Text(prose(f"  {prospects_text(task)}")))
     if task.active < 1.0:
-        tree.add(Text(f"  going on with probability {task.active:.2f}"))
+        tree.add(Text(f"  active with probability {task.active:.2f}"))
     return tree
 
 

@@ -14,7 +14,8 @@ from tests.rules.safety.test_reasoner import NAMES, believed
 from tests.rules.scenes import box_region, seen
 from visup.agent import Binding, Expectation, Mind, Observation, Outcome, TaskBelief, Verdict
 from visup.agent.model.errors import RuleError
-from visup.agent.model.mind import Pose, Spin, Zone
+from visup.agent.model.mind import Zone
+from visup.agent.model.object_beliefs import Pose, Spin
 from visup.cli import app
 from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
@@ -280,7 +281,7 @@ def test_the_command_checks_and_lists_rules(tmp_path: Path) -> None:
     bad.write_text('rule q(a): info when sen(a) for 2 px say "{a}"\n')
     fine = CliRunner().invoke(app, ["rules", "check", str(good)])
     assert fine.exit_code == 0
-    assert "r: told 2 s late, at most" in fine.output
+    assert "r: reported 2 s late, at most" in fine.output
     wrong = CliRunner().invoke(app, ["rules", "check", str(good), str(bad)])
     assert "'sen'" in str(wrong.exception)
     assert "'for' wants a time" in str(wrong.exception)

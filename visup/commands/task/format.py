@@ -12,10 +12,11 @@ import typer
 def format_files(
     files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
     only_check: Annotated[
-        bool, typer.Option("--check", help="Change nothing; exit code 1 when a layout differs.")
+        bool,
+        typer.Option("--check", help="Change nothing; exit code 1 when a file is not formatted."),
     ] = False,
 ) -> None:
-    """Give task files one layout; words, comments and meaning stay as they are."""
+    """Format task files; words, comments and meaning stay as they are."""
     from visup.tasks.checks.files import read_text
 
     differ = False

@@ -22,13 +22,13 @@ File = Annotated[str, typer.Argument(help="A task file or shipped task.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
 Without = Annotated[
     list[str] | None,
-    typer.Option(help="A kind of percept that will not be at hand, such as depth; repeatable."),
+    typer.Option(help="A kind of percept that will be missing, such as depth; repeatable."),
 ]
 
 
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
-    """Tell every mistake of some task files; exit code 2 when there is any."""
+    """Report every mistake in task files; exit code 2 if there is any."""
     from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
     from visup.tasks.actions.actions import ALL_PERCEPTS
     from visup.tasks.checks.diagnose import diagnose
