@@ -27,7 +27,7 @@ JSON = Setting(
 
 
 @dataclass(frozen=True, slots=True)
-class Evaluation:
+class EvaluationCommand:
     """One command of `visup eval`.
 
     Attributes:
