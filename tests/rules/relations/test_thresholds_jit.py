@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.relations import judged_by_arrays as twin
+from tests.rules.relations import array_thresholds as twin
 from visup.rules.geometry.hysteresis import Codes, Floats
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import DIRECTIONS
