@@ -1,13 +1,24 @@
 """The agent: the cogitation-action cycle, the mental model, behaviours, the journal.
 
-Read in this order: `records.py` (what flows), `mind.py` (what is believed),
-`relations.py` (what holds between objects), `behaviour.py` (what
-may be plugged in), `agent.py` (the cycle on one screen), `perceive.py`, `slot.py`, `limits.py` (how
-behaviours are contained), `registry.py`, `journal.py`.
+Rooms, in the order in which to read them:
+
+1. `model/`: the records that flow through a step, and the mental model.
+2. `contract/`: what may be plugged in, and what is promised to it.
+3. `cycle/`: the cycle on one screen (`cycle/agent.py`).
+4. `execution/`: how behaviours are run and contained.
+5. `plugins/`: how behaviours are found and made.
+6. `storage/`: journals and checkpoints.
 """
 
-from visup.agent.contract.behaviour import Behaviour, Contract, Outcome, Reasoner
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
+from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
+from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.saving import Saveable
+from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
 from visup.agent.model.mind import (
     Binding,
@@ -27,10 +38,9 @@ from visup.agent.model.mind import (
     Verdict,
     Zone,
 )
-from visup.agent.model.notebook import showing
 from visup.agent.model.records import (
     Alert,
-    Concern,
+    AlertCondition,
     Depth,
     Directive,
     Event,
@@ -39,7 +49,7 @@ from visup.agent.model.records import (
     HealthStatus,
     Hypothesis,
     Observation,
-    Past,
+    PastFrame,
     Percept,
     Region,
     Report,
@@ -49,14 +59,28 @@ from visup.agent.model.records import (
 )
 from visup.agent.model.relation_columns import Column, Relation
 from visup.agent.model.relation_table import RelationTable
+from visup.agent.model.step import Step
+
+if TYPE_CHECKING:
+    from visup.agent.cycle.agent import Agent, Reasoners
+    from visup.agent.plugins.registry import Registry, discover_behaviours
+
+_LAZY = {
+    "Agent": "visup.agent.cycle.agent",
+    "Reasoners": "visup.agent.cycle.agent",
+    "Registry": "visup.agent.plugins.registry",
+    "discover_behaviours": "visup.agent.plugins.registry",
+}
+"""Names that bring NumPy and the behaviours' runners: imported when first asked for."""
 
 __all__ = [
+    "Agent",
     "Alert",
+    "AlertCondition",
     "Behaviour",
     "Binding",
     "Candidate",
     "Column",
-    "Concern",
     "Contract",
     "Coupling",
     "Depth",
@@ -72,42 +96,74 @@ __all__ = [
     "ObjectBelief",
     "Observation",
     "Outcome",
-    "Past",
+    "PastFrame",
     "Percept",
+    "Phase",
     "Pose",
     "Presence",
     "Prospect",
     "Question",
     "Reasoner",
+    "Reasoners",
     "Region",
+    "Registry",
     "Relation",
     "RelationTable",
     "Report",
     "ReportState",
+    "Saveable",
     "Severity",
+    "Snapshot",
     "Spin",
     "StageBelief",
     "Status",
+    "Step",
     "TaskBelief",
     "Truth",
     "Verdict",
     "VisupError",
     "Zone",
+    "discover_behaviours",
 ]
 
-showing(
-    *(Alert, Binding, Candidate, Concern, Coupling, Depth, Directive, Event, Expectation, Frame),
-    *(
-        Health,
-        Hypothesis,
-        Mind,
-        ObjectBelief,
-        Observation,
-        Outcome,
-        Percept,
-        Pose,
-        Question,
-        Region,
-    ),
-    *(Prospect, Relation, RelationTable, Report, Spin, StageBelief, TaskBelief, Zone),
+
+if not TYPE_CHECKING:  # else every name would be there for checkers
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LAZY:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_LAZY[name]), name)
+
+
+_RECORDS = (
+    Alert,
+    Binding,
+    Candidate,
+    AlertCondition,
+    Coupling,
+    Depth,
+    Directive,
+    Event,
+    Expectation,
+    Frame,
+    Health,
+    Hypothesis,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Outcome,
+    Percept,
+    Pose,
+    Question,
+    Region,
+    Prospect,
+    Relation,
+    RelationTable,
+    Report,
+    Spin,
+    StageBelief,
+    TaskBelief,
+    Zone,
+    Step,
 )
+enable_display(*_RECORDS)

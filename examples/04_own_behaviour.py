@@ -19,7 +19,7 @@ class Lamp:
     contract = Contract("lamp", gives=("lamp",), every_s=0.2)
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         """One percept, (x, y) in pixels, when a spot is over 100 grey levels above the mean."""
         grey = frame.image.mean(axis=2)

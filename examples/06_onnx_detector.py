@@ -39,7 +39,7 @@ class Detector:
         self.session = onnxruntime.InferenceSession(str(self.settings.model))
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         """One percept for each block above the least score, which becomes its confidence."""
         grey = frame.image.mean(axis=2, dtype=np.float32)[None, None] / 255

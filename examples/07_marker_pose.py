@@ -31,7 +31,7 @@ class Markers:
         self.settings = settings or self.Settings()
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         """One percept for each marker of the dictionary 4X4_50."""
         detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))

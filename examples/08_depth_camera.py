@@ -39,14 +39,14 @@ class DepthCamera:
         self.camera = StandIn()
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         """The median over the region's mask, with the spread of what was measured there."""
         metres = self.camera.image(frame)
-        for region in seen.of("region"):
+        for region in observation.of("region"):
             x, y, w, h = region.bbox
             values = metres[y : y + h, x : x + w][region.mask].compressed()
-            for name in {s.name for s in seen.of("hypothesis") if s.region_id == region.id}:
+            for name in {s.name for s in observation.of("hypothesis") if s.region_id == region.id}:
                 depth = Depth(region.id, name, float(np.median(values)), float(values.std()))
                 yield self.contract.percept(frame, depth)
 

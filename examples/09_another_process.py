@@ -18,7 +18,7 @@ class Fragile:
     contract = Contract("fragile", gives=("brightness",), isolate=True, memory_mb=200)
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         """One number from 0 to 255, with the process that says so."""
         if frame.index == 5:

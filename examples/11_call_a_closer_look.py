@@ -20,12 +20,12 @@ class CloserLook:
     )
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         """One percept for each region of which it was called."""
         called = {d.data["region"] for d in directives if d.kind == "wake"}
         grey = cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
-        for region in seen.of("region"):
+        for region in observation.of("region"):
             if region.id in called:
                 x, y, w, h = region.bbox
                 edges = cv2.Laplacian(grey[y : y + h, x : x + w], cv2.CV_64F)

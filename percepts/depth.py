@@ -80,12 +80,12 @@ class DepthBehaviour:
         """Nothing is remembered."""
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """One depth for each region that the border does not cut and each name it may have."""
         focal = focal_px(frame.size[1], self.fov_vertical_deg)
-        hypotheses: tuple[Hypothesis, ...] = seen.of("hypothesis")
-        for region in seen.of("region"):
+        hypotheses: tuple[Hypothesis, ...] = observation.of("hypothesis")
+        for region in observation.of("region"):
             if not region.cut and region.area > 0:
                 own = [h for h in hypotheses if h.region_id == region.id]
                 for depth in region_depths(region, own, focal, self._areas):

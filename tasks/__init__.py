@@ -1,10 +1,10 @@
-"""Tasks: the language of task files, and the supervision of tasks.
+"""Tasks: the language of task files, and the supervision of what is seen against them.
 
-Read in this order: `tasks.lark` (the language), `tree.py` and `read.py` (text to tree),
-`diagnostics.py` (mistakes: `syntax.py`, `mistakes.py`, `check.py`), `actions.py` (what actions
-mean), `course.py` (where one can be in a task), `verify.py` (how a step stands), `readings.py`
-(which courses fit what is seen), `matching.py` (who plays whom), `supervise.py` (the reasoner that
-joins them).
+The rooms, in reading order: `grammar/` (text to tree), `diagnostics/` and `checks/` (every error of
+a file at once), `actions/` (what each action means in terms of relations), `automaton/` (where one
+can be in a task), `verification/` (whether what is seen confirms a step), `supervision/` (the
+reasoner: which actor is whom, how far the task is, what goes wrong), `tools/` (formatter, diagram,
+simulation, editor support), `shipped/` (the tasks that ship with visup).
 """
 
 from visup.tasks.checks.load import load_task, load_tasks, parse_task, shipped_tasks

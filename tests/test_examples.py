@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.paths import ROOT
-from visup.agent.plugins.loader import load
+from visup.agent.plugins.factory import load_behaviours
 from visup.testing import check_behaviour
 
 SAYS = {
@@ -58,7 +58,7 @@ def test_the_behaviours_in_the_docs_run_as_they_stand_there_and_are_short(tmp_pa
         assert len(code.splitlines()) < 40
         path = tmp_path / f"plugin_{number}.py"
         path.write_text(code)
-        for behaviour in load(str(path)):
+        for behaviour in load_behaviours(str(path)):
             check_behaviour(behaviour)
 
 

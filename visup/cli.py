@@ -12,7 +12,7 @@ from visup.agent.model.errors import VisupError
 from visup.commands.behaviours import app as behaviours_app
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
-from visup.commands.eval.app import app as evaluate_app
+from visup.commands.eval.catalogue import eval_app
 from visup.commands.models import app as models_app
 from visup.commands.render import render
 from visup.commands.replay import replay
@@ -46,7 +46,7 @@ app.add_typer(task_app, name="task", help="Check, show and list task files.")
 app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
 app.add_typer(behaviours_app, name="behaviours", help="List, check and begin behaviours.")
-app.add_typer(evaluate_app, name="eval", help="Compute figures against ground truth.")
+app.add_typer(eval_app(), name="eval", help="Compute figures against ground truth.")
 app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")
 
 

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 from visup.agent.contract.contract import Contract
 from visup.agent.model.mind import Mind
-from visup.agent.model.records import Concern, Directive, Event, Frame, Observation, Percept
+from visup.agent.model.records import AlertCondition, Directive, Event, Frame, Observation, Percept
 
 __all__ = ["Behaviour", "Contract", "Outcome", "Reasoner"]
 
@@ -25,14 +25,14 @@ class Behaviour(Protocol):
     contract: Contract
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report about one frame.
 
         Args:
             frame: The frame; its image cannot be written to.
-            seen: What behaviours before this one reported of the same frame; `seen.past` holds as
-                many frames before it as the contract's `history` asks for.
+            observation: What behaviours before this one reported of the same frame;
+                `observation.past` holds as many earlier frames as the contract's `history` asks for.
             directives: What cogitation asked for after the last step.
 
         Returns:
@@ -54,7 +54,7 @@ class Outcome:
 
     mind: Mind
     events: tuple[Event, ...] = ()
-    concerns: tuple[Concern, ...] = ()
+    conditions: tuple[AlertCondition, ...] = ()
     directives: tuple[Directive, ...] = ()
 
 

@@ -26,7 +26,7 @@ class Contract:
         needs: Kinds of percept that must be there before it runs in a step.
         every_s: Least time between two runs, seconds of video; 0 for every frame.
         cost_ms: Its budget: what one run takes at most, milliseconds; None when it does not say.
-        history: How many past frames, with what was reported of them, it wants in `seen.past`.
+        history: How many past frames, with what was reported of them, it wants in `observation.past`.
         deterministic: Whether the same frames give the same percepts.
         isolate: Whether it runs in a process of its own, with hard limits.
         memory_mb: How much memory it may take, megabytes; None when it does not say.

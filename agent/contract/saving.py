@@ -17,3 +17,8 @@ class Saveable(Protocol):
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on a state that an object of the same settings gave."""
         ...
+
+
+def saved_attributes(it: object, *left_out: str) -> dict[str, Any]:
+    """The attributes of an object besides those left out: what most `save` methods give."""
+    return {name: value for name, value in vars(it).items() if name not in left_out}

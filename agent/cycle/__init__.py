@@ -1,1 +1,9 @@
-"""cycle."""
+"""The cogitation-action cycle: perceive, update, cogitate, match, act.
+
+Read `agent.py` (the cycle on one screen), `outcomes.py` (conclusions of reasoners are merged),
+`alerts.py` (alerts open and close) and `answers.py` (what the operator says becomes a fact).
+"""
+
+from visup.agent.cycle.agent import Agent, Reasoners
+
+__all__ = ["Agent", "Reasoners"]

@@ -11,17 +11,16 @@ from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.limits import Limits
 from visup.agent.contract.phases import Phase, Snapshot
 from visup.agent.contract.saving import Saveable
-from visup.agent.cycle.alerts import alert_events, faults, update_alerts
-from visup.agent.cycle.answers import understood, with_answers
-from visup.agent.cycle.outcomes import joined
-from visup.agent.execution.behaviour_slot import Slot
-from visup.agent.execution.pipeline import in_order, perceive
-from visup.agent.execution.runners import worded
+from visup.agent.cycle.alerts import alert_events, fault_conditions, update_alerts
+from visup.agent.cycle.answers import apply_answers, resolve_answer
+from visup.agent.cycle.outcomes import merge_outcomes
+from visup.agent.execution.behaviour_slot import BehaviourSlot
+from visup.agent.execution.pipeline import ordered_slots, perceive
+from visup.agent.execution.runners import error_line
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.mind import Mind, Zone
-from visup.agent.model.notebook import showing
 from visup.agent.model.records import (
-    Concern,
+    AlertCondition,
     Directive,
     Frame,
     Observation,
@@ -53,9 +52,6 @@ class Reasoners:
         )
 
 
-showing(Step)
-
-
 @dataclass(slots=True)
 class Agent:
     """A mind with what perceives and reasons for it.
@@ -83,13 +79,13 @@ class Agent:
     limits: Limits = field(default_factory=Limits)
     mind: Mind = field(init=False)
     directives: tuple[Directive, ...] = field(default=(), init=False)
-    _slots: list[Slot] = field(init=False, repr=False)
+    _slots: list[BehaviourSlot] = field(init=False, repr=False)
     _alerts_opened: int = field(default=0, init=False, repr=False)
     _answers: dict[int, str] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         self.mind = Mind(actors=MappingProxyType(dict(self.actors)), zones=tuple(self.zones))
-        self._slots = in_order(self.behaviours, self.limits)
+        self._slots = ordered_slots(self.behaviours, self.limits)
 
     def step(self, frame: Frame) -> Step:
         """Perceive, update, cogitate, match, act: one turn of the cycle.
@@ -109,60 +105,75 @@ class Agent:
         """Perceive only: behaviours see the frame, the mind stays as it is."""
         return perceive(self._slots, frame, self.directives)
 
-    def reason(self, seen: Observation, answers: Mapping[int, str] | None = None) -> Step:
+    def reason(self, observation: Observation, answers: Mapping[int, str] | None = None) -> Step:
         """Reason about what was perceived, now or in a recorded run; observers are not told.
 
         Args:
-            seen: What was perceived of the next frame.
+            observation: What was perceived of the next frame.
             answers: What the operator had said before that step of a recorded run: object id ->
                 model name, as 'answer' events tell it. None when there is no such run.
 
         Returns:
             The whole record of the step; `mind` has become `Step.mind`.
         """
-        *_, (_, thought) = self.phases(seen, answers)
-        return self.act(seen, thought)
+        *_, (_, thought) = self.phases(observation, answers)
+        return self.act(observation, thought)
 
     def phases(
-        self, seen: Observation, answers: Mapping[int, str] | None = None
+        self, observation: Observation, answers: Mapping[int, str] | None = None
     ) -> Iterator[tuple[Phase, Outcome]]:
         """Update, cogitate, match: one after the other, to look in between; the mind stays as it is.
 
         Args:
-            seen: What was perceived of the next frame.
+            observation: What was perceived of the next frame.
             answers: As of `reason`.
 
         Yields:
             Each phase that is over, with all that was concluded up to there; the last one is for `act`.
         """
         begin = replace(
-            self.mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+            self.mind,
+            time=observation.time,
+            frame_index=observation.frame_index,
+            frame_size=observation.frame_size,
         )
-        begin, told = with_answers(begin, self._answers if answers is None else answers)
+        begin, told = apply_answers(begin, self._answers if answers is None else answers)
         self._answers = {}
         outcome = Outcome(begin, told)
         for phase, reasoners in self.reasoners.by_phase():
             for reasoner in reasoners:
                 try:
-                    outcome = joined(outcome, reasoner(outcome.mind, seen), seen)
+                    outcome = merge_outcomes(
+                        outcome, reasoner(outcome.mind, observation), observation
+                    )
                 except (Exception, SystemExit) as fault:
                     # The half-made mind is dropped: beliefs stay as they were and count as unknown.
-                    yield phase, replace(_fault(begin, seen, reasoner, fault), events=told)
+                    yield (
+                        phase,
+                        replace(_failed_outcome(begin, observation, reasoner, fault), events=told),
+                    )
                     return
             yield phase, outcome
 
-    def act(self, seen: Observation, thought: Outcome) -> Step:
+    def act(self, observation: Observation, thought: Outcome) -> Step:
         """The last phase: alerts and directives; what was thought becomes the mind."""
-        concerns = (*thought.concerns, *faults(seen))
+        concerns = (*thought.conditions, *fault_conditions(observation))
         alerts, opened, closed = update_alerts(
-            self.mind.alerts, concerns, seen.time, self._alerts_opened + 1, thought.mind.unknown
+            self.mind.alerts,
+            concerns,
+            observation.time,
+            self._alerts_opened + 1,
+            thought.mind.unknown,
         )
         self._alerts_opened += len(opened)
-        events = (*thought.events, *alert_events(opened, closed, seen.time, seen.frame_index))
+        events = (
+            *thought.events,
+            *alert_events(opened, closed, observation.time, observation.frame_index),
+        )
         step = Step(
-            frame_index=seen.frame_index,
-            time=seen.time,
-            observation=seen,
+            frame_index=observation.frame_index,
+            time=observation.time,
+            observation=observation,
             mind=replace(thought.mind, alerts=alerts),
             events=events,
             alerts=(*opened, *closed),
@@ -218,7 +229,7 @@ class Agent:
         Raises:
             SettingsError: There is no such object, or nobody knows such a name.
         """
-        self._answers[object_id] = understood(self.mind, object_id, name, self.models)
+        self._answers[object_id] = resolve_answer(self.mind, object_id, name, self.models)
 
     def save(self) -> Mapping[str, Any]:
         """All that this agent has become, to be frozen by `visup.agent.storage.checkpoint`.
@@ -226,12 +237,12 @@ class Agent:
         Returns:
             `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
         """
-        whole = all(s.keeps for s in self._slots)
-        kept = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.keeps}
+        whole = all(s.is_saveable for s in self._slots)
+        kept = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.is_saveable}
         return {
             "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
             "behaviours": {n: _saved(b) for n, b in kept.items()} if whole else None,
-            "slots": {s.behaviour.contract.name: s.conduct() for s in self._slots},
+            "slots": {s.behaviour.contract.name: s.state_dict() for s in self._slots},
         }
 
     def load(self, state: Mapping[str, Any]) -> bool:
@@ -245,7 +256,7 @@ class Agent:
         for slot in self._slots if behaviours is not None else ():
             name = slot.behaviour.contract.name
             slot.behaviour.load(behaviours[name])  # type: ignore[attr-defined]  # it gave its state
-            slot.take_up(state["slots"][name])
+            slot.load_state_dict(state["slots"][name])
         return behaviours is not None
 
 
@@ -254,20 +265,22 @@ def _saved(behaviour: Behaviour) -> Mapping[str, Any]:
     return behaviour.save()
 
 
-def _fault(mind: Mind, seen: Observation, reasoner: Reasoner, fault: BaseException) -> Outcome:
+def _failed_outcome(
+    mind: Mind, observation: Observation, reasoner: Reasoner, fault: BaseException
+) -> Outcome:
     name = getattr(reasoner, "__name__", type(reasoner).__name__)
-    concern = Concern(
+    concern = AlertCondition(
         "reasoning_failed",
         (),
         Severity.CRITICAL,
         f"Reasoning failed in '{name}'; beliefs are as before this frame and may be stale.",
-        (worded(fault),),
+        (error_line(fault),),
         key=name,
         needs=(),
     )
     held = tuple(
-        Concern(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key, a.needs)
+        AlertCondition(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key, a.needs)
         for a in mind.alerts
     )
-    unknown = frozenset(kind for r in seen.reports for kind in r.gives)
+    unknown = frozenset(kind for r in observation.reports for kind in r.gives)
     return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, concern))

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import (
-    BROKEN,
+    FAULT_STATES,
     Alert,
-    Concern,
+    AlertCondition,
     Event,
     Observation,
     ReportState,
@@ -25,10 +25,10 @@ then no alert that needs it is told to be over."""
 Key = tuple[str, tuple[int, ...], str]
 
 
-def faults(observation: Observation) -> tuple[Concern, ...]:
+def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
     """Concerns about behaviours that failed, are late or suspended: their part of the mind is unknown."""
     return tuple(
-        Concern(
+        AlertCondition(
             "behaviour_failed",
             (),
             Severity.WARNING,
@@ -38,7 +38,7 @@ def faults(observation: Observation) -> tuple[Concern, ...]:
             needs=(),
         )
         for r in observation.reports
-        if r.state in BROKEN
+        if r.state in FAULT_STATES
     )
 
 
@@ -48,7 +48,7 @@ def _ails(state: ReportState) -> str:
 
 def update_alerts(
     alerts: Sequence[Alert],
-    concerns: Iterable[Concern],
+    concerns: Iterable[AlertCondition],
     time: float,
     next_id: int,
     unknown: frozenset[str] = frozenset(),
@@ -102,12 +102,12 @@ def _event(
     return Event(kind, time, frame_index, text, alert.objects, severity=severity, data=data)
 
 
-def _key(it: Alert | Concern) -> Key:
+def _key(it: Alert | AlertCondition) -> Key:
     return it.kind, it.objects, it.key
 
 
-def _by_key(concerns: Iterable[Concern]) -> dict[Key, Concern]:
-    now: dict[Key, Concern] = {}
+def _by_key(concerns: Iterable[AlertCondition]) -> dict[Key, AlertCondition]:
+    now: dict[Key, AlertCondition] = {}
     for concern in concerns:
         held = now.setdefault(_key(concern), concern)
         if concern.severity > held.severity:
@@ -115,7 +115,7 @@ def _by_key(concerns: Iterable[Concern]) -> dict[Key, Concern]:
     return now
 
 
-def _open(concern: Concern, time: float, number: int) -> Alert:
+def _open(concern: AlertCondition, time: float, number: int) -> Alert:
     return Alert(
         id=number,
         kind=concern.kind,
@@ -130,7 +130,7 @@ def _open(concern: Concern, time: float, number: int) -> Alert:
     )
 
 
-def _renew(alert: Alert, concern: Concern, time: float) -> Alert:
+def _renew(alert: Alert, concern: AlertCondition, time: float) -> Alert:
     # The cause keeps its first wording, so that the narrative and the report tell one story.
     severity = max(alert.severity, concern.severity)
     return replace(alert, severity=severity, updated=time, evidence=concern.evidence)

@@ -15,7 +15,7 @@ NOBODY = ("unknown", UNKNOWN_OBJECT)
 """Answers that say that an object is none of the models."""
 
 
-def understood(mind: Mind, object_id: int, name: str, models: Iterable[str] = ()) -> str:
+def resolve_answer(mind: Mind, object_id: int, name: str, models: Iterable[str] = ()) -> str:
     """The model that an answer means.
 
     Args:
@@ -36,10 +36,12 @@ def understood(mind: Mind, object_id: int, name: str, models: Iterable[str] = ()
         raise SettingsError(f"there is no object {object_id}", expected=f"one of: {known}")
     own = [c.name for c in belief.candidates]
     own += [n for q in mind.questions if q.object_id == object_id for n in q.names]
-    return model_named(mind, name, models, own)
+    return resolve_model(mind, name, models, own)
 
 
-def model_named(mind: Mind, name: str, models: Iterable[str] = (), own: Sequence[str] = ()) -> str:
+def resolve_model(
+    mind: Mind, name: str, models: Iterable[str] = (), own: Sequence[str] = ()
+) -> str:
     """The model that a name means.
 
     Args:
@@ -66,12 +68,12 @@ def model_named(mind: Mind, name: str, models: Iterable[str] = (), own: Sequence
     )
 
 
-def with_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[Event, ...]]:
+def apply_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[Event, ...]]:
     """A mind that takes answers as facts, and the events that tell of them.
 
     Args:
         mind: At the beginning of a step.
-        answers: Object id -> model name, as `understood` gives it.
+        answers: Object id -> model name, as `resolve_answer` gives it.
     """
     if not answers:
         return mind, ()

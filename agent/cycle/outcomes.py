@@ -6,16 +6,16 @@ from math import isfinite
 
 from visup.agent.contract.behaviour import Outcome
 from visup.agent.model.mind import Mind
-from visup.agent.model.records import Concern, Directive, Event, Observation
+from visup.agent.model.records import AlertCondition, Directive, Event, Observation
 
 
-def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
+def merge_outcomes(so_far: Outcome, more: Outcome, observation: Observation) -> Outcome:
     """What reasoners before concluded, and one more.
 
     Args:
         so_far: Of those before.
         more: Of the one more; its mind takes the place of theirs.
-        seen: What they thought about.
+        observation: What they thought about.
 
     Raises:
         TypeError: It is no outcome, or holds what is none of its parts.
@@ -23,14 +23,14 @@ def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
     """
     _expect(more, Outcome, "the reasoner returned")
     _expect(more.mind, Mind, "the mind is")
-    if (more.mind.time, more.mind.frame_index) != (seen.time, seen.frame_index):
+    if (more.mind.time, more.mind.frame_index) != (observation.time, observation.frame_index):
         raise ValueError(
             f"the mind is of frame {more.mind.frame_index} at {more.mind.time} s, "
-            f"not of frame {seen.frame_index} at {seen.time} s"
+            f"not of frame {observation.frame_index} at {observation.time} s"
         )
     for parts, kind in (
         (more.events, Event),
-        (more.concerns, Concern),
+        (more.conditions, AlertCondition),
         (more.directives, Directive),
     ):
         _all_are(parts, kind)
@@ -42,7 +42,7 @@ def joined(so_far: Outcome, more: Outcome, seen: Observation) -> Outcome:
     return Outcome(
         more.mind,
         so_far.events + more.events,
-        so_far.concerns + more.concerns,
+        so_far.conditions + more.conditions,
         so_far.directives + more.directives,
     )
 

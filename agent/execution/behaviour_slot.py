@@ -17,23 +17,23 @@ from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
 from visup.agent.contract.saving import Saveable
 from visup.agent.execution.runners import (
-    Direct,
-    GrowthError,
-    LateError,
-    LostError,
+    DirectRunner,
+    MemoryLimitError,
+    ProcessDiedError,
     Runner,
-    Threaded,
+    RunTimeoutError,
+    ThreadRunner,
+    duration_text,
+    error_line,
     resident_mb,
-    told_seconds,
-    worded,
 )
 from visup.agent.model.records import (
-    BROKEN,
+    FAULT_STATES,
     WAKE,
     Directive,
     Frame,
     Observation,
-    Past,
+    PastFrame,
     Percept,
     Report,
     ReportState,
@@ -50,7 +50,7 @@ _SETTLED = frozenset({"behaviour", "contract", "limits", "runner", "relieved_by"
 
 
 @dataclass(slots=True)
-class Slot:
+class BehaviourSlot:
     """A behaviour in its place in an agent, with what the agent knows of its conduct.
 
     Attributes:
@@ -77,18 +77,18 @@ class Slot:
     error: str = ""
     suspended_at: float = NEVER
     grown_mb: float = 0.0
-    past: deque[Past] = field(default_factory=deque)
+    past: deque[PastFrame] = field(default_factory=deque)
 
     @property
-    def keeps(self) -> bool:
+    def is_saveable(self) -> bool:
         """Whether the behaviour can tell its state; that of another process is out of reach."""
         return isinstance(self.behaviour, Saveable) and not self.limits.isolated(self.contract)
 
-    def conduct(self) -> dict[str, Any]:
+    def state_dict(self) -> dict[str, Any]:
         """What the agent knows of its behaviour's conduct, for a checkpoint."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SETTLED}
 
-    def take_up(self, conduct: Mapping[str, Any]) -> None:
+    def load_state_dict(self, conduct: Mapping[str, Any]) -> None:
         """Go on from the conduct that another slot told."""
         for name, value in conduct.items():
             setattr(self, name, value)
@@ -99,12 +99,14 @@ class Slot:
         over = self.failures - PATIENCE
         return 0.0 if over < 0 else min(FIRST_SUSPENSION_S * 2.0**over, LONGEST_SUSPENSION_S)
 
-    def run(self, frame: Frame, seen: Observation, directives: Sequence[Directive]) -> Report:
+    def run(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Report:
         """Run it on a frame, if it is its turn.
 
         Args:
             frame: The frame.
-            seen: What others reported of it before.
+            observation: What others reported of it before.
             directives: What the last step asked for.
 
         Returns:
@@ -117,12 +119,14 @@ class Slot:
             return replace(idle, state=waiting, error=self.error)
         if asleep:
             return replace(idle, error="asleep: nothing calls for it")
-        closer = [r.behaviour for r in seen.reports if r.behaviour in self.relieved_by and _ran(r)]
+        closer = [
+            r.behaviour for r in observation.reports if r.behaviour in self.relieved_by and _ran(r)
+        ]
         if closer:
             return replace(idle, error=f"'{closer[0]}' looks more closely")
-        unseen = [k for k in contract.needs if not seen.observed(k)]
+        unseen = [k for k in contract.needs if not observation.observed(k)]
         if unseen:
-            blind = any(k in seen.unknown for k in unseen)
+            blind = any(k in observation.unknown for k in unseen)
             state = ReportState.BLIND if blind else ReportState.RESTED
             return replace(idle, state=state, error=f"'{unseen[0]}' was not observed")
         if self._within(frame.time, self.last_run, contract.every_s):
@@ -130,19 +134,21 @@ class Slot:
         self.last_run = frame.time
         begin = self.limits.clock()
         try:
-            percepts = self._held(frame, replace(seen, past=tuple(self.past)), directives, begin)
+            percepts = self._held(
+                frame, replace(observation, past=tuple(self.past)), directives, begin
+            )
         except Exception as fault:
             # Containment: whatever a plug-in raises is its own failure, never the supervisor's.
             self._fail(fault, frame.time)
-            state = ReportState.LATE if isinstance(fault, LateError) else ReportState.FAILED
+            state = ReportState.LATE if isinstance(fault, RunTimeoutError) else ReportState.FAILED
             return replace(idle, state=state, error=self.error, elapsed_ms=self._ms(begin))
         self.failures, self.error = 0, ""
         return replace(idle, state=ReportState.RAN, percepts=percepts, elapsed_ms=self._ms(begin))
 
-    def remember(self, frame: Frame, seen: Observation) -> None:
+    def remember(self, frame: Frame, observation: Observation) -> None:
         """Keep a frame that is over, if past frames were asked for."""
         if self.past.maxlen:
-            self.past.append(Past(frame, seen))
+            self.past.append(PastFrame(frame, observation))
 
     def _asleep(self, directives: Sequence[Directive]) -> bool:
         name = self.contract.name
@@ -151,7 +157,7 @@ class Slot:
 
     def _waiting(self, now: float, asleep: bool) -> ReportState | None:
         """Why a behaviour that failed does not run now; None when it may."""
-        if self.runner.tend():
+        if self.runner.maintain():
             return ReportState.LATE
         if self._within(now, self.suspended_at, self.suspension_s):
             return ReportState.SUSPENDED
@@ -165,24 +171,24 @@ class Slot:
         return 0.0 <= now - since < seconds - 1e-9
 
     def _held(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive], begin: float
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive], begin: float
     ) -> tuple[Percept, ...]:
         """Run it, held to its limits."""
         seconds = self.limits.seconds(self.contract)
         before = resident_mb()
-        percepts = self.runner.run(frame, seen, directives, seconds)
+        percepts = self.runner.run(frame, observation, directives, seconds)
         taken = self.limits.clock() - begin
         if self.limits.budgets and seconds is not None and taken > seconds:
-            raise LateError(f"it took longer than its budget of {told_seconds(seconds)}")
+            raise RunTimeoutError(f"it took longer than its budget of {duration_text(seconds)}")
         self.grown_mb += resident_mb() - before
         most = self.limits.megabytes(self.contract)
         if self.grown_mb > most:
             self.grown_mb = 0.0
-            raise GrowthError(f"its runs made the process grow by more than {most:g} MB")
+            raise MemoryLimitError(f"its runs made the process grow by more than {most:g} MB")
         return percepts
 
     def _fail(self, fault: Exception, now: float) -> None:
-        self.error = worded(fault)
+        self.error = error_line(fault)
         self.failures += 1
         if self._grave(fault):
             self.failures = max(self.failures, PATIENCE)
@@ -191,9 +197,9 @@ class Slot:
 
     def _grave(self, fault: Exception) -> bool:
         """Whether another try is too dear: each hang costs its whole limit again."""
-        if isinstance(fault, LateError):
+        if isinstance(fault, RunTimeoutError):
             return not self.limits.budgets
-        return isinstance(fault, LostError | GrowthError | MemoryError)
+        return isinstance(fault, ProcessDiedError | MemoryLimitError | MemoryError)
 
     def _ms(self, begin: float) -> float:
         return (self.limits.clock() - begin) * 1000.0
@@ -203,18 +209,18 @@ def _ran(report: Report) -> bool:
     return report.state is ReportState.RAN
 
 
-def taken_over(report: Report, by: Slot) -> Report:
+def superseded(report: Report, by: BehaviourSlot) -> Report:
     """The report of a behaviour that failed, once one that it relieves has run in its place.
 
     What both give is known.
     """
-    if report.state not in BROKEN or report.behaviour not in by.relieved_by:
+    if report.state not in FAULT_STATES or report.behaviour not in by.relieved_by:
         return report
     gives = tuple(kind for kind in report.gives if kind not in by.contract.gives)
     return replace(report, gives=gives)
 
 
-def slot_of(behaviour: Behaviour, limits: Limits) -> Slot:
+def make_slot(behaviour: Behaviour, limits: Limits) -> BehaviourSlot:
     """A behaviour in its place, with what runs it as its contract and the limits say.
 
     Raises:
@@ -223,11 +229,11 @@ def slot_of(behaviour: Behaviour, limits: Limits) -> Slot:
     contract = behaviour.contract
     runner: Runner
     if limits.isolated(contract):
-        from visup.agent.execution.process_runner import Isolated
+        from visup.agent.execution.process_runner import ProcessRunner
 
-        runner = Isolated(behaviour, contract, limits)
+        runner = ProcessRunner(behaviour, contract, limits)
     elif limits.hang_s is None:
-        runner = Direct(behaviour, contract)
+        runner = DirectRunner(behaviour, contract)
     else:
-        runner = Threaded(behaviour, contract, limits.start_s)
-    return Slot(behaviour, contract, limits, runner, past=deque(maxlen=contract.history))
+        runner = ThreadRunner(behaviour, contract, limits.start_s)
+    return BehaviourSlot(behaviour, contract, limits, runner, past=deque(maxlen=contract.history))

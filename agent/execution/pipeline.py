@@ -12,12 +12,14 @@ from graphlib import CycleError, TopologicalSorter
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.limits import Limits
-from visup.agent.execution.behaviour_slot import Slot, slot_of, taken_over
+from visup.agent.execution.behaviour_slot import BehaviourSlot, make_slot, superseded
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.records import Directive, Frame, Observation, ReportState
 
 
-def in_order(behaviours: Sequence[Behaviour], limits: Limits | None = None) -> list[Slot]:
+def ordered_slots(
+    behaviours: Sequence[Behaviour], limits: Limits | None = None
+) -> list[BehaviourSlot]:
     """Behaviours so that each comes after those that give what it needs.
 
     Args:
@@ -46,7 +48,7 @@ def in_order(behaviours: Sequence[Behaviour], limits: Limits | None = None) -> l
     except CycleError as circle:
         path = " -> ".join(circle.args[1])
         raise BehaviourError(f"behaviours wait for each other in a circle: {path}") from circle
-    slots = [slot_of(named[name], held) for name in order]
+    slots = [make_slot(named[name], held) for name in order]
     for slot in slots:
         slot.relieved_by = frozenset(closer[slot.contract.name])
     return slots
@@ -81,11 +83,13 @@ def _providers(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[st
     return [c.name for c in others if set(contract.needs) & set(c.gives)]
 
 
-def perceive(slots: Sequence[Slot], frame: Frame, directives: Sequence[Directive]) -> Observation:
+def perceive(
+    slots: Sequence[BehaviourSlot], frame: Frame, directives: Sequence[Directive]
+) -> Observation:
     """Run the behaviours on a frame.
 
     Args:
-        slots: From `in_order`.
+        slots: From `ordered_slots`.
         frame: The frame.
         directives: What the last step asked for.
 
@@ -93,16 +97,16 @@ def perceive(slots: Sequence[Slot], frame: Frame, directives: Sequence[Directive
         One report for each behaviour, in order.
     """
     shown = read_only(frame)
-    seen = Observation(frame.index, frame.time, frame.size)
+    observation = Observation(frame.index, frame.time, frame.size)
     for slot in slots:
-        report = slot.run(shown, seen, directives)
-        earlier = seen.reports
+        report = slot.run(shown, observation, directives)
+        earlier = observation.reports
         if slot.relieved_by and report.state is ReportState.RAN:
-            earlier = tuple(taken_over(r, slot) for r in earlier)
-        seen = replace(seen, reports=(*earlier, report))
+            earlier = tuple(superseded(r, slot) for r in earlier)
+        observation = replace(observation, reports=(*earlier, report))
     for slot in slots:
-        slot.remember(shown, seen)
-    return seen
+        slot.remember(shown, observation)
+    return observation
 
 
 def read_only(frame: Frame) -> Frame:

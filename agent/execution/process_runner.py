@@ -24,17 +24,24 @@ import numpy as np
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
-from visup.agent.execution.runners import LateError, LostError, told_seconds
-from visup.agent.execution.validation import check, collect
-from visup.agent.execution.worker import FAULTS, Answer, Parcel, Request, packed_bytes, serve
+from visup.agent.execution.runners import ProcessDiedError, RunTimeoutError, duration_text
+from visup.agent.execution.validation import check_percepts, collect_percepts
+from visup.agent.execution.worker import (
+    EXCEPTIONS,
+    PackedBehaviour,
+    RunReply,
+    RunRequest,
+    pickled,
+    serve,
+)
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.records import Directive, Frame, Observation, Percept
 
-LARGEST_ANSWER = 256 * 2**20
+LARGEST_REPLY_BYTES = 256 * 2**20
 """Bytes of one answer; what is larger is refused unread."""
 
 
-class Isolated:
+class ProcessRunner:
     """Runs a behaviour in a process of its own.
 
     Args:
@@ -49,11 +56,11 @@ class Isolated:
     def __init__(self, behaviour: Behaviour, contract: Contract, limits: Limits) -> None:
         self._contract = contract
         self._limits = limits
-        self._parcel = parcel(behaviour, contract)
-        self._child: _Child | None = None
+        self._parcel = pack_behaviour(behaviour, contract)
+        self._child: _ChildProcess | None = None
         self._sent = -1
 
-    def tend(self) -> bool:
+    def maintain(self) -> bool:
         """Start a new process in place of one that was killed, while the behaviour is suspended."""
         if self._child is not None and self._child.killed:
             self._child = self._start(self._child)
@@ -62,24 +69,24 @@ class Isolated:
     def run(
         self,
         frame: Frame,
-        seen: Observation,
+        observation: Observation,
         directives: Sequence[Directive],
         seconds: float | None,
     ) -> tuple[Percept, ...]:
         """See `Runner`."""
         child = self._ready(seconds)
         try:
-            answer = child.ask(self._request(child, frame, seen, directives), seconds)
-        except (LateError, LostError):
+            answer = child.ask(self._request(child, frame, observation, directives), seconds)
+        except (RunTimeoutError, ProcessDiedError):
             child.kill()
             raise
         if answer.fault is not None:
             kind, said = answer.fault
             if kind == MemoryError.__name__:
                 child.kill()  # what it holds is given back
-            raise FAULTS.get(kind, BehaviourError)(said)
-        percepts = collect(self._contract, answer.percepts)
-        check(self._contract, percepts, frame, seen)
+            raise EXCEPTIONS.get(kind, BehaviourError)(said)
+        percepts = collect_percepts(self._contract, answer.percepts)
+        check_percepts(self._contract, percepts, frame, observation)
         return percepts
 
     def close(self) -> None:
@@ -88,14 +95,14 @@ class Isolated:
             self._child.end()
             self._child = None
 
-    def _start(self, old: _Child | None = None) -> _Child:
+    def _start(self, old: _ChildProcess | None = None) -> _ChildProcess:
         if old is not None:
             old.end()
         self._sent = -1
         memory_mb = self._limits.megabytes(self._contract)
-        return _Child(self._parcel, memory_mb, replaces=old is not None)
+        return _ChildProcess(self._parcel, memory_mb, replaces=old is not None)
 
-    def _ready(self, seconds: float | None) -> _Child:
+    def _ready(self, seconds: float | None) -> _ChildProcess:
         """The process, once its behaviour has started."""
         child = self._child = self._child or self._start()
         # A budget says how long a step may wait; without one, waiting keeps runs repeatable.
@@ -103,25 +110,31 @@ class Isolated:
         try:
             child.await_start(self._limits.start_s if patient else seconds)
         except BehaviourError as fault:
-            if not isinstance(fault, LateError) or patient:
+            if not isinstance(fault, RunTimeoutError) or patient:
                 self._child = None
                 child.end()
             raise
         return child
 
     def _request(
-        self, child: _Child, frame: Frame, seen: Observation, directives: Sequence[Directive]
-    ) -> Request:
-        news = tuple(p for p in seen.past if p.frame.index > self._sent)
-        if seen.past:
-            self._sent = seen.past[-1].frame.index
-        without = Observation(seen.frame_index, seen.time, seen.frame_size, seen.reports)
-        return Request(
+        self,
+        child: _ChildProcess,
+        frame: Frame,
+        observation: Observation,
+        directives: Sequence[Directive],
+    ) -> RunRequest:
+        news = tuple(p for p in observation.past if p.frame.index > self._sent)
+        if observation.past:
+            self._sent = observation.past[-1].frame.index
+        without = Observation(
+            observation.frame_index, observation.time, observation.frame_size, observation.reports
+        )
+        return RunRequest(
             frame.index, frame.time, *child.place(frame.image), without, tuple(directives), news
         )
 
 
-def parcel(behaviour: Behaviour, contract: Contract) -> Parcel:
+def pack_behaviour(behaviour: Behaviour, contract: Contract) -> PackedBehaviour:
     """A behaviour as it is sent to a process.
 
     Raises:
@@ -131,20 +144,20 @@ def parcel(behaviour: Behaviour, contract: Contract) -> Parcel:
     file = str(getattr(module, "__file__", "") or "")
     own = module is not None and module.__name__.startswith("visup_plugin_")
     try:
-        packed = packed_bytes(behaviour)
+        packed = pickled(behaviour)
     except Exception as fault:
         raise BehaviourError(
             f"behaviour '{contract.name}' cannot be sent to a process of its own: {fault}",
             expected="attributes that can be pickled",
             hint="open models, sockets and devices in its method `start`, not in `__init__`",
         ) from fault
-    return Parcel(packed, file if own else "", tuple(sys.path), contract)
+    return PackedBehaviour(packed, file if own else "", tuple(sys.path), contract)
 
 
-class _Child:
+class _ChildProcess:
     """A process with a behaviour, and the memory shared with it."""
 
-    def __init__(self, sent: Parcel, memory_mb: float, *, replaces: bool) -> None:
+    def __init__(self, sent: PackedBehaviour, memory_mb: float, *, replaces: bool) -> None:
         context = _context()
         here, there = context.Pipe()
         process = context.Process(  # type: ignore[attr-defined]
@@ -179,10 +192,10 @@ class _Child:
             raise BehaviourError(f"it does not start: {f'{kind}: ' if kind else ''}{said}")
         self._started = True
 
-    def ask(self, request: Request, seconds: float | None) -> Answer:
+    def ask(self, request: RunRequest, seconds: float | None) -> RunReply:
         """Send a request and wait for the answer."""
         try:
-            self._pipe.send_bytes(packed_bytes(request))
+            self._pipe.send_bytes(pickled(request))
         except OSError as fault:
             raise self._lost() from fault
         return self._receive(seconds, "it gave no answer")
@@ -196,20 +209,20 @@ class _Child:
         np.ndarray(image.shape, np.uint8, block.buf)[:] = image
         return block.name, image.shape
 
-    def _receive(self, seconds: float | None, what: str) -> Answer:
+    def _receive(self, seconds: float | None, what: str) -> RunReply:
         try:
             if not self._pipe.poll(seconds):
-                raise LateError(f"{what} within {told_seconds(seconds or 0.0)}")
-            answer: Answer = pickle.loads(self._pipe.recv_bytes(LARGEST_ANSWER))
+                raise RunTimeoutError(f"{what} within {duration_text(seconds or 0.0)}")
+            answer: RunReply = pickle.loads(self._pipe.recv_bytes(LARGEST_REPLY_BYTES))
         except (EOFError, OSError) as fault:
             raise self._lost() from fault
         return answer
 
-    def _lost(self) -> LostError:
+    def _lost(self) -> ProcessDiedError:
         self._process.join(1.0)
         code = self._process.exitcode
         how = f"by signal {-code}" if code is not None and code < 0 else f"with exit code {code}"
-        return LostError(f"its process ended {how}")
+        return ProcessDiedError(f"its process ended {how}")
 
 
 def _end(process: BaseProcess, pipe: Connection, shared: list[SharedMemory]) -> None:

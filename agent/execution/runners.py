@@ -19,7 +19,7 @@ from typing import Protocol
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
-from visup.agent.execution.validation import check, collect
+from visup.agent.execution.validation import check_percepts, collect_percepts
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.records import Directive, Frame, Observation, Percept
 
@@ -27,22 +27,22 @@ STOPPING_S = 0.05
 """How long a step waits for a thread that it has just asked to stop, seconds."""
 
 
-class LateError(BehaviourError):
+class RunTimeoutError(BehaviourError):
     """No answer came in time."""
 
 
-class LostError(BehaviourError):
+class ProcessDiedError(BehaviourError):
     """The behaviour's process ended."""
 
 
-class GrowthError(BehaviourError):
+class MemoryLimitError(BehaviourError):
     """It took more memory than it may."""
 
 
 class Runner(Protocol):
     """Runs one behaviour; what it raises is the behaviour's failure."""
 
-    def tend(self) -> bool:
+    def maintain(self) -> bool:
         """Look after it between runs: stop what was given up, replace what ended.
 
         Returns:
@@ -53,15 +53,15 @@ class Runner(Protocol):
     def run(
         self,
         frame: Frame,
-        seen: Observation,
+        observation: Observation,
         directives: Sequence[Directive],
         seconds: float | None,
     ) -> tuple[Percept, ...]:
         """Run it on a frame, for so many seconds at most.
 
         Raises:
-            Exception: Whatever the behaviour raised, `BehaviourError` for nonsense, `LateError`,
-                `LostError` or `GrowthError`.
+            Exception: Whatever the behaviour raised, `BehaviourError` for nonsense, `RunTimeoutError`,
+                `ProcessDiedError` or `MemoryLimitError`.
         """
         ...
 
@@ -70,20 +70,20 @@ class Runner(Protocol):
         ...
 
 
-def perceived(
+def run_behaviour(
     behaviour: Behaviour,
     contract: Contract,
     frame: Frame,
-    seen: Observation,
+    observation: Observation,
     directives: Sequence[Directive],
 ) -> tuple[Percept, ...]:
     """What a behaviour reports of a frame, known to make sense."""
-    percepts = collect(contract, behaviour.perceive(frame, seen, directives))
-    check(contract, percepts, frame, seen)
+    percepts = collect_percepts(contract, behaviour.perceive(frame, observation, directives))
+    check_percepts(contract, percepts, frame, observation)
     return percepts
 
 
-def start(behaviour: Behaviour) -> tuple[Percept, ...]:
+def start_behaviour(behaviour: Behaviour) -> tuple[Percept, ...]:
     """Call its method `start`, if it has one; nothing is perceived by that."""
     begin = getattr(behaviour, "start", None)
     if callable(begin):
@@ -91,7 +91,7 @@ def start(behaviour: Behaviour) -> tuple[Percept, ...]:
     return ()
 
 
-class Direct:
+class DirectRunner:
     """Runs a behaviour in the thread of the caller: nothing can stop it."""
 
     def __init__(self, behaviour: Behaviour, contract: Contract) -> None:
@@ -99,23 +99,23 @@ class Direct:
         self._contract = contract
         self._started = False
 
-    def tend(self) -> bool:
+    def maintain(self) -> bool:
         """Nothing is ever given up."""
         return False
 
     def run(
         self,
         frame: Frame,
-        seen: Observation,
+        observation: Observation,
         directives: Sequence[Directive],
         seconds: float | None,
     ) -> tuple[Percept, ...]:
         """See `Runner`; `seconds` is not kept."""
         try:
             if not self._started:
-                start(self._behaviour)
+                start_behaviour(self._behaviour)
                 self._started = True
-            return perceived(self._behaviour, self._contract, frame, seen, directives)
+            return run_behaviour(self._behaviour, self._contract, frame, observation, directives)
         except (SystemExit, GeneratorExit) as leaving:
             raise _as_error(leaving) from leaving
 
@@ -148,7 +148,7 @@ class _Job:
             self.done.set()
 
 
-class Threaded:
+class ThreadRunner:
     """Runs a behaviour in a thread of its own, which is given up when it takes too long.
 
     The next run gets a new thread, once the one given up has ended.
@@ -168,7 +168,7 @@ class Threaded:
         self._thread: threading.Thread | None = None
         self._given_up: tuple[threading.Thread, _Job] | None = None
 
-    def tend(self) -> bool:
+    def maintain(self) -> bool:
         """Ask what was given up to stop once more; whether it is still under way."""
         if self._given_up is None:
             return False
@@ -182,17 +182,18 @@ class Threaded:
     def run(
         self,
         frame: Frame,
-        seen: Observation,
+        observation: Observation,
         directives: Sequence[Directive],
         seconds: float | None,
     ) -> tuple[Percept, ...]:
         """See `Runner`."""
         behaviour, contract = self._behaviour, self._contract
         if not self._started:
-            self._wait(_Job(lambda: start(behaviour)), self._start_s)
+            self._wait(_Job(lambda: start_behaviour(behaviour)), self._start_s)
             self._started = True
         return self._wait(
-            _Job(lambda: perceived(behaviour, contract, frame, seen, directives)), seconds
+            _Job(lambda: run_behaviour(behaviour, contract, frame, observation, directives)),
+            seconds,
         )
 
     def close(self) -> None:
@@ -205,7 +206,7 @@ class Threaded:
         self._queue().put(job)
         if not job.done.wait(seconds):
             self._give_up(job)
-            raise LateError(f"it gave no answer within {told_seconds(seconds or 0.0)}")
+            raise RunTimeoutError(f"it gave no answer within {duration_text(seconds or 0.0)}")
         if job.fault is not None:
             raise job.fault
         return job.percepts
@@ -260,7 +261,7 @@ def _ask_to_stop(thread: threading.Thread, job: _Job) -> None:
             )
 
 
-def told_seconds(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """A time for a message: milliseconds below a second."""
     return f"{seconds:g} s" if seconds >= 1.0 else f"{seconds * 1000:g} ms"
 
@@ -286,7 +287,7 @@ def resident_mb() -> float:
 LONGEST_ERROR = 400
 
 
-def worded(fault: BaseException) -> str:
+def error_line(fault: BaseException) -> str:
     """An exception in one short line, whatever its own text does."""
     if isinstance(fault, BehaviourError):
         said = f"{fault.what}; expected {fault.expected}" if fault.expected else fault.what

@@ -33,7 +33,7 @@ DEEPEST = 8
 """Values of plug-ins' own kinds may nest this deep."""
 
 
-def collect(contract: Contract, said: object) -> tuple[Percept, ...]:
+def collect_percepts(contract: Contract, said: object) -> tuple[Percept, ...]:
     """What a behaviour returned, as percepts; a generator that does not end is cut off.
 
     Raises:
@@ -59,7 +59,7 @@ def collect(contract: Contract, said: object) -> tuple[Percept, ...]:
     return percepts
 
 
-def check(
+def check_percepts(
     contract: Contract, percepts: Iterable[Percept], frame: Frame, before: Observation | None = None
 ) -> None:
     """Refuse percepts that are not as the contract and their kinds want them.
@@ -73,7 +73,7 @@ def check(
     Raises:
         BehaviourError: One is nonsense.
     """
-    seen: set[int] = {r.id for r in before.of("region")} if before is not None else set()
+    region_ids: set[int] = {r.id for r in before.of("region")} if before is not None else set()
     for p in percepts:
         who = f"behaviour '{contract.name}' reported '{_brief(p.kind)}'"
         if not isinstance(p.kind, str) or p.kind not in contract.gives:
@@ -94,7 +94,7 @@ def check(
             f"{who} with confidence {_brief(p.confidence)}",
             "a number from 0 to 1",
         )
-        kind = VALUES.get(p.kind)
+        kind = VALUE_CHECKS.get(p.kind)
         if kind is None:
             _own(p.value, who)
             continue
@@ -103,11 +103,11 @@ def check(
         judge(p.value, frame.size)
         if isinstance(p.value, Region):
             _expect(
-                p.value.id not in seen,
+                p.value.id not in region_ids,
                 f"region {p.value.id} comes twice",
                 "each id once, also among all behaviours that give regions",
             )
-            seen.add(p.value.id)
+            region_ids.add(p.value.id)
 
 
 def _region(r: Region, size: tuple[int, int]) -> None:
@@ -166,7 +166,7 @@ def _health(h: Health, size: tuple[int, int]) -> None:
     _expect(fine, f"health has status {_brief(h.status)}", "a HealthStatus and a sentence")
 
 
-VALUES: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] = {
+VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] = {
     "region": (Region, _region),
     "hypothesis": (Hypothesis, _hypothesis),
     "depth": (Depth, _depth),

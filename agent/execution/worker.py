@@ -23,20 +23,20 @@ import numpy as np
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
-from visup.agent.execution.runners import perceived, start, worded
-from visup.agent.model.records import Directive, Frame, Observation, Past, Percept
-from visup.agent.plugins.loader import module_of
+from visup.agent.execution.runners import error_line, run_behaviour, start_behaviour
+from visup.agent.model.records import Directive, Frame, Observation, PastFrame, Percept
+from visup.agent.plugins.factory import import_file
 
 _TOLD = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)
 _TOLD_TOO = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
-FAULTS: Mapping[str, type[Exception]] = MappingProxyType(
+EXCEPTIONS: Mapping[str, type[Exception]] = MappingProxyType(
     {kind.__name__: kind for kind in (*_TOLD, *_TOLD_TOO)}
 )
 """Exceptions that are told by their own names; all others come as `BehaviourError`."""
 
 
 @dataclass(frozen=True, slots=True)
-class Parcel:
+class PackedBehaviour:
     """A behaviour on its way to a process.
 
     Attributes:
@@ -53,7 +53,7 @@ class Parcel:
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class RunRequest:
     """A frame to run on.
 
     Attributes:
@@ -61,7 +61,7 @@ class Request:
         time: Of the frame, seconds.
         shared: Name of the shared memory with its image.
         shape: Of the image, uint8.
-        seen: What others reported of it.
+        observation: What others reported of it.
         directives: What the last step asked for.
         past: Past frames that were not sent before.
     """
@@ -70,72 +70,72 @@ class Request:
     time: float
     shared: str
     shape: tuple[int, ...]
-    seen: Observation
+    observation: Observation
     directives: tuple[Directive, ...]
-    past: tuple[Past, ...]
+    past: tuple[PastFrame, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class RunReply:
     """What came of it: percepts, or the kind and the words of a fault."""
 
     percepts: tuple[Percept, ...] = ()
     fault: tuple[str, str] | None = None
 
 
-def serve(pipe: Connection, parcel: Parcel, memory_mb: float) -> None:
+def serve(pipe: Connection, parcel: PackedBehaviour, memory_mb: float) -> None:
     """Start a behaviour and run it on the frames that come, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides when to stop
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         behaviour = _unpacked(parcel)
-        start(behaviour)
+        start_behaviour(behaviour)
         _limit(memory_mb)
     except BaseException as fault:
         _send(pipe, _told(fault))
         return
-    _send(pipe, Answer())
-    past: deque[Past] = deque(maxlen=parcel.contract.history)
+    _send(pipe, RunReply())
+    past: deque[PastFrame] = deque(maxlen=parcel.contract.history)
     with suppress(EOFError):
         while True:
-            request: Request = pickle.loads(pipe.recv_bytes())
+            request: RunRequest = pickle.loads(pipe.recv_bytes())
             _send(pipe, _answer(behaviour, parcel.contract, request, past))
 
 
 def _answer(
-    behaviour: Behaviour, contract: Contract, request: Request, past: deque[Past]
-) -> Answer:
+    behaviour: Behaviour, contract: Contract, request: RunRequest, past: deque[PastFrame]
+) -> RunReply:
     try:
         past.extend(request.past)
         frame = Frame(request.index, request.time, _image(request))
-        seen = replace(request.seen, past=tuple(past))
-        return Answer(perceived(behaviour, contract, frame, seen, request.directives))
+        observation = replace(request.observation, past=tuple(past))
+        return RunReply(run_behaviour(behaviour, contract, frame, observation, request.directives))
     except BaseException as fault:
         # Whatever it is, it is the behaviour's failure; the supervisor decides what comes of it.
         return _told(fault)
 
 
-def _told(fault: BaseException) -> Answer:
+def _told(fault: BaseException) -> RunReply:
     if isinstance(fault, SystemExit | GeneratorExit | KeyboardInterrupt):
-        return Answer(fault=("", f"it called for an exit ({type(fault).__name__})"))
-    kind, said = type(fault).__name__, worded(fault)
-    if kind in FAULTS:
-        return Answer(fault=(kind, said.removeprefix(f"{kind}: ")))
-    return Answer(fault=("", said))
+        return RunReply(fault=("", f"it called for an exit ({type(fault).__name__})"))
+    kind, said = type(fault).__name__, error_line(fault)
+    if kind in EXCEPTIONS:
+        return RunReply(fault=(kind, said.removeprefix(f"{kind}: ")))
+    return RunReply(fault=("", said))
 
 
-def _send(pipe: Connection, answer: Answer) -> None:
+def _send(pipe: Connection, answer: RunReply) -> None:
     try:
-        sent = packed_bytes(answer)
+        sent = pickled(answer)
     except Exception as fault:
         # A value that cannot be sent is a fault of what was perceived.
         said = f"what it reported cannot be sent: {type(fault).__name__}: {fault}"
-        sent = packed_bytes(Answer(fault=("", said[:1000])))
+        sent = pickled(RunReply(fault=("", said[:1000])))
     with suppress(OSError):
         pipe.send_bytes(sent)
 
 
-def packed_bytes(value: object) -> bytes:
+def pickled(value: object) -> bytes:
     """A value pickled; read-only mappings, which records hold, are among what can be."""
     into = BytesIO()
     _Pickler(into, pickle.HIGHEST_PROTOCOL).dump(value)
@@ -156,7 +156,7 @@ class _Pickler(pickle.Pickler):
 _attached: dict[str, SharedMemory] = {}
 
 
-def _image(request: Request) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+def _image(request: RunRequest) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     """A copy of its own: the behaviour may keep frames, the shared memory is written over."""
     block = _attached.get(request.shared)
     if block is None:
@@ -169,10 +169,10 @@ def _image(request: Request) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     return image
 
 
-def _unpacked(parcel: Parcel) -> Behaviour:
+def _unpacked(parcel: PackedBehaviour) -> Behaviour:
     sys.path[:] = parcel.paths
     if parcel.file:
-        module_of(Path(parcel.file))
+        import_file(Path(parcel.file))
     behaviour: Behaviour = pickle.loads(parcel.packed)
     return behaviour
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class SourceLocation:
     """Where in a text a fault stands.
 
     Attributes:
@@ -50,7 +50,7 @@ class VisupError(Exception):
         self,
         what: str,
         *,
-        where: str | Place | None = None,
+        where: str | SourceLocation | None = None,
         expected: str | None = None,
         hint: str | None = None,
     ) -> None:
@@ -62,7 +62,7 @@ class VisupError(Exception):
 
     def __str__(self) -> str:
         lines = [f"{self.where}: {self.what}" if self.where else self.what]
-        if isinstance(self.where, Place) and self.where.text:
+        if isinstance(self.where, SourceLocation) and self.where.text:
             lines.append(self.where.caret())
         if self.expected:
             lines.append(f"  expected: {self.expected}")
@@ -114,7 +114,7 @@ class ExtraMissingError(VisupError):
         )
 
 
-class ManyErrors(VisupError):
+class ErrorGroup(VisupError):
     """All the faults of one file, told at once.
 
     Args:

@@ -46,7 +46,7 @@ def replace(record: Record, **changes: Any) -> Record:
 
 
 @dataclass(frozen=True, slots=True)
-class _Layout:
+class _RecordLayout:
     """What a kind of record is made of.
 
     Attributes:
@@ -62,10 +62,10 @@ class _Layout:
     open: bool
 
 
-_LAYOUTS: dict[type, _Layout] = {}
+_LAYOUTS: dict[type, _RecordLayout] = {}
 
 
-def _of_open(record: Record, changes: Mapping[str, Any], layout: _Layout) -> Record:
+def _of_open(record: Record, changes: Mapping[str, Any], layout: _RecordLayout) -> Record:
     held, alike = record.__dict__, True
     for name, value in changes.items():
         alike = held[name] is value and alike
@@ -81,11 +81,11 @@ def _of_open(record: Record, changes: Mapping[str, Any], layout: _Layout) -> Rec
     return new
 
 
-def _layout(kind: Any) -> _Layout:
+def _layout(kind: Any) -> _RecordLayout:
     """The layout of a kind of record; found once for each kind."""
     names = [f.name for f in fields(kind)]
     one = attrgetter(names[0])
     read = attrgetter(*names) if len(names) > 1 else lambda record: (one(record),)
     open_ = not hasattr(kind, "__slots__") and not hasattr(kind, "__post_init__")
     place = {name: i for i, name in enumerate(names)}
-    return _LAYOUTS.setdefault(kind, _Layout(read, place, open_))
+    return _LAYOUTS.setdefault(kind, _RecordLayout(read, place, open_))

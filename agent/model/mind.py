@@ -385,19 +385,19 @@ class Mind:
 
     def holding(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""
-        return self._table.true(*names)
+        return self._table.holding(*names)
 
-    def held(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
+    def holding_objects(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
         """Objects and names of the relations that `holding` gives."""
-        return self._table.held(*names)
+        return self._table.holding_objects(*names)
 
-    def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
+    def truth_codes(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
         """A relation between all of some objects: (n, n) codes, 1 true, -1 false, 0 unknown."""
-        return self._table.truths(name, ids)
+        return self._table.truth_codes(name, ids)
 
-    def truths_of(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
+    def truth_tables(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
         """Several relations between all of some objects: (k, n, n) codes as of `truths`."""
-        return self._table.truths_of(names, ids)
+        return self._table.truth_tables(names, ids)
 
     @property
     def _table(self) -> RelationTable:

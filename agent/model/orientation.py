@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 _ALONG_POLE = 0.999
 
 
-def picture_axes(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def image_axes(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Right and up of the picture seen from directions.
 
     Args:
@@ -57,7 +57,7 @@ def orientations(directions: ArrayLike, rotations: ArrayLike) -> NDArray[np.floa
         [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
     """
     d = np.asarray(directions, np.float64)
-    right, up = picture_axes(d)
+    right, up = image_axes(d)
     angle = np.asarray(rotations, np.float64)[..., None]
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * right + s * up, s * right - c * up, -d], axis=-2)
@@ -74,7 +74,7 @@ def views(orientation: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float
     """
     m = np.asarray(orientation, np.float64)
     directions = -m[..., 2, :]
-    right, up = picture_axes(directions)
+    right, up = image_axes(directions)
     x = m[..., 0, :]
     return directions, np.arctan2((x * up).sum(axis=-1), (x * right).sum(axis=-1))
 

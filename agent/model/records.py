@@ -214,7 +214,7 @@ class ReportState(StrEnum):
     SUSPENDED = "suspended"
 
 
-BROKEN = frozenset({ReportState.FAILED, ReportState.LATE, ReportState.SUSPENDED})
+FAULT_STATES = frozenset({ReportState.FAILED, ReportState.LATE, ReportState.SUSPENDED})
 """States of a behaviour that is at fault itself; one that is blind only misses what it needs."""
 
 
@@ -257,7 +257,7 @@ class Observation:
     time: float
     frame_size: tuple[int, int]
     reports: tuple[Report, ...] = ()
-    past: tuple[Past, ...] = field(default=(), repr=False, compare=False)
+    past: tuple[PastFrame, ...] = field(default=(), repr=False, compare=False)
 
     def of(self, kind: str) -> tuple[Any, ...]:
         """Values of all percepts of one kind, in order."""
@@ -277,21 +277,23 @@ class Observation:
 
         Nothing follows from their absence.
         """
-        unable = (r for r in self.reports if r.state in BROKEN or r.state is ReportState.BLIND)
+        unable = (
+            r for r in self.reports if r.state in FAULT_STATES or r.state is ReportState.BLIND
+        )
         return frozenset(kind for r in unable for kind in r.gives)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Past:
+class PastFrame:
     """A frame that is over, with what was observed of it.
 
     Attributes:
         frame: The frame.
-        seen: Its observation.
+        observation: What was perceived of it.
     """
 
     frame: Frame
-    seen: Observation
+    observation: Observation
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,7 +324,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Concern:
+class AlertCondition:
     """A reason for an alert that holds now; the act phase keeps alerts from these.
 
     Attributes:

@@ -41,7 +41,7 @@ class Relation:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One question about every pair of objects; see `Cells`.
+    """One question about every pair of objects; see `RelationBlock`.
 
     Attributes:
         names: The relation that each code stands for; '' for a code that has no name of its own (not
@@ -69,7 +69,7 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class ColumnLayout:
     """Columns that stand together in every step, and so made once.
 
     Attributes:
@@ -85,7 +85,7 @@ class Columns:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cells:
+class RelationBlock:
     """What holds between all pairs of objects.
 
     Pairs (a, b) with a < b stand in the order (0, 1), (0, 2), ..., (1, 2), ... of a table's ids.
@@ -97,7 +97,7 @@ class Cells:
         numbers: (N, P) confidences and quantities.
     """
 
-    columns: Columns
+    columns: ColumnLayout
     state: NDArray[np.int8]
     since: NDArray[np.float64]
     numbers: NDArray[np.float64]

@@ -15,7 +15,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, overload
 
 from visup.agent.model.records import Truth
-from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns, Relation
+from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, Relation, RelationBlock
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,10 +36,10 @@ class RelationTable(Sequence[Relation]):
     """
 
     ids: tuple[int, ...] = ()
-    parts: tuple[Cells, ...] = ()
+    parts: tuple[RelationBlock, ...] = ()
     extra: tuple[Relation, ...] = field(default=())
 
-    def with_cells(self, cells: Cells) -> RelationTable:
+    def with_block(self, cells: RelationBlock) -> RelationTable:
         """The same with more that holds between all pairs of its objects."""
         return RelationTable(self.ids, (*self.parts, cells), self.extra)
 
@@ -82,12 +82,12 @@ class RelationTable(Sequence[Relation]):
         truths = [self.truth(name, *pair) for pair in self._pairs]
         return [0 if t is None else _CODES[t] for t in truths]
 
-    def true(self, *names: str) -> tuple[Relation, ...]:
+    def holding(self, *names: str) -> tuple[Relation, ...]:
         """The relations of some names that are true, by their objects."""
-        held = (self.find(name, *objects) for objects, name in self.held(*names))
+        held = (self.find(name, *objects) for objects, name in self.holding_objects(*names))
         return tuple([r for r in held if r is not None])
 
-    def held(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
+    def holding_objects(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
         """Objects and names of the relations of some names that are true, by objects: no records."""
         found: list[tuple[tuple[int, ...], str]] = [
             (r.objects, r.name) for r in self.extra if r.name in names and r.truth is Truth.TRUE
@@ -107,7 +107,7 @@ class RelationTable(Sequence[Relation]):
                             found.append((pair, name))
         return sorted(found, key=itemgetter(0))
 
-    def truths(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
+    def truth_codes(self, name: str, ids: Sequence[int]) -> NDArray[np.int8]:
         """A relation between all of some objects.
 
         Args:
@@ -117,10 +117,10 @@ class RelationTable(Sequence[Relation]):
         Returns:
             (n, n) int8, a the row and b the column: 1 true, -1 false, 0 unknown or not judged.
         """
-        table: NDArray[np.int8] = self.truths_of((name,), ids)[0]
+        table: NDArray[np.int8] = self.truth_tables((name,), ids)[0]
         return table
 
-    def truths_of(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
+    def truth_tables(self, names: tuple[str, ...], ids: Sequence[int]) -> NDArray[np.int8]:
         """Several relations between all of some objects, in one pass.
 
         Args:
@@ -229,7 +229,7 @@ class RelationTable(Sequence[Relation]):
 
 @lru_cache(maxsize=128)
 def _places_of(
-    columns: tuple[Columns, ...], heights: tuple[int, ...], wanted: tuple[str, ...], m: int
+    columns: tuple[ColumnLayout, ...], heights: tuple[int, ...], wanted: tuple[str, ...], m: int
 ) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
     """Where some relations of all of m objects are found in the states of all cells, end to end.
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.model.display import drawn
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.mind import Mind
-from visup.agent.model.notebook import drawn
 from visup.agent.model.records import (
     Alert,
     Directive,

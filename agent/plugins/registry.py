@@ -8,7 +8,7 @@ from typing import Any
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.model.errors import BehaviourError
-from visup.agent.plugins.loader import Kind, Offer
+from visup.agent.plugins.factory import BehaviourFactory, Constructor
 
 GROUP = "visup.behaviours"
 
@@ -17,9 +17,9 @@ class Registry:
     """Behaviours that can be made, by name. Made by whoever wires an agent; never global."""
 
     def __init__(self) -> None:
-        self._offers: dict[str, Offer | EntryPoint] = {}
+        self._offers: dict[str, BehaviourFactory | EntryPoint] = {}
 
-    def add(self, name: str, kind: Kind | EntryPoint) -> None:
+    def add(self, name: str, kind: Constructor | EntryPoint) -> None:
         """Add a class of behaviours, or whatever makes one.
 
         Raises:
@@ -27,13 +27,13 @@ class Registry:
         """
         if name in self._offers:
             raise BehaviourError(f"a behaviour called '{name}' is registered already")
-        self._offers[name] = kind if isinstance(kind, EntryPoint) else Offer(kind, name)
+        self._offers[name] = kind if isinstance(kind, EntryPoint) else BehaviourFactory(kind, name)
 
     def names(self) -> list[str]:
         """Names in alphabetical order."""
         return sorted(self._offers)
 
-    def offer(self, name: str) -> Offer:
+    def factory(self, name: str) -> BehaviourFactory:
         """What makes the behaviour of that name; an entry point is imported now.
 
         Raises:
@@ -45,10 +45,10 @@ class Registry:
                 expected=f"one of: {', '.join(self.names())}",
             )
         found = self._offers[name]
-        if isinstance(found, Offer):
+        if isinstance(found, BehaviourFactory):
             return found
         try:
-            offer = Offer(found.load(), found.value)
+            offer = BehaviourFactory(found.load(), found.value)
         except Exception as fault:
             said = f"{type(fault).__name__}: {fault}"
             raise BehaviourError(
@@ -68,10 +68,10 @@ class Registry:
             BehaviourError: No such name, or it cannot be made.
             SettingsError: A setting is not as it should be.
         """
-        return self.offer(name).make(settings)
+        return self.factory(name).make(settings)
 
 
-def discover() -> Registry:
+def discover_behaviours() -> Registry:
     """A registry of all behaviours that installed packages offer under `visup.behaviours`."""
     registry = Registry()
     for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):

@@ -8,13 +8,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
 
 Values = dict[str, dict[str, Any]]
 """Name of a behaviour -> its settings."""
 
 
-def validated(model: type | None, values: Mapping[str, Any], name: str) -> object:
+def validate_settings(model: type | None, values: Mapping[str, Any], name: str) -> object:
     """Settings of one behaviour, as its model makes them.
 
     Args:
@@ -103,7 +103,7 @@ def read_settings(path: Path) -> Values:
     return tables
 
 
-def merged(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
+def merge_settings(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
     """Settings in layers; a later one goes over those before it, key by key."""
     names = dict.fromkeys(name for layer in layers for name in layer)
     return {n: {k: v for layer in layers for k, v in layer.get(n, {}).items()} for n in names}
@@ -142,4 +142,4 @@ def _refuse(faults: list[VisupError]) -> None:
     if len(faults) == 1:
         raise faults[0]
     if faults:
-        raise ManyErrors(faults)
+        raise ErrorGroup(faults)

@@ -34,25 +34,20 @@ class StateError(TypeError):
     """A value is of a kind that cannot be kept."""
 
 
-def held(it: object, *left_out: str) -> dict[str, Any]:
-    """The attributes of an object besides those left out: what most `save` methods give."""
-    return {name: value for name, value in vars(it).items() if name not in left_out}
-
-
-def frozen(value: Any) -> bytes:
+def dump_state(value: Any) -> bytes:
     """A state as bytes.
 
     Raises:
         StateError: It holds something that cannot be kept, such as a function or an open file.
     """
-    writer = _Writer()
+    writer = _StateWriter()
     root = writer.node(value)
     tree = json.dumps([writer.table, root, writer.shapes], separators=(",", ":")).encode()
     body = b"".join(writer.arrays)
     return _HEAD.pack(MAGIC, len(tree), zlib.crc32(tree), zlib.crc32(body)) + tree + body
 
 
-def thawed(data: bytes) -> Any:
+def load_state(data: bytes) -> Any:
     """The state that was frozen.
 
     Raises:
@@ -65,13 +60,13 @@ def thawed(data: bytes) -> Any:
         if magic != MAGIC or zlib.crc32(tree) != tree_crc or zlib.crc32(body) != body_crc:
             raise ValueError("its check sum is wrong")
         table, root, shapes = json.loads(tree)
-        return _Reader(table, _arrays(shapes, body)).value(root)
+        return _StateReader(table, _arrays(shapes, body)).value(root)
     except (struct.error, ValueError, TypeError, KeyError, IndexError, AttributeError) as fault:
         raise OutputError(f"a kept state cannot be read ({fault})") from fault
 
 
 @dataclass(slots=True)
-class _Writer:
+class _StateWriter:
     """Nodes in an order in which each comes after those that it holds."""
 
     table: list[_Node] = field(default_factory=list)
@@ -159,7 +154,7 @@ def _attributes(value: Any) -> dict[str, Any]:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _StateReader:
     table: list[_Node]
     arrays: list[NDArray[Any]]
     _made: list[Any] = field(default_factory=list)
@@ -214,10 +209,10 @@ _MAKERS: Mapping[str, Callable[..., Any]] = {
     "array": lambda r, number: r.arrays[number],
     "scalar": lambda r, number: r.arrays[number][()],
     "bytes": lambda r, number: r.arrays[number].tobytes(),
-    "object": _Reader.made,
-    "enum": _Reader.enum,
-    "csr": _Reader.csr,
-    "named": _Reader.named,
+    "object": _StateReader.made,
+    "enum": _StateReader.enum,
+    "csr": _StateReader.csr,
+    "named": _StateReader.named,
 }
 
 

@@ -26,7 +26,7 @@ from visup.agent.model.errors import OutputError
 from visup.agent.model.records import Observation, Percept, Region, Report, ReportState
 from visup.agent.storage._codec_jit import NO_DIGIT, chain_digits, chain_points, run_lengths
 
-LARGEST = 256 * 2**20
+LARGEST_STEP_BYTES = 256 * 2**20
 """No step is larger, bytes uncompressed: a damaged file must not fill the memory."""
 
 _LEVEL = 1  # of zlib: higher levels save a few per cent and take several times as long
@@ -46,23 +46,23 @@ _TYPES: Mapping[str, type] = MappingProxyType(
 _FIELDS = {k: tuple(f.name for f in fields(k)) for k in _TYPES.values() if is_dataclass(k)}
 
 
-class NotPlainError(TypeError):
+class UnsupportedTypeError(TypeError):
     """A value is of a type that the codec does not know."""
 
 
-def packed(seen: Observation) -> bytes:
+def pack_observation(observation: Observation) -> bytes:
     """An observation as bytes.
 
     Args:
-        seen: What was perceived of one frame; times that behaviours took are not kept.
+        observation: What was perceived of one frame; times that behaviours took are not kept.
 
     Returns:
         A compressed JSON document.
     """
-    return zlib.compress(to_json(document(seen), inf_nan_mode="constants"), _LEVEL)
+    return zlib.compress(to_json(to_document(observation), inf_nan_mode="constants"), _LEVEL)
 
 
-def unpacked(data: bytes, where: str = "") -> Observation:
+def unpack_observation(data: bytes, where: str = "") -> Observation:
     """The observation that was packed.
 
     Raises:
@@ -70,10 +70,10 @@ def unpacked(data: bytes, where: str = "") -> Observation:
     """
     try:
         inflater = zlib.decompressobj()
-        text = inflater.decompress(data, LARGEST)
+        text = inflater.decompress(data, LARGEST_STEP_BYTES)
         if not inflater.eof:
             raise ValueError("it is cut off or too large")
-        return observation(from_json(text))
+        return from_document(from_json(text))
     except (zlib.error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as fault:
         raise OutputError(
             f"a recorded step cannot be read ({fault})",
@@ -82,17 +82,17 @@ def unpacked(data: bytes, where: str = "") -> Observation:
         ) from fault
 
 
-def document(seen: Observation) -> dict[str, Any]:
+def to_document(observation: Observation) -> dict[str, Any]:
     """An observation as JSON values, in the form of docs/step.schema.json."""
     return {
-        "frame_index": seen.frame_index,
-        "time": float(seen.time),
-        "frame_size": [int(n) for n in seen.frame_size],
-        "reports": [_report(r) for r in seen.reports],
+        "frame_index": observation.frame_index,
+        "time": float(observation.time),
+        "frame_size": [int(n) for n in observation.frame_size],
+        "reports": [_report(r) for r in observation.reports],
     }
 
 
-def observation(told: Mapping[str, Any]) -> Observation:
+def from_document(told: Mapping[str, Any]) -> Observation:
     """The observation of a document; reports whose values could not be kept have rested."""
     width, height = told["frame_size"]
     return Observation(
@@ -109,13 +109,13 @@ def _report(r: Report) -> dict[str, Any]:
         out["error"] = r.error
     try:
         out["percepts"] = [_percept(p) for p in r.percepts]
-    except NotPlainError as fault:
+    except UnsupportedTypeError as fault:
         out["lost"] = str(fault)
     return out
 
 
 def _percept(p: Percept) -> list[Any]:
-    return [p.kind, encoded(p.value), encoded(p.time), p.source, encoded(p.confidence)]
+    return [p.kind, encode(p.value), encode(p.time), p.source, encode(p.confidence)]
 
 
 def _told_report(told: Mapping[str, Any]) -> Report:
@@ -124,14 +124,14 @@ def _told_report(told: Mapping[str, Any]) -> Report:
         error = f"its percepts were not recorded: {told['lost']}"
         return Report(str(told["behaviour"]), ReportState.RESTED, gives, error=error)
     percepts = tuple(
-        Percept(str(kind), decoded(value), decoded(time), str(source), decoded(confidence))
+        Percept(str(kind), decode(value), decode(time), str(source), decode(confidence))
         for kind, value, time, source, confidence in told["percepts"]
     )
     state = ReportState(told["state"])
     return Report(str(told["behaviour"]), state, gives, percepts, str(told.get("error", "")))
 
 
-def encoded(value: Any) -> Any:
+def encode(value: Any) -> Any:
     """A value as JSON values; what JSON has no form for is an object with the key '$'.
 
     Raises:
@@ -145,26 +145,26 @@ def encoded(value: Any) -> Any:
     if kind in _FIELDS:
         return _record(kind, value)
     if kind is tuple:
-        return {"$": "tuple", "of": [v if type(v) in _PLAIN else encoded(v) for v in value]}
+        return {"$": "tuple", "of": [v if type(v) in _PLAIN else encode(v) for v in value]}
     if kind is list:
-        return [encoded(v) for v in value]
+        return [encode(v) for v in value]
     if isinstance(value, Enum):
         if _TYPES.get(kind.__name__) is not kind:
-            raise NotPlainError(f"{kind.__module__}.{kind.__qualname__}")
+            raise UnsupportedTypeError(f"{kind.__module__}.{kind.__qualname__}")
         return {"$": kind.__name__, "of": value.value}
     if kind is dict or kind is MappingProxyType:
         return _mapping(value)
     if isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biufc":
         return _array(value)
     if kind is frozenset or kind is set:
-        ordered = sorted((encoded(v) for v in value), key=lambda v: json.dumps(v, sort_keys=True))
+        ordered = sorted((encode(v) for v in value), key=lambda v: json.dumps(v, sort_keys=True))
         return {"$": kind.__name__, "of": ordered}
     if kind is bytes:
         return {"$": "bytes", "of": base64.b64encode(value).decode()}
-    raise NotPlainError(f"{kind.__module__}.{kind.__qualname__}")
+    raise UnsupportedTypeError(f"{kind.__module__}.{kind.__qualname__}")
 
 
-def decoded(value: Any) -> Any:
+def decode(value: Any) -> Any:
     """The value that was encoded.
 
     Raises:
@@ -174,10 +174,10 @@ def decoded(value: Any) -> Any:
     if kind in _PLAIN:
         return value
     if kind is list:
-        return [decoded(v) for v in value]
+        return [decode(v) for v in value]
     tag = value.get("$")
     if tag is None:
-        return {k: decoded(v) for k, v in value.items()}
+        return {k: decode(v) for k, v in value.items()}
     if tag == "Region":
         return _told_region(value)
     if tag in _TYPES:
@@ -189,21 +189,21 @@ def _record(kind: type, value: Any) -> dict[str, Any]:
     out: dict[str, Any] = {"$": kind.__name__}
     for name in _FIELDS[kind]:
         held = getattr(value, name)
-        out[name] = held if type(held) in _PLAIN else encoded(held)
+        out[name] = held if type(held) in _PLAIN else encode(held)
     return out
 
 
 def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
     if type(value) is dict and all(type(k) is str and k != "$" for k in value):
-        return {k: encoded(v) for k, v in value.items()}
-    pairs = [[encoded(k), encoded(v)] for k, v in value.items()]
+        return {k: encode(v) for k, v in value.items()}
+    pairs = [[encode(k), encode(v)] for k, v in value.items()]
     return {"$": "map" if type(value) is dict else "frozenmap", "of": pairs}
 
 
 def _told_record(kind: type, told: Mapping[str, Any]) -> Any:
     if kind not in _FIELDS:
         return kind(told["of"])
-    given = {n: v if type(v) in _PLAIN else decoded(v) for n, v in told.items()}
+    given = {n: v if type(v) in _PLAIN else decode(v) for n, v in told.items()}
     del given["$"]
     return kind(**given)
 
@@ -229,11 +229,11 @@ def _told_array(told: Mapping[str, Any]) -> NDArray[Any]:
 
 
 _OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
-    "tuple": lambda told: tuple([v if type(v) in _PLAIN else decoded(v) for v in told["of"]]),
-    "set": lambda told: {decoded(v) for v in told["of"]},
-    "frozenset": lambda told: frozenset(decoded(v) for v in told["of"]),
-    "map": lambda told: {decoded(k): decoded(v) for k, v in told["of"]},
-    "frozenmap": lambda told: MappingProxyType({decoded(k): decoded(v) for k, v in told["of"]}),
+    "tuple": lambda told: tuple([v if type(v) in _PLAIN else decode(v) for v in told["of"]]),
+    "set": lambda told: {decode(v) for v in told["of"]},
+    "frozenset": lambda told: frozenset(decode(v) for v in told["of"]),
+    "map": lambda told: {decode(k): decode(v) for k, v in told["of"]},
+    "frozenmap": lambda told: MappingProxyType({decode(k): decode(v) for k, v in told["of"]}),
     "bytes": lambda told: base64.b64decode(told["of"]),
     "array": _told_array,
     "scalar": lambda told: _told_array(told)[()],
@@ -247,31 +247,31 @@ def _region(r: Region) -> dict[str, Any]:
     out: dict[str, Any] = {
         "$": "Region",
         "bbox": [int(n) for n in r.bbox],
-        "mask": runs(r.mask),
+        "mask": mask_to_runs(r.mask),
         "contour": _chain(r.contour),
     }
     for name in _SHOWN:
         held = getattr(r, name)
-        out[name] = held if type(held) in _PLAIN else encoded(held)
+        out[name] = held if type(held) in _PLAIN else encode(held)
     return out
 
 
 def _told_region(told: Mapping[str, Any]) -> Region:
     x, y, w, h = (int(n) for n in told["bbox"])
-    given = {n: decoded(v) for n, v in told.items() if n not in ("$", "bbox", "mask", "contour")}
-    mask = unrun(told["mask"], (h, w))
+    given = {n: decode(v) for n, v in told.items() if n not in ("$", "bbox", "mask", "contour")}
+    mask = runs_to_mask(told["mask"], (h, w))
     return Region(
-        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decoded(told["contour"])), **given
+        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decode(told["contour"])), **given
     )
 
 
-def runs(mask: NDArray[np.bool_]) -> list[int]:
+def mask_to_runs(mask: NDArray[np.bool_]) -> list[int]:
     """Lengths of the runs of a mask in reading order, that of False first (0 when there is none)."""
     lengths: list[int] = run_lengths(np.ascontiguousarray(mask).reshape(-1)).tolist()
     return lengths
 
 
-def unrun(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
+def runs_to_mask(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
     """The mask of runs, of shape (height, width).
 
     Raises:
@@ -298,10 +298,10 @@ def _chain(contour: NDArray[np.float32]) -> Any:
     """
     points = np.asarray(contour)
     if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 2 or not len(points):
-        return encoded(contour)
+        return encode(contour)
     digits = chain_digits(np.ascontiguousarray(points), _CODE)
     if len(digits) == len(points):
-        return encoded(contour)
+        return encode(contour)
     first = [int(points[0, 0]), int(points[0, 1])]
     return {"$": "chain", "from": first, "of": digits.tobytes().decode()}
 

@@ -21,8 +21,8 @@ from visup.agent.model.errors import OutputError
 from visup.agent.model.mind import TaskBelief
 from visup.agent.model.records import Alert, Event, Frame
 from visup.agent.model.step import Step
-from visup.agent.storage.codec import packed
-from visup.agent.storage.jsonable import event_line, object_line, plain
+from visup.agent.storage.codec import pack_observation
+from visup.agent.storage.jsonable import event_record, object_summary, to_jsonable
 
 APPLICATION_ID = 0x56495355  # "VISU"
 VERSION = 2
@@ -45,7 +45,7 @@ Statement = tuple[str, tuple[Any, ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class JournalLimits:
     """How a journal is cut into segments, and how much of it is kept.
 
     Attributes:
@@ -76,10 +76,12 @@ class Journal:
         OutputError: It cannot be written, or the one to go on with is of another version.
     """
 
-    def __init__(self, path: Path, limits: Limits | None = None, *, resume: bool = False) -> None:
+    def __init__(
+        self, path: Path, limits: JournalLimits | None = None, *, resume: bool = False
+    ) -> None:
         self.path = path
         self.last_frame: int | None = None
-        self._limits = limits or Limits()
+        self._limits = limits or JournalLimits()
         self._begun: float | None = None
         self._last_event = 0
         self._sizes: list[int] = []
@@ -92,7 +94,7 @@ class Journal:
 
     def note(self, **facts: Any) -> None:
         """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
-        rows = [(key, _text(plain(value))) for key, value in facts.items()]
+        rows = [(key, _text(to_jsonable(value))) for key, value in facts.items()]
         self._write([("INSERT OR REPLACE INTO run VALUES (?, ?)", row) for row in rows])
 
     def record(self, step: Step, frame: Frame | None = None) -> None:
@@ -101,7 +103,7 @@ class Journal:
         Raises:
             OutputError: The disk is full or the file has become unwritable; earlier steps stay.
         """
-        seen = packed(step.observation)
+        seen = pack_observation(step.observation)
         text = to_json(summary(step)).decode()
         row = (step.frame_index, step.time, text, seen, zlib.crc32(seen))
         statements: list[Statement] = [("INSERT INTO steps VALUES (?, ?, ?, ?, ?)", row)]
@@ -252,12 +254,12 @@ def summary(step: Step) -> dict[str, Any]:
     """What is believed after a step, in short; all else follows from what was seen (`seen`)."""
     mind = step.mind
     return {
-        "objects": [object_line(b) for _, b in sorted(mind.objects.items())],
-        "couplings": plain(mind.couplings),
+        "objects": [object_summary(b) for _, b in sorted(mind.objects.items())],
+        "couplings": to_jsonable(mind.couplings),
         "tasks": [_task_line(t) for t in mind.tasks],
-        "health": plain(mind.health),
-        "unknown": plain(mind.unknown),
-        "directives": plain(step.directives),
+        "health": to_jsonable(mind.health),
+        "unknown": to_jsonable(mind.unknown),
+        "directives": to_jsonable(step.directives),
         "behaviours": {r.behaviour: [r.state.value, r.error] for r in step.reports},
     }
 
@@ -282,11 +284,11 @@ def _connected(path: Path) -> sqlite3.Connection:
 
 
 def _event_row(event: Event) -> tuple[Any, ...]:
-    return event.frame_index, event.time, event.kind, event.text, _text(event_line(event))
+    return event.frame_index, event.time, event.kind, event.text, _text(event_record(event))
 
 
 def _alert_row(a: Alert) -> tuple[Any, ...]:
-    return a.id, a.kind, a.severity.name.lower(), a.opened, a.closed, a.cause, _text(plain(a))
+    return a.id, a.kind, a.severity.name.lower(), a.opened, a.closed, a.cause, _text(to_jsonable(a))
 
 
 def _text(value: Any) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 from visup.agent.model.errors import OutputError
 from visup.agent.model.records import Observation
-from visup.agent.storage.codec import unpacked
+from visup.agent.storage.codec import unpack_observation
 from visup.agent.storage.journal import check_version, is_empty, segments
 
 JOURNAL = "journal.sqlite"
@@ -99,7 +99,7 @@ class Recording:
             where = f"{path}, frame {index}"
             if not isinstance(seen, bytes) or zlib.crc32(seen) != crc:
                 raise _damaged(where, "its check sum is wrong")
-            yield unpacked(seen, where)
+            yield unpack_observation(seen, where)
 
     def first_and_last(self) -> tuple[int, int] | None:
         """Numbers of the first and last frame whose steps are kept, or None when there are none."""

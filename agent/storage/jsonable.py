@@ -16,7 +16,7 @@ from visup.agent.model.records import Event, Region
 from visup.agent.model.relation_table import RelationTable
 
 
-def plain(value: Any) -> Any:
+def to_jsonable(value: Any) -> Any:
     """A record as JSON-like values.
 
     Images and masks are left out (they are large, and the video has them); numbers are rounded to
@@ -31,7 +31,7 @@ def plain(value: Any) -> Any:
     if kind is float:
         return _number(value)
     if kind is tuple or kind is list:
-        return [plain(v) for v in value]
+        return [to_jsonable(v) for v in value]
     if isinstance(value, IntEnum):
         return value.name.lower()
     if isinstance(value, Enum):
@@ -43,15 +43,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.integer | np.bool_):
         return value.item()
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        return to_jsonable(value.tolist())
     if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
+        return {str(k): to_jsonable(v) for k, v in value.items()}
     if isinstance(value, frozenset | set):
-        return sorted(plain(v) for v in value)
+        return sorted(to_jsonable(v) for v in value)
     if isinstance(value, tuple | list | RelationTable):
-        return [plain(v) for v in value]
+        return [to_jsonable(v) for v in value]
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: plain(getattr(value, name)) for name in _shown(kind)}
+        return {name: to_jsonable(getattr(value, name)) for name in _shown(kind)}
     return str(value)
 
 
@@ -73,13 +73,13 @@ def _number(x: float) -> float | str:
     return round(x, 6) if isfinite(x) else str(x)
 
 
-def event_line(event: Event) -> dict[str, Any]:
+def event_record(event: Event) -> dict[str, Any]:
     """An event as it stands in `events.jsonl`."""
-    line: dict[str, Any] = plain(event)
+    line: dict[str, Any] = to_jsonable(event)
     return line
 
 
-def object_line(belief: ObjectBelief) -> dict[str, Any]:
+def object_summary(belief: ObjectBelief) -> dict[str, Any]:
     """What is believed about an object, short, as it stands in the journal."""
     region = belief.region
     return {
@@ -88,9 +88,9 @@ def object_line(belief: ObjectBelief) -> dict[str, Any]:
         "confirmed": belief.confirmed,
         "region": region.id,
         "bbox": list(region.bbox),
-        "area": plain(region.area),
-        "velocity": plain(region.velocity),
+        "area": to_jsonable(region.area),
+        "velocity": to_jsonable(region.velocity),
         "cut": region.cut,
-        "candidates": [[c.name, plain(c.share)] for c in belief.candidates],
-        "depth": plain(belief.depth),
+        "candidates": [[c.name, to_jsonable(c.share)] for c in belief.candidates],
+        "depth": to_jsonable(belief.depth),
     }

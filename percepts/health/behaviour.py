@@ -20,7 +20,7 @@ from visup.agent import (
     Observation,
     Percept,
 )
-from visup.agent.storage.checkpoint import held
+from visup.agent.contract.saving import saved_attributes
 from visup.percepts.health.frame_timing import ArrivalMonitor
 from visup.percepts.health.frozen_under_noise import NoiseOnlyDetector
 from visup.percepts.health.image_quality import ImageQuality, measure_quality
@@ -58,14 +58,14 @@ class HealthBehaviour:
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return held(self, "_settings")
+        return saved_attributes(self, "_settings")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a behaviour of the same settings remembered."""
         vars(self).update(state)
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report the health of one frame; one percept of kind 'health'.
 

@@ -36,26 +36,26 @@ class MotionBehaviour:
         self._segmenter.load(state["segmenter"])
         self._back = state["back"]
 
-    def missed(self, seen: Observation) -> None:
+    def missed(self, observation: Observation) -> None:
         """Be told of regions reported since the state that was taken on: their ids are used."""
-        for region in seen.of("region"):
+        for region in observation.of("region"):
             self._segmenter.used(region.id)
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report the regions of one frame.
 
         Args:
             frame: The next frame.
-            seen: What was reported before of this frame; unless its health is OK beyond doubt,
+            observation: What was reported before of this frame; unless its health is OK beyond doubt,
                 nothing moves.
             directives: 'expect_regions', 'look_at' and 'ignore' are obeyed.
 
         Returns:
             Percepts of kind 'region', by id.
         """
-        health = [p for r in seen.reports for p in r.percepts if p.kind == "health"]
+        health = [p for r in observation.reports for p in r.percepts if p.kind == "health"]
         # Tracks live on over frames that are left out, but not over black ones taken for sight.
         if any(p.confidence < 1.0 or p.value.status in HARMED for p in health):
             return []

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from visup.agent import Directive, Frame, Region
-from visup.agent.storage.checkpoint import held
+from visup.agent.contract.saving import saved_attributes
 from visup.percepts.motion.features.motion_constraints import (
     Constraints,
     Points,
@@ -29,7 +29,13 @@ from visup.percepts.motion.features.work_image import Floats, ImageHistory, Work
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 from visup.percepts.motion.layers.background_motion import empty_prevalence, fit_background
-from visup.percepts.motion.layers.dense_labelling import appearance_prior, label_cells
+from visup.percepts.motion.layers.dense_labelling import (
+    Labelling,
+    LabelPrior,
+    PointEvidence,
+    appearance_prior,
+    label_cells,
+)
 from visup.percepts.motion.layers.layer_discovery import affine_rate
 from visup.percepts.motion.output.region_report import (
     apply_ignore,
@@ -39,20 +45,22 @@ from visup.percepts.motion.output.region_report import (
     select_regions,
 )
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.lifecycle import confirm, delete, initiate, update
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
     background_weights,
     claimable_cells,
-    fit_tracks,
     point_likelihoods,
     predicted_positions,
 )
 from visup.percepts.motion.tracks.merge_split import assign_unknown, merge_tracks, split_occluded
-from visup.percepts.motion.tracks.salience import is_stationary, update_salience
+from visup.percepts.motion.tracks.salience import stationary_cells, update_salience
 from visup.percepts.motion.tracks.trace import SegmentationTrace
-from visup.percepts.motion.tracks.track import Tracks, label_priors, predict_tracks
+from visup.percepts.motion.tracks.track import Tracks
+from visup.percepts.motion.tracks.track_fitting import fit_tracks
+from visup.percepts.motion.tracks.track_prediction import label_priors, predict_tracks
 from visup.percepts.motion.tracks.warping import dense_likelihood, flow_back
 
 FARTHEST = 0.02  # share of the image that the camera may move over a baseline
@@ -74,7 +82,7 @@ class MotionSegmenter:
         # Cells and points do not need each other: one core each. What is found is the same.
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
-        self._ids = 0  # never begun anew: a number that was told stays the region's
+        self._ids = IdAllocator()
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -85,26 +93,26 @@ class MotionSegmenter:
         self._cells: Superpixels | None = None
         self._prevalence = empty_prevalence((1, 1))
         self._camera: dict[int, AffineRate] = {}
-        self._fixed_until: float | None = None
+        self._camera_fixed_until: float | None = None
         self._static = StaticCameraSegmenter()
         self._count = self._last_key = 0
 
     @property
     def camera_static(self) -> bool:
-        """Whether the camera is seen to rest, and what moves is told before the picture of that."""
+        """Whether the camera is seen to be static, and what moves is found by background subtraction."""
         return self._static.active
 
     def save(self) -> dict[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return held(self, "settings", "trace", "_beside", "_engine")
+        return saved_attributes(self, "settings", "trace", "_beside", "_engine")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a segmenter of the same settings remembered."""
         vars(self).update(state)
 
     def used(self, region_id: int) -> None:
-        """A region of this id was told before: none is called so anew."""
-        self._ids = max(self._ids, region_id)
+        """A region of this id was reported before: no other is given it."""
+        self._ids.reserve(region_id)
 
     def step(self, frame: Frame, directives: Sequence[Directive] = ()) -> tuple[Region, ...]:
         """Segment one frame.
@@ -121,51 +129,75 @@ class MotionSegmenter:
         image = prepare_image(frame, self.settings.work_size)
         self._history.push(image)
         self._count += 1
-        before = self._cells
-        if before is None:
-            self._cells = superpixels(image, self.settings.cell, self.settings.contrast)
-            self._prevalence = empty_prevalence(image.shape)
+        if self._cells is None:
+            self._begin(image)
             return ()
-        scene, carried, prior = self._look(image, before)
-        cells = self._cells = scene.cells
-        known = fit_tracks(carried, scene)
+        scene, predicted, prior = self._measured_frame(image, self._cells)
+        self._cells = scene.cells
+        tracks, prior = self._initiated(fit_tracks(predicted, scene), scene, prior)
+        evidence, labelling = self._labelled(scene, tracks, prior, directives)
+        keys = tuple(t.key for t in tracks)
+        tracks = self._updated(tracks, scene, evidence, labelling)
+        wanted = looked_at(directives, tracks, scene)
+        tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, wanted)
+        self.trace = SegmentationTrace(scene, tracks, keys, labelling.posterior)
+        regions = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        moving = motion_evidence(scene, labelling.winner, evidence)
+        regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
+        return select_regions(regions, directives)
+
+    def _begin(self, image: WorkImage) -> None:
+        """Take in the first frame of a size: there is nothing to compare it with."""
+        self._cells = superpixels(image, self.settings.cell, self.settings.contrast)
+        self._prevalence = empty_prevalence(image.shape)
+
+    def _initiated(
+        self, known: Tracks, scene: FrameMeasurements, prior: Floats
+    ) -> tuple[Tracks, Floats]:
+        """The tracks with new ones, and the label shares expected of all of them."""
         tracks = initiate(known, scene, self.settings, self._last_key)
+        self._note_keys(tracks)
+        # What was seen before is expected where it was.
+        return tracks, prior if tracks == known else label_priors(tracks, scene.cells)
+
+    def _note_keys(self, tracks: Tracks) -> None:
         self._last_key = max([self._last_key, *(t.key for t in tracks)])
-        if tracks != known:  # what was seen before is expected where it was
-            prior = label_priors(tracks, cells)
+
+    def _labelled(
+        self,
+        scene: FrameMeasurements,
+        tracks: Tracks,
+        prior: Floats,
+        directives: Sequence[Directive],
+    ) -> tuple[PointEvidence, Labelling]:
+        """What points say of the tracks, and the labels of the superpixels that follow (the E step)."""
         near = claimable_cells(scene, tracks, prior)
         old = self._history.back(scene.measured[-1].constraints.lag)
         dense = self._beside.submit(dense_likelihood, scene, tracks, old, near, self.settings.noise)
-        likelihood, has = point_likelihoods(scene, tracks, near, self.settings)
-        likelihood = apply_ignore(directives, scene, likelihood)
-        look = appearance_prior(cells, prior)
-        more = dense.result()
-        stay = np.zeros(cells.count, dtype=bool)
-        for t in tracks:
-            if is_stationary(t, scene):
-                stay |= t.share > 0.5
-        posterior = label_cells(
-            cells, scene.points, likelihood, has, prior, look, more, stay, self.settings
-        )
-        keys = tuple(t.key for t in tracks)
-        winner = posterior.argmax(axis=1)
-        tracks = update(tracks, scene, posterior, winner, likelihood, self.settings)
+        evidence = point_likelihoods(scene, tracks, near, self.settings)
+        evidence = apply_ignore(directives, scene, evidence)
+        by_appearance = appearance_prior(scene.cells, prior)
+        expected = LabelPrior(prior, by_appearance, stationary_cells(tracks, scene))
+        return evidence, label_cells(scene.cells, evidence, dense.result(), expected, self.settings)
+
+    def _updated(
+        self,
+        tracks: Tracks,
+        scene: FrameMeasurements,
+        evidence: PointEvidence,
+        labelling: Labelling,
+    ) -> Tracks:
+        """The tracks after the labels of a frame; parts merged, occluded ones split, lost ones deleted."""
+        winner = labelling.winner
+        tracks = update(tracks, scene, labelling, evidence.likelihood, self.settings)
         tracks = update_salience(tracks, scene, winner)
-        evidence = motion_evidence(scene, winner, likelihood, has)
         tracks = assign_unknown(tracks, scene, winner, self.settings, self._last_key)
-        self._last_key = max([self._last_key, *(t.key for t in tracks)])
+        self._note_keys(tracks)
         tracks = split_occluded(tracks, scene, winner)
         tracks = merge_tracks(tracks, scene, winner, self.settings)
-        tracks = delete(tracks, scene, self.settings)
-        wanted = looked_at(directives, tracks, scene)
-        tracks, self._ids = confirm(tracks, scene, self._ids, self.settings, wanted)
-        self._tracks = tracks
-        self.trace = SegmentationTrace(scene, tracks, keys, posterior)
-        seen = report_regions(tracks, scene, self._size, self.settings, self._beside)
-        seen, self._ids = self._static.step(frame, scene, seen, self._ids, self.settings, evidence)
-        return select_regions(seen, directives)
+        return delete(tracks, scene, self.settings)
 
-    def _look(
+    def _measured_frame(
         self, image: WorkImage, before: Superpixels
     ) -> tuple[FrameMeasurements, Tracks, Floats]:
         """Measure motion, and carry the tracks to the newest image, with where they are expected."""
@@ -176,13 +208,13 @@ class MotionSegmenter:
         flow = flow_back(image.grey, old.grey, self._engine)
         carried = self._beside.submit(self._carried, flow, before, coming, seconds)
         points = found.result()
-        first = self._follow(points, flow, old, image)
+        first = self._track_one_frame(points, flow, old, image)
         cells, tracks, prior = carried.result()
         owner = prior.argmax(axis=1)
         scene = FrameMeasurements(image, points, cells, owner, seconds, ())
-        later = [self._later(scene, tracks, lag) for lag in self._turn(image)]
-        measured = [self._measure(scene, first)]
-        measured += [self._measure(scene, c.result()) for c in later]
+        later = [self._begin_tracking(scene, tracks, lag) for lag in self._long_lags(image)]
+        measured = [self._baseline(scene, first)]
+        measured += [self._baseline(scene, c.result()) for c in later]
         return (
             FrameMeasurements(image, points, cells, owner, seconds, tuple(measured)),
             tracks,
@@ -197,7 +229,7 @@ class MotionSegmenter:
         tracks = predict_tracks(self._tracks, flow, before, cells, seconds)
         return cells, tracks, label_priors(tracks, cells)
 
-    def _turn(self, image: WorkImage) -> list[int]:
+    def _long_lags(self, image: WorkImage) -> list[int]:
         """The longer baseline whose turn it is: they are measured one in each frame.
 
         Long ones are for slow things. When the camera has turned far away since, there is little to
@@ -207,17 +239,17 @@ class MotionSegmenter:
         lags = [
             lag
             for lag in self._history.lags(self.settings.lags_s)
-            if lag > 1 and self._turned(image, lag) < far
+            if lag > 1 and self._camera_shift(image, lag) < far
         ]
         return [lags[self._count % len(lags)]] if lags else []
 
-    def _turned(self, image: WorkImage, lag: int) -> float:
+    def _camera_shift(self, image: WorkImage, lag: int) -> float:
         """How far the camera is predicted to have moved the middle of the image, pixels."""
         camera = self._predicted(image.time, image.time - self._history.back(lag).time)
         middle = np.asarray([image.shape[::-1]], dtype=np.float32) / np.float32(2)
         return float(np.hypot(*camera.at(middle)[0]))
 
-    def _follow(
+    def _track_one_frame(
         self, points: Points, flow: Floats, old: WorkImage, image: WorkImage
     ) -> Constraints:
         """Constraints over one frame, from where dense flow expects the points."""
@@ -225,7 +257,9 @@ class MotionSegmenter:
         c = track_points(points, points.xy + flow[y, x], old, image, 1, self.settings.noise)
         return add_flow_constraints(c, points, flow, old, image, self.settings.noise)
 
-    def _later(self, scene: FrameMeasurements, tracks: Tracks, lag: int) -> Future[Constraints]:
+    def _begin_tracking(
+        self, scene: FrameMeasurements, tracks: Tracks, lag: int
+    ) -> Future[Constraints]:
         """Begin to look for the points over a longer baseline, where known motions expect them."""
         old = self._history.back(lag)
         span = scene.time - old.time
@@ -233,19 +267,19 @@ class MotionSegmenter:
         noise = self.settings.noise
         return self._beside.submit(track_points, scene.points, guess, old, scene.image, lag, noise)
 
-    def _measure(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
+    def _baseline(self, scene: FrameMeasurements, c: Constraints) -> BaselineMotion:
         """The background that constraints over one baseline show."""
         image, lag = scene.image, c.lag
         camera = self._predicted(image.time, c.span_s)
         # Until a baseline is long enough to tell, what is still in the image may be background.
-        still_too = self._fixed_until is None or image.time < self._fixed_until
+        still_too = self._camera_fixed_until is None or image.time < self._camera_fixed_until
         clear = background_weights(scene)[c.index]
         bg = fit_background(c, clear, image.shape, camera, still_too, self._prevalence, lag)
         self._prevalence = bg.prevalence
         if bg.fixed is not None:
-            until = self._fixed_until or 0.0
+            until = self._camera_fixed_until or 0.0
             hold = image.time + 2 * max(self.settings.lags_s)
-            self._fixed_until = max(until, hold) if bg.fixed else until
+            self._camera_fixed_until = max(until, hold) if bg.fixed else until
         if bg.sure:
             self._camera[lag] = affine_rate(bg.models[-1], c, image.time)
         return BaselineMotion(c, bg)

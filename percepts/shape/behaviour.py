@@ -94,20 +94,20 @@ class ShapeBehaviour:
         self._remembered = dict(state["remembered"])
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Hypotheses for all regions of a frame, the best of each region first.
 
         Args:
             frame: The frame; its time and its size are used.
-            seen: Holds the regions.
+            observation: Holds the regions.
             directives: 'restrict' (data: names) lets only these models be considered; 'try_first'
                 (data: names) has these compared whatever the index says; 'rest' (data: behaviour,
                 region, every_s) has a region matched no more often than that.
         """
         if self.database is None:
             return []
-        regions: tuple[Region, ...] = seen.of("region")
+        regions: tuple[Region, ...] = observation.of("region")
         restrict, first = _name_directives(directives)
         here = {r.id for r in regions}
         self._remembered = {k: v for k, v in self._remembered.items() if k in here}

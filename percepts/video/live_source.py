@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from visup.agent import Concern, Frame, Severity
+from visup.agent import AlertCondition, Frame, Severity
 from visup.agent.model.errors import SourceError
 from visup.percepts.video.capture import Capture, frame_rate, take
 from visup.percepts.video.source import Ending, VideoSource
@@ -88,11 +88,13 @@ class LiveSource(VideoSource):
             return None
         return frame
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """Once after it came back: how long nothing was delivered."""
         while self._came_back:
             said = self._came_back.popleft()
-            yield Concern("source_dropped", (), Severity.WARNING, said, key=self.name, needs=())
+            yield AlertCondition(
+                "source_dropped", (), Severity.WARNING, said, key=self.name, needs=()
+            )
 
     def _grab(self) -> bool:
         return self._capture.grab() or (self._received > 0 and self._back_again())

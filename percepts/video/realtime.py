@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 
-from visup.agent import Concern, Frame, Severity
+from visup.agent import AlertCondition, Frame, Severity
 from visup.percepts.video.source import VideoSource
 
 NAME = "frames_dropped"
@@ -60,7 +60,7 @@ class RealTimeFrames(Iterator[Frame], ABC):
             self._recent.popleft()
         return frame
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """That frames are dropped, while more than a tenth of those of late were."""
         lost = sum(missed for _, missed in self._recent)
         if lost < SHARE * (lost + len(self._recent)):
@@ -72,7 +72,7 @@ class RealTimeFrames(Iterator[Frame], ABC):
             f"{lost + len(times)} were dropped; for up to {longest:.1f} s nobody looked."
         )
         severity = Severity.WARNING if longest >= LONG_S else Severity.INFO
-        yield Concern(NAME, (), severity, text, key=self.name, needs=())
+        yield AlertCondition(NAME, (), severity, text, key=self.name, needs=())
 
     def note(self) -> str | None:
         """One sentence for the end of a run; None when nothing was dropped."""

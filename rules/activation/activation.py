@@ -13,13 +13,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Concern, Contract, Directive, Mind, Observation, Outcome, Severity
+from visup.agent import AlertCondition, Contract, Directive, Mind, Observation, Outcome, Severity
 from visup.agent.model.errors import BehaviourError, VisupError
 from visup.agent.model.records import WAKE
 from visup.rules.formula.nodes import Rule, calls
 from visup.rules.language.parser import parse_rules
-from visup.rules.predicates.inputs_missing import inputs
-from visup.rules.safety.reasoner import SAFETY, Kept, RuleReasoner
+from visup.rules.predicates.inputs_missing import percepts_read
+from visup.rules.safety.reasoner import SAFETY, RuleMemory, RuleReasoner
 
 ACTIVATION = "rules.waking"
 _PREFIX = "awake_"
@@ -63,7 +63,7 @@ def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> froze
         if rule.severity > Severity.INFO
         for formula in rule.formulas
         for call in calls(formula)
-        for kind in inputs(call.name)
+        for kind in percepts_read(call.name)
     }
     always = {kind for c in contracts if not c.awake for kind in c.gives}
     return frozenset(c.name for c in contracts if c.awake and set(c.gives) & (read - always))
@@ -86,13 +86,13 @@ class ActivationReasoner:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         # What these rules remember stands, while they look, where rules look for it.
-        own = mind.remember(SAFETY, mind.memory.get(ACTIVATION, Kept()))
+        own = mind.remember(SAFETY, mind.memory.get(ACTIVATION, RuleMemory()))
         asked = self._reasoner(own, observation)
         mind = mind.remember(ACTIVATION, asked.mind.memory[SAFETY])
-        return Outcome(mind, directives=tuple(_directives(mind, asked.concerns)))
+        return Outcome(mind, directives=tuple(_directives(mind, asked.conditions)))
 
 
-def _directives(mind: Mind, concerns: Sequence[Concern]) -> Iterator[Directive]:
+def _directives(mind: Mind, concerns: Sequence[AlertCondition]) -> Iterator[Directive]:
     for concern in concerns:
         (number,) = concern.objects
         region = mind.objects[number].region.id

@@ -34,7 +34,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
+from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
     begin_relative_track,
@@ -52,7 +52,7 @@ COUPLING = "rules.coupling"
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
 
-COLUMNS = Columns((Column(("", "coupled"), (0, 0), 0),))
+COLUMNS = ColumnLayout((Column(("", "coupled"), (0, 0), 0),))
 
 YES, MAYBE, NO = 1, 0, -1
 """Codes of truths."""
@@ -158,7 +158,7 @@ class CouplingReasoner:
                 p = NO_EVIDENCE
             kept[pair] = p
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_cells(_coupled_cells(sights, coupled, mind))
+        table = table.with_block(_coupled_cells(sights, coupled, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
@@ -261,7 +261,7 @@ def _table(mind: Mind) -> RelationTable:
 
 def _coupled_cells(
     sights: Sequence[PairObservation], coupled: Mapping[Pair, Coupling], mind: Mind
-) -> Cells:
+) -> RelationBlock:
     """The relation of being coupled."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
     state, since = [0] * len(sights), [mind.time] * len(sights)
@@ -271,7 +271,7 @@ def _coupled_cells(
         elif sight.touching == MAYBE or (hidden and not hidden.isdisjoint(sight.pair)):
             state[k] = UNKNOWN_CODE
     sure = np.full((1, len(sights)), CONFIDENCE)
-    return Cells(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
+    return RelationBlock(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
 
 
 def _regions(sight: PairObservation, mind: Mind) -> tuple[Region, Region] | None:

@@ -7,14 +7,21 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from visup.agent import Severity
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import Number, Span, Unit
 
 ZERO = Number(0.0, Unit.S)
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class TimeWindow:
     """`[2 s .. 5 s]`: a stretch of time, counted from now into the past or into the future."""
 
     low: Number
@@ -82,7 +89,7 @@ class Or:
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class PastOperator:
     """`always f`, `once f`: so far; `f for 2 s`, `f within 2 s`: in a window that ends now.
 
     Attributes:
@@ -93,7 +100,7 @@ class Past:
 
     kind: str
     part: Formula
-    window: Window | None = None
+    window: TimeWindow | None = None
 
     def __str__(self) -> str:
         if self.window is None:
@@ -105,12 +112,12 @@ class Past:
 
 
 @dataclass(frozen=True, slots=True)
-class Future:
+class FutureOperator:
     """`eventually[5 s] f`, `henceforth[5 s] f`: in a window that begins now; told when it is over."""
 
     kind: str
     part: Formula
-    window: Window | None
+    window: TimeWindow | None
     span: Span = field(default=Span(), compare=False, repr=False)
 
     def __str__(self) -> str:
@@ -123,7 +130,7 @@ class Since:
 
     left: Formula
     right: Formula
-    window: Window | None = None
+    window: TimeWindow | None = None
 
     def __str__(self) -> str:
         left, right = (_wrapped(p, *_LOOSER) for p in (self.left, self.right))
@@ -136,7 +143,7 @@ class Until:
 
     left: Formula
     right: Formula
-    window: Window | None
+    window: TimeWindow | None
     span: Span = field(default=Span(), compare=False, repr=False)
 
     def __str__(self) -> str:
@@ -145,7 +152,7 @@ class Until:
 
 
 @dataclass(frozen=True, slots=True)
-class Often:
+class MOfN:
     """`f in 60 % of 2 s`: in at least that share of the time; `f in 3 of 5 samples`: in as many."""
 
     part: Formula
@@ -203,11 +210,11 @@ Formula = (
     | Not
     | And
     | Or
-    | Past
-    | Future
+    | PastOperator
+    | FutureOperator
     | Since
     | Until
-    | Often
+    | MOfN
     | Last
     | Quantified
 )
@@ -263,11 +270,16 @@ class Rule:
 def children(node: Node) -> tuple[Node, ...]:
     """The nodes that a node is made of directly; numbers of windows and durations left out."""
     match node:
-        case And(parts=parts) | Or(parts=parts) | Combined(parts=parts):
+        case And(parts=parts) | Or(parts=parts) | PointwiseFunction(parts=parts):
             return parts
-        case Not(part=part) | Past(part=part) | Future(part=part) | Often(part=part):
+        case Not(part=part) | PastOperator(part=part) | FutureOperator(part=part) | MOfN(part=part):
             return (part,)
-        case Last(part=part) | Quantified(part=part) | Negative(part=part) | OverTime(part=part):
+        case (
+            Last(part=part)
+            | Quantified(part=part)
+            | Negative(part=part)
+            | WindowFunction(part=part)
+        ):
             return (part,)
         case Since(left=left, right=right) | Until(left=left, right=right):
             return (left, right)
@@ -289,29 +301,29 @@ def calls(node: Node | None) -> tuple[Predicate | Measure, ...]:
     return tuple(n for n in walk(node) if isinstance(n, Predicate | Measure))
 
 
-def named(node: Node, names: Mapping[str, str]) -> Node:
+def substituted(node: Node, names: Mapping[str, str]) -> Node:
     """The same tree with variables replaced by the names of objects."""
     if isinstance(node, Predicate | Measure):
         return replace(node, words=tuple(names.get(w, w) for w in node.words))
     if isinstance(node, Number):
         return node
     changes: dict[str, Any] = {}
-    if isinstance(node, And | Or | Combined):
-        changes["parts"] = tuple(named(p, names) for p in node.parts)
+    if isinstance(node, And | Or | PointwiseFunction):
+        changes["parts"] = tuple(substituted(p, names) for p in node.parts)
     elif isinstance(node, Since | Until | Comparison | Arithmetic):
-        changes = {"left": named(node.left, names), "right": named(node.right, names)}
+        changes = {"left": substituted(node.left, names), "right": substituted(node.right, names)}
     else:
-        changes["part"] = named(node.part, names)
+        changes["part"] = substituted(node.part, names)
     return replace(node, **changes)
 
 
-def mark(variable: str) -> str:
+def placeholder(variable: str) -> str:
     """What stands for a variable in a text until it is known which object it is."""
     return f"\0{variable}\0"
 
 
 _LOOSER = (And, Or, Since, Until)
-_PREFIXED = (Not, Quantified, Future, Past)
+_PREFIXED = (Not, Quantified, FutureOperator, PastOperator)
 
 
 def _wrapped(formula: Formula, *loose: type) -> str:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from visup.rules.formula.units import Number, Span
 
-SPLIT = ("abs", "min", "max")
+POINTWISE = ("abs", "min", "max")
 """Functions of quantities of one moment."""
-OVER_TIME = ("rate", "before", "lowest", "highest", "last")
+OVER_WINDOW = ("rate", "before", "lowest", "highest", "last")
 """Functions of a quantity and of a time span."""
 
 
@@ -50,8 +50,8 @@ class Negative:
 
 
 @dataclass(frozen=True, slots=True)
-class Combined:
-    """`min(gap(a, b), gap(a, c))`: one of `SPLIT` of quantities of one dimension."""
+class PointwiseFunction:
+    """`min(gap(a, b), gap(a, c))`: one of `POINTWISE` of quantities of one dimension."""
 
     name: str
     parts: tuple[Term, ...]
@@ -62,8 +62,8 @@ class Combined:
 
 
 @dataclass(frozen=True, slots=True)
-class OverTime:
-    """`rate(gap(a, b), 2 s)`: one of `OVER_TIME` of a quantity."""
+class WindowFunction:
+    """`rate(gap(a, b), 2 s)`: one of `OVER_WINDOW` of a quantity."""
 
     name: str
     part: Term
@@ -74,7 +74,7 @@ class OverTime:
         return f"{self.name}({self.part}, {self.duration})"
 
 
-Term = Number | Measure | Arithmetic | Negative | Combined | OverTime
+Term = Number | Measure | Arithmetic | Negative | PointwiseFunction | WindowFunction
 
 
 def _wrapped(term: Term, loose: str | tuple[str, ...]) -> str:

@@ -42,7 +42,7 @@ class Dimension:
         )
 
     def __str__(self) -> str:
-        return NAMES.get(self) or " ".join(
+        return DIMENSION_NAMES.get(self) or " ".join(
             f"{unit}^{power}"
             for unit, power in (("px", self.length), ("s", self.time), ("deg", self.angle))
             if power
@@ -54,19 +54,19 @@ LENGTH = Dimension(length=1)
 TIME = Dimension(time=1)
 ANGLE = Dimension(angle=1)
 SPEED = LENGTH / TIME
-TURNING = ANGLE / TIME
+ANGULAR_SPEED = ANGLE / TIME
 ACCELERATION = SPEED / TIME
-CHANGE = SHARE / TIME
+RATE_OF_CHANGE = SHARE / TIME
 
-NAMES = {
+DIMENSION_NAMES = {
     SHARE: "share",
     LENGTH: "length",
     TIME: "time",
     ANGLE: "angle",
     SPEED: "speed",
-    TURNING: "rate of turn",
+    ANGULAR_SPEED: "rate of turn",
     ACCELERATION: "acceleration",
-    CHANGE: "rate of change",
+    RATE_OF_CHANGE: "rate of change",
 }
 """Dimensions that have a name, for messages and docs."""
 
@@ -87,7 +87,7 @@ class Unit(StrEnum):
     PER_S = "/s"
 
 
-DIMENSION = {
+UNITS = {
     Unit.NONE: (SHARE, 1.0),
     Unit.S: (TIME, 1.0),
     Unit.MS: (TIME, 0.001),
@@ -97,8 +97,8 @@ DIMENSION = {
     Unit.PX_S2: (ACCELERATION, 1.0),
     Unit.PERCENT: (SHARE, 0.01),
     Unit.DEG: (ANGLE, 1.0),
-    Unit.DEG_S: (TURNING, 1.0),
-    Unit.PER_S: (CHANGE, 1.0),
+    Unit.DEG_S: (ANGULAR_SPEED, 1.0),
+    Unit.PER_S: (RATE_OF_CHANGE, 1.0),
 }
 """Unit -> what it measures, and how many of the base unit it is."""
 
@@ -113,7 +113,7 @@ def ticks(seconds: float) -> int:
 
 def units_of(dimension: Dimension) -> str:
     """The units in which a dimension is written, for messages: 'a speed: px/s'."""
-    units = [str(u) or "no unit" for u, (d, _) in DIMENSION.items() if d == dimension]
+    units = [str(u) or "no unit" for u, (d, _) in UNITS.items() if d == dimension]
     return f"a {dimension}: {', '.join(units)}" if units else f"a quantity in {dimension}"
 
 
@@ -128,12 +128,12 @@ class Number:
     @property
     def base(self) -> float:
         """The number in the base unit of its dimension: seconds, pixels, share of one."""
-        return self.value * DIMENSION[self.unit][1]
+        return self.value * UNITS[self.unit][1]
 
     @property
     def dimension(self) -> Dimension:
         """What it measures."""
-        return DIMENSION[self.unit][0]
+        return UNITS[self.unit][0]
 
     def __str__(self) -> str:
         digits = f"{self.value:.10f}".rstrip("0").rstrip(".")

@@ -9,7 +9,8 @@ rule near(a, b): warning
     hold 3 s
     say "{a} {is} near {b}."
 
-Comparisons give a `Claim`; claims join with `&`, `|`, `~`. Amounts add, subtract, multiply and divide.
+Comparisons give a `FormulaBuilder`, which joins with `&`, `|`, `~`; a `TermBuilder` adds, subtracts,
+multiplies and divides.
 """
 
 from __future__ import annotations
@@ -22,155 +23,166 @@ from visup.rules.formula.nodes import (
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Not,
-    Often,
     Or,
-    Past,
+    PastOperator,
     Predicate,
     Quantified,
     Rule,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import Number, Unit
 from visup.rules.language.parser import raise_all
-from visup.rules.language.typecheck import Checker
+from visup.rules.language.typecheck import TypeChecker
 
 
 @dataclass(frozen=True, eq=False)
-class Amount:
+class TermBuilder:
     """A quantity that Python's operators work on; `node` is its tree."""
 
     node: Term
 
-    def __add__(self, other: Amount) -> Amount:
-        return Amount(Arithmetic(self.node, "+", other.node))
+    def __add__(self, other: TermBuilder) -> TermBuilder:
+        return TermBuilder(Arithmetic(self.node, "+", other.node))
 
-    def __sub__(self, other: Amount) -> Amount:
-        return Amount(Arithmetic(self.node, "-", other.node))
+    def __sub__(self, other: TermBuilder) -> TermBuilder:
+        return TermBuilder(Arithmetic(self.node, "-", other.node))
 
-    def __mul__(self, other: Amount) -> Amount:
-        return Amount(Arithmetic(self.node, "*", other.node))
+    def __mul__(self, other: TermBuilder) -> TermBuilder:
+        return TermBuilder(Arithmetic(self.node, "*", other.node))
 
-    def __truediv__(self, other: Amount) -> Amount:
-        return Amount(Arithmetic(self.node, "/", other.node))
+    def __truediv__(self, other: TermBuilder) -> TermBuilder:
+        return TermBuilder(Arithmetic(self.node, "/", other.node))
 
-    def __neg__(self) -> Amount:
+    def __neg__(self) -> TermBuilder:
         if isinstance(self.node, Number):
-            return Amount(Number(-self.node.value, self.node.unit))
-        return Amount(Negative(self.node))
+            return TermBuilder(Number(-self.node.value, self.node.unit))
+        return TermBuilder(Negative(self.node))
 
-    def __abs__(self) -> Amount:
-        return Amount(Combined("abs", (self.node,)))
+    def __abs__(self) -> TermBuilder:
+        return TermBuilder(PointwiseFunction("abs", (self.node,)))
 
-    def __lt__(self, other: Amount) -> Claim:
-        return Claim(Comparison(self.node, "<", other.node))
+    def __lt__(self, other: TermBuilder) -> FormulaBuilder:
+        return FormulaBuilder(Comparison(self.node, "<", other.node))
 
-    def __le__(self, other: Amount) -> Claim:
-        return Claim(Comparison(self.node, "<=", other.node))
+    def __le__(self, other: TermBuilder) -> FormulaBuilder:
+        return FormulaBuilder(Comparison(self.node, "<=", other.node))
 
-    def __gt__(self, other: Amount) -> Claim:
-        return Claim(Comparison(self.node, ">", other.node))
+    def __gt__(self, other: TermBuilder) -> FormulaBuilder:
+        return FormulaBuilder(Comparison(self.node, ">", other.node))
 
-    def __ge__(self, other: Amount) -> Claim:
-        return Claim(Comparison(self.node, ">=", other.node))
+    def __ge__(self, other: TermBuilder) -> FormulaBuilder:
+        return FormulaBuilder(Comparison(self.node, ">=", other.node))
 
-    def over(self, function: str, span: Amount) -> Amount:
+    def over(self, function: str, span: TermBuilder) -> TermBuilder:
         """`rate`, `before`, `lowest`, `highest` or `last` over a time: `speed.over("rate", s(2))`."""
-        return Amount(OverTime(function, self.node, _number(span)))
+        return TermBuilder(WindowFunction(function, self.node, _number(span)))
 
 
 @dataclass(frozen=True, eq=False)
-class Claim:
+class FormulaBuilder:
     """A formula that Python's operators work on; `node` is its tree."""
 
     node: Formula
 
-    def __and__(self, other: Claim) -> Claim:
+    def __and__(self, other: FormulaBuilder) -> FormulaBuilder:
         parts = self.node.parts if isinstance(self.node, And) else (self.node,)
-        return Claim(And((*parts, other.node)))
+        return FormulaBuilder(And((*parts, other.node)))
 
-    def __or__(self, other: Claim) -> Claim:
+    def __or__(self, other: FormulaBuilder) -> FormulaBuilder:
         parts = self.node.parts if isinstance(self.node, Or) else (self.node,)
-        return Claim(Or((*parts, other.node)))
+        return FormulaBuilder(Or((*parts, other.node)))
 
-    def __invert__(self) -> Claim:
-        return Claim(Not(self.node))
+    def __invert__(self) -> FormulaBuilder:
+        return FormulaBuilder(Not(self.node))
 
-    def lasting(self, span: Amount, to: Amount | None = None) -> Claim:
+    def lasting(self, span: TermBuilder, to: TermBuilder | None = None) -> FormulaBuilder:
         """`f for 2 s`; with `to`, `f for 2 s to 5 s ago`."""
-        return Claim(Past("always", self.node, _window(span, to)))
+        return FormulaBuilder(PastOperator("always", self.node, _window(span, to)))
 
-    def within(self, span: Amount, to: Amount | None = None) -> Claim:
+    def within(self, span: TermBuilder, to: TermBuilder | None = None) -> FormulaBuilder:
         """`f within 2 s`; with `to`, `f within 2 s to 5 s ago`."""
-        return Claim(Past("once", self.node, _window(span, to)))
+        return FormulaBuilder(PastOperator("once", self.node, _window(span, to)))
 
-    def leaving(self, bound: Amount) -> Claim:
+    def leaving(self, bound: TermBuilder) -> FormulaBuilder:
         """A comparison that, once true, ends only at another bound: `... leave 3 px/s`."""
         assert isinstance(self.node, Comparison), "only a comparison has a bound to leave"
         c = self.node
-        return Claim(Comparison(c.left, c.operator, c.right, _number(bound)))
+        return FormulaBuilder(Comparison(c.left, c.operator, c.right, _number(bound)))
 
-    def since(self, other: Claim, span: Amount | None = None) -> Claim:
+    def since(self, other: FormulaBuilder, span: TermBuilder | None = None) -> FormulaBuilder:
         """`f since g`, `f since[2 s] g`."""
         window = None if span is None else _window(span, None)
-        return Claim(Since(self.node, other.node, window))
+        return FormulaBuilder(Since(self.node, other.node, window))
 
-    def until(self, other: Claim, span: Amount) -> Claim:
+    def until(self, other: FormulaBuilder, span: TermBuilder) -> FormulaBuilder:
         """`f until[2 s] g`."""
-        return Claim(Until(self.node, other.node, _window(span, None)))
+        return FormulaBuilder(Until(self.node, other.node, _window(span, None)))
 
-    def often(self, least: Amount, of: Amount) -> Claim:
+    def often(self, least: TermBuilder, of: TermBuilder) -> FormulaBuilder:
         """`f in 60 % of 2 s` by `often(percent(60), s(2))`, `f in 3 of 5 samples` by numbers."""
-        return Claim(Often(self.node, _number(least), _number(of)))
+        return FormulaBuilder(MOfN(self.node, _number(least), _number(of)))
 
-    def last(self, span: Amount) -> Claim:
+    def last(self, span: TermBuilder) -> FormulaBuilder:
         """`last(f, 0.5 s)`."""
-        return Claim(Last(self.node, _number(span)))
+        return FormulaBuilder(Last(self.node, _number(span)))
 
 
-def once(claim: Claim) -> Claim:
+def once(claim: FormulaBuilder) -> FormulaBuilder:
     """`once f`."""
-    return Claim(Past("once", claim.node))
+    return FormulaBuilder(PastOperator("once", claim.node))
 
 
-def always(claim: Claim) -> Claim:
+def always(claim: FormulaBuilder) -> FormulaBuilder:
     """`always f`."""
-    return Claim(Past("always", claim.node))
+    return FormulaBuilder(PastOperator("always", claim.node))
 
 
-def eventually(claim: Claim, span: Amount, to: Amount | None = None) -> Claim:
+def eventually(
+    claim: FormulaBuilder, span: TermBuilder, to: TermBuilder | None = None
+) -> FormulaBuilder:
     """`eventually[2 s] f`; with `to`, `eventually[2 s .. 5 s] f`."""
-    return Claim(Future("eventually", claim.node, _window(span, to)))
+    return FormulaBuilder(FutureOperator("eventually", claim.node, _window(span, to)))
 
 
-def henceforth(claim: Claim, span: Amount, to: Amount | None = None) -> Claim:
+def henceforth(
+    claim: FormulaBuilder, span: TermBuilder, to: TermBuilder | None = None
+) -> FormulaBuilder:
     """`henceforth[2 s] f`; with `to`, `henceforth[2 s .. 5 s] f`."""
-    return Claim(Future("henceforth", claim.node, _window(span, to)))
+    return FormulaBuilder(FutureOperator("henceforth", claim.node, _window(span, to)))
 
 
-def exists(variable: str, claim: Claim, may_repeat: bool = False) -> Claim:
+def exists(variable: str, claim: FormulaBuilder, may_repeat: bool = False) -> FormulaBuilder:
     """`exists b: f`."""
-    return Claim(Quantified("exists", variable, claim.node, may_repeat))
+    return FormulaBuilder(Quantified("exists", variable, claim.node, may_repeat))
 
 
-def forall(variable: str, claim: Claim, may_repeat: bool = False) -> Claim:
+def forall(variable: str, claim: FormulaBuilder, may_repeat: bool = False) -> FormulaBuilder:
     """`forall b: f`."""
-    return Claim(Quantified("forall", variable, claim.node, may_repeat))
+    return FormulaBuilder(Quantified("forall", variable, claim.node, may_repeat))
 
 
-def least(*amounts: Amount) -> Amount:
+def least(*amounts: TermBuilder) -> TermBuilder:
     """`min(...)`."""
-    return Amount(Combined("min", tuple(a.node for a in amounts)))
+    return TermBuilder(PointwiseFunction("min", tuple(a.node for a in amounts)))
 
 
-def greatest(*amounts: Amount) -> Amount:
+def greatest(*amounts: TermBuilder) -> TermBuilder:
     """`max(...)`."""
-    return Amount(Combined("max", tuple(a.node for a in amounts)))
+    return TermBuilder(PointwiseFunction("max", tuple(a.node for a in amounts)))
 
 
 class _Facts:
@@ -191,47 +203,47 @@ class _Quantities:
 class _Fact:
     name: str
 
-    def __call__(self, *words: str) -> Claim:
-        return Claim(Predicate(self.name, words))
+    def __call__(self, *words: str) -> FormulaBuilder:
+        return FormulaBuilder(Predicate(self.name, words))
 
 
 @dataclass(frozen=True)
 class _Quantity:
     name: str
 
-    def __call__(self, *words: str) -> Amount:
-        return Amount(Measure(self.name, words))
+    def __call__(self, *words: str) -> TermBuilder:
+        return TermBuilder(Measure(self.name, words))
 
 
 fact, quantity = _Facts(), _Quantities()
 
 
-def number(value: float, unit: Unit = Unit.NONE) -> Amount:
+def number(value: float, unit: Unit = Unit.NONE) -> TermBuilder:
     """A number with any unit."""
-    return Amount(Number(float(value), unit))
+    return TermBuilder(Number(float(value), unit))
 
 
-def s(value: float) -> Amount:
+def s(value: float) -> TermBuilder:
     """Seconds."""
     return number(value, Unit.S)
 
 
-def px(value: float) -> Amount:
+def px(value: float) -> TermBuilder:
     """Pixels."""
     return number(value, Unit.PX)
 
 
-def px_s(value: float) -> Amount:
+def px_s(value: float) -> TermBuilder:
     """Pixels per second."""
     return number(value, Unit.PX_S)
 
 
-def percent(value: float) -> Amount:
+def percent(value: float) -> TermBuilder:
     """Hundredths."""
     return number(value, Unit.PERCENT)
 
 
-def deg_s(value: float) -> Amount:
+def deg_s(value: float) -> TermBuilder:
     """Degrees per second."""
     return number(value, Unit.DEG_S)
 
@@ -240,12 +252,12 @@ def rule(
     name: str,
     variables: str,
     severity: str,
-    when: Claim,
+    when: FormulaBuilder,
     say: str,
     *,
-    unless: Claim | None = None,
-    hold: Amount | None = None,
-    cooldown: Amount | None = None,
+    unless: FormulaBuilder | None = None,
+    hold: TermBuilder | None = None,
+    cooldown: TermBuilder | None = None,
     may_repeat: str = "",
 ) -> Rule:
     """A rule, checked as those of files are.
@@ -279,14 +291,14 @@ def rule(
         None if cooldown is None else _number(cooldown),
         tuple(may_repeat.split()),
     )
-    raise_all(list(Checker(str(made), f"<rule {name}>").rule(made)))
+    raise_all(list(TypeChecker(str(made), f"<rule {name}>").rule(made)))
     return made
 
 
-def _number(amount: Amount) -> Number:
+def _number(amount: TermBuilder) -> Number:
     assert isinstance(amount.node, Number), "a plain number is wanted here"
     return amount.node
 
 
-def _window(span: Amount, to: Amount | None) -> Window:
-    return Window(ZERO, _number(span)) if to is None else Window(_number(span), _number(to))
+def _window(span: TermBuilder, to: TermBuilder | None) -> TimeWindow:
+    return TimeWindow(ZERO, _number(span)) if to is None else TimeWindow(_number(span), _number(to))

@@ -8,15 +8,15 @@ from visup.rules.formula.nodes import Node, Quantified, Rule, children
 from visup.rules.formula.units import TICKS
 from visup.rules.monitoring.compiler import Compiler
 
-MOST_KEPT = 100_000
+MAX_STATE = 100_000
 """Most intervals that a rule may keep for one choice of objects: 8 minutes of a quantity."""
-MOST_VARIABLES = 3
+MAX_VARIABLES = 3
 """Most objects that a rule may look at together; of 64 there are 250,000 choices of three."""
 INTERVAL_BYTES = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class RuleCost:
     """What a rule costs.
 
     Attributes:
@@ -33,7 +33,7 @@ class Bounds:
         return self.kept * INTERVAL_BYTES
 
 
-def bounds_of(rule: Rule) -> Bounds:
+def cost_of(rule: Rule) -> RuleCost:
     """The bounds of a rule whose windows are all bounded.
 
     Args:
@@ -45,7 +45,7 @@ def bounds_of(rule: Rule) -> Bounds:
     compiler = Compiler()
     latest = compiler.rule(rule)[0].delay
     kept = sum(operator.kept for operator in compiler.program.operators())
-    return Bounds(kept, latest / TICKS)
+    return RuleCost(kept, latest / TICKS)
 
 
 def variables_of(rule: Rule) -> int:

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from visup.rules.formula.nodes import Comparison
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import SHARE, TIME, Dimension, Number, Span, units_of
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.vocabulary import Vocabulary
 
 
-def dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault]:
+def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault]:
     """The faults of units of a comparison.
 
     Args:
@@ -58,7 +65,7 @@ def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimens
             return None if known is None else known.dimension
         case Negative(part=part):
             return _measured(part, vocabulary, faults)
-        case OverTime(name=name, part=part):
+        case WindowFunction(name=name, part=part):
             inner = _measured(part, vocabulary, faults)
             return inner / TIME if inner and name == "rate" else inner
         case Arithmetic(left=one, operator="*" | "/" as operator, right=other):
@@ -69,7 +76,7 @@ def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimens
         case Arithmetic(left=one, operator=operator, right=other):
             word = "added to" if operator == "+" else "subtracted from"
             return _alike((one, other), word, term.span, vocabulary, faults)
-        case Combined(name=name, parts=parts):
+        case PointwiseFunction(name=name, parts=parts):
             if not parts or (name == "abs") != (len(parts) == 1):
                 wanted = "abs(gap(a, b))" if name == "abs" else f"{name}(gap(a, b), 20 px)"
                 what = f"'{name}' does not take {len(parts)} quantities"

@@ -12,10 +12,10 @@ from typing import cast
 
 from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 
-from visup.agent.model.errors import ManyErrors, Place, RuleError, VisupError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.transform import read_tree
-from visup.rules.language.typecheck import Checker
+from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
 
 _HEAD = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
@@ -60,7 +60,7 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         ManyErrors: It has several; each rule is read by itself, so that one syntax fault in a rule
             hides nothing of the others.
     """
-    checker = Checker(text, file)
+    checker = TypeChecker(text, file)
     errors: list[VisupError] = []
     rules: list[Rule] = []
     sound: list[Rule] = []
@@ -98,7 +98,7 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
         tree = _parser().parse(text, start="formula")
     except UnexpectedInput as fault:
         raise _syntax_error(fault, text, file) from None
-    checker = Checker(text, file, vocabulary)
+    checker = TypeChecker(text, file, vocabulary)
     found, faults = read_tree(tree, file)
     raise_all([checker.fault(*f) for f in faults] or list(checker.formula(found)))
     return cast("Formula", found)
@@ -110,7 +110,7 @@ def raise_all(errors: Sequence[VisupError]) -> None:
     if len(errors) == 1:
         raise errors[0]
     if errors:
-        raise ManyErrors(sorted(errors, key=_place))
+        raise ErrorGroup(sorted(errors, key=_place))
 
 
 def load_rules(path: str | Path) -> tuple[Rule, ...]:
@@ -162,7 +162,7 @@ def _blocks(text: str) -> list[str]:
 
 def _place(error: VisupError) -> tuple[int, int]:
     where = error.where
-    return (where.line, where.column) if isinstance(where, Place) else (0, 0)
+    return (where.line, where.column) if isinstance(where, SourceLocation) else (0, 0)
 
 
 def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
@@ -179,7 +179,7 @@ def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
         line, column = _end_before(lines, line)
     wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
     wanted = wanted or getattr(fault, "allowed", set()) or set()
-    where = Place(file, line, column, lines[line - 1], max(1, len(found)))
+    where = SourceLocation(file, line, column, lines[line - 1], max(1, len(found)))
     what = f"'{found}' does not belong here" if found else "the rule ends too early"
     return RuleError(what, where=where, expected=_expected(wanted), hint=_slip(found, wanted))
 

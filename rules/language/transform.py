@@ -15,28 +15,28 @@ from visup.rules.formula.nodes import (
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Not,
-    Often,
     Or,
-    Past,
+    PastOperator,
     Quantified,
     Rule,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
 from visup.rules.formula.nodes import Predicate as Fact
 from visup.rules.formula.terms import (
-    OVER_TIME,
-    SPLIT,
+    OVER_WINDOW,
+    POINTWISE,
     Arithmetic,
-    Combined,
     Measure,
     Negative,
-    OverTime,
+    PointwiseFunction,
     Term,
+    WindowFunction,
 )
 from visup.rules.formula.units import TIME, Number, Span, Unit
 
@@ -45,7 +45,7 @@ Fault = tuple[Span, str, str | None, str | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class UnresolvedCall:
     """`name(...)` while it is not yet known whether it stands for a quantity or for a fact."""
 
     name: str
@@ -54,14 +54,14 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
-class Word:
+class NameArgument:
     """A bare name among arguments."""
 
     name: str
     span: Span
 
 
-class Meaning:
+class CallResolver:
     """What a call stands for, by where it stands.
 
     Args:
@@ -73,13 +73,13 @@ class Meaning:
 
     def formula(self, node: Any) -> Formula:
         """A node where something true or false is wanted."""
-        if isinstance(node, Call):
+        if isinstance(node, UnresolvedCall):
             if node.name == "last":
                 spanned = self._spanned(node)
                 if spanned is None:
                     return Fact("", (), node.span)
                 return Last(self.formula(spanned[0]), spanned[1])
-            if node.name in (*SPLIT, *OVER_TIME):
+            if node.name in (*POINTWISE, *OVER_WINDOW):
                 what = f"'{node.name}' is a quantity, neither true nor false"
                 self.fault((node.span, what, None, "compare it with a number"))
             return Fact(node.name, self._words(node), node.span)
@@ -91,19 +91,19 @@ class Meaning:
 
     def term(self, node: Any) -> Term:
         """A node where a quantity is wanted."""
-        if isinstance(node, Call):
-            if node.name in SPLIT:
-                return Combined(
+        if isinstance(node, UnresolvedCall):
+            if node.name in POINTWISE:
+                return PointwiseFunction(
                     node.name,
                     tuple(self.term(self._unworded(a)) for a in node.arguments),
                     node.span,
                 )
-            if node.name in OVER_TIME:
+            if node.name in OVER_WINDOW:
                 spanned = self._spanned(node)
                 if spanned is None:
                     return Number(0.0, span=node.span)
                 part, duration = spanned
-                return OverTime(node.name, self.term(part), duration, node.span)
+                return WindowFunction(node.name, self.term(part), duration, node.span)
             return Measure(node.name, self._words(node), node.span)
         if isinstance(node, Term):
             return node
@@ -111,15 +111,15 @@ class Meaning:
         self.fault((_place(node), what, "a quantity or a number", None))
         return Number(0.0, span=_place(node))
 
-    def _words(self, call: Call) -> tuple[str, ...]:
+    def _words(self, call: UnresolvedCall) -> tuple[str, ...]:
         for argument in call.arguments:
-            if not isinstance(argument, Word):
+            if not isinstance(argument, NameArgument):
                 what = f"'{call.name}' takes names, not what is in its parentheses"
                 self.fault((call.span, what, f"such as {call.name}(a)", None))
                 return ()
         return tuple(a.name for a in call.arguments)
 
-    def _spanned(self, call: Call) -> tuple[Any, Number] | None:
+    def _spanned(self, call: UnresolvedCall) -> tuple[Any, Number] | None:
         """The parts of `rate(x, 2 s)` and its like, or None after a fault."""
         parts = call.arguments
         if len(parts) == 2 and isinstance(parts[1], Number) and parts[1].dimension == TIME:
@@ -129,7 +129,7 @@ class Meaning:
         return None
 
     def _unworded(self, argument: Any) -> Any:
-        if isinstance(argument, Word):
+        if isinstance(argument, NameArgument):
             what = f"'{argument.name}' is a name, and no quantity"
             self.fault((argument.span, what, "a quantity or a number", None))
             return Number(0.0, span=argument.span)
@@ -160,12 +160,12 @@ def read_tree(tree: Tree[Token], file: str) -> tuple[Any, list[Fault]]:
     Returns:
         A list of rules or a formula; and the faults that were found on the way.
     """
-    reading = _ToTree(file)
+    reading = _RuleBuilder(file)
     return reading.transform(tree), reading.faults
 
 
 @with_meta(meta=True)
-class _ToTree(Transformer[Token, Any]):
+class _RuleBuilder(Transformer[Token, Any]):
     """Lark's tree to ours.
 
     Args:
@@ -179,7 +179,7 @@ class _ToTree(Transformer[Token, Any]):
         super().__init__()
         self.file = file
         self.faults: list[Fault] = []
-        self.meaning = Meaning(self.faults.append)
+        self.meaning = CallResolver(self.faults.append)
 
     def start(self, meta: Any, parts: list[Any]) -> list[Rule]:
         return parts
@@ -209,8 +209,8 @@ class _ToTree(Transformer[Token, Any]):
     def variable(self, meta: Any, parts: list[Any]) -> tuple[str, bool]:
         return str(parts[0]), parts[1] is not None
 
-    def word(self, meta: Any, parts: list[Token]) -> Word:
-        return Word(str(parts[0]), _span_of(meta))
+    def word(self, meta: Any, parts: list[Token]) -> NameArgument:
+        return NameArgument(str(parts[0]), _span_of(meta))
 
     def when(self, meta: Any, parts: list[Any]) -> Formula:
         return self.meaning.formula(parts[0])
@@ -248,36 +248,36 @@ class _ToTree(Transformer[Token, Any]):
         place = Span(kind.line, kind.column, len(kind))
         return Quantified(str(kind), variable, self.meaning.formula(part), repeats, place)
 
-    def past(self, meta: Any, parts: list[Any]) -> Past:
+    def past(self, meta: Any, parts: list[Any]) -> PastOperator:
         kind, window, part = parts
-        return Past(str(kind), self.meaning.formula(part), window)
+        return PastOperator(str(kind), self.meaning.formula(part), window)
 
-    def future(self, meta: Any, parts: list[Any]) -> Future:
+    def future(self, meta: Any, parts: list[Any]) -> FutureOperator:
         kind, window, part = parts
         place = Span(kind.line, kind.column, len(kind))
-        return Future(str(kind), self.meaning.formula(part), window, place)
+        return FutureOperator(str(kind), self.meaning.formula(part), window, place)
 
     def formula(self, meta: Any, parts: list[Any]) -> Formula:
         return self.meaning.formula(parts[0])
 
-    def span(self, meta: Any, parts: list[Number]) -> Window:
-        return Window(ZERO, parts[0])
+    def span(self, meta: Any, parts: list[Number]) -> TimeWindow:
+        return TimeWindow(ZERO, parts[0])
 
-    def window(self, meta: Any, parts: list[Any]) -> Window:
+    def window(self, meta: Any, parts: list[Any]) -> TimeWindow:
         low, high = parts
-        return Window(ZERO, low) if high is None else Window(low, high)
+        return TimeWindow(ZERO, low) if high is None else TimeWindow(low, high)
 
-    def for_(self, meta: Any, parts: list[Any]) -> Past:
+    def for_(self, meta: Any, parts: list[Any]) -> PastOperator:
         part, low, high = parts
-        window = Window(ZERO, low) if high is None else Window(low, high)
-        return Past("always", self.meaning.formula(part), window)
+        window = TimeWindow(ZERO, low) if high is None else TimeWindow(low, high)
+        return PastOperator("always", self.meaning.formula(part), window)
 
-    def within(self, meta: Any, parts: list[Any]) -> Past:
+    def within(self, meta: Any, parts: list[Any]) -> PastOperator:
         return replace(self.for_(meta, parts), kind="once")
 
-    def often_time(self, meta: Any, parts: list[Any]) -> Often:
+    def often_time(self, meta: Any, parts: list[Any]) -> MOfN:
         part, least, of = parts
-        return Often(self.meaning.formula(part), least, of, least.span)
+        return MOfN(self.meaning.formula(part), least, of, least.span)
 
     often_samples = often_time
 
@@ -304,8 +304,8 @@ class _ToTree(Transformer[Token, Any]):
         value = -number.value if minus is not None else number.value
         return Number(value, number.unit, _span_of(meta))
 
-    def call(self, meta: Any, parts: list[Any]) -> Call:
-        return Call(str(parts[0]), parts[1] or (), _span_of(meta))
+    def call(self, meta: Any, parts: list[Any]) -> UnresolvedCall:
+        return UnresolvedCall(str(parts[0]), parts[1] or (), _span_of(meta))
 
     def number(self, meta: Any, parts: list[Any]) -> Number:
         unit = Unit.NONE if parts[1] is None else Unit(str(parts[1]))

@@ -5,30 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 
-from visup.agent.model.errors import Place, RuleError
+from visup.agent.model.errors import RuleError, SourceLocation
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Node,
-    Often,
-    Past,
+    PastOperator,
     Predicate,
     Quantified,
     Rule,
     Since,
+    TimeWindow,
     Until,
-    Window,
     children,
 )
-from visup.rules.formula.terms import Measure, OverTime
+from visup.rules.formula.terms import Measure, WindowFunction
 from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
-from visup.rules.language.cost import MOST_KEPT, MOST_VARIABLES, bounds_of, variables_of
-from visup.rules.language.dimensions import dimensions
+from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
+from visup.rules.language.dimensions import check_dimensions
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.snapshot import RELATION_NAMES
-from visup.rules.predicates.vocabulary import KINDS, RULES, Vocabulary
+from visup.rules.predicates.vocabulary import PERCEPT_KINDS, RULES, Vocabulary
 from visup.rules.wording.sentences import mentions
 
 KEYWORDS = frozenset(
@@ -65,7 +65,7 @@ KEYWORDS = frozenset(
 """Words of the language itself, which name nothing else."""
 
 
-class Checker:
+class TypeChecker:
     """Finds the faults of meaning of one text.
 
     Args:
@@ -82,7 +82,7 @@ class Checker:
     def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
         """A fault as an error with its line."""
         line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
-        where = Place(self.file, span.line, span.column, line, span.length)
+        where = SourceLocation(self.file, span.line, span.column, line, span.length)
         return RuleError(what, where=where, expected=expected, hint=hint)
 
     def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:
@@ -96,12 +96,12 @@ class Checker:
 
     def formula(self, formula: Formula) -> Iterator[RuleError]:
         """The faults of a formula that stands by itself."""
-        for fault in _Reader(self.vocabulary, ()).node(formula):
+        for fault in _FormulaChecker(self.vocabulary, ()).node(formula):
             yield self.fault(*fault)
 
     def rule(self, rule: Rule) -> Iterator[RuleError]:
         """The faults of one rule."""
-        reader = _Reader(self.vocabulary, rule.variables)
+        reader = _FormulaChecker(self.vocabulary, rule.variables)
         found = [f for formula in rule.formulas for f in reader.node(formula)]
         found += [f for w in ("hold", "cooldown") for f in _time(getattr(rule, w), w)]
         found += self._head(rule)
@@ -129,18 +129,18 @@ class Checker:
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:
         together = variables_of(rule)
-        if together > MOST_VARIABLES:
+        if together > MAX_VARIABLES:
             what = f"'{rule.name}' looks at {together} objects together"
-            yield rule.span, what, f"at most {MOST_VARIABLES}", "make it two rules"
+            yield rule.span, what, f"at most {MAX_VARIABLES}", "make it two rules"
             return
-        kept = bounds_of(rule).kept
-        if kept > MOST_KEPT:
+        kept = cost_of(rule).kept
+        if kept > MAX_STATE:
             what = f"'{rule.name}' would keep {kept:,} values for each choice of objects"
             hint = "shorten its windows; `for` and `within` of facts keep one moment only"
-            yield rule.span, what, f"at most {MOST_KEPT:,}", hint
+            yield rule.span, what, f"at most {MAX_STATE:,}", hint
 
 
-class _Reader:
+class _FormulaChecker:
     """Goes through formulas; remembers which variables they use."""
 
     def __init__(self, vocabulary: Vocabulary, variables: tuple[str, ...]) -> None:
@@ -156,21 +156,21 @@ class _Reader:
                 yield from self.quantified(node)
                 return
             case Comparison():
-                yield from dimensions(node, self.vocabulary)
-            case Past(window=Window() as window):
+                yield from check_dimensions(node, self.vocabulary)
+            case PastOperator(window=TimeWindow() as window):
                 yield from _window(window, "for" if node.kind == "always" else "within")
-            case Future(window=window, span=span) | Until(window=window, span=span):
-                word = node.kind if isinstance(node, Future) else "until"
+            case FutureOperator(window=window, span=span) | Until(window=window, span=span):
+                word = node.kind if isinstance(node, FutureOperator) else "until"
                 if window is None:
                     what = f"'{word}' without a window would wait without end"
                     yield span, what, f"such as {word}[5 s]", None
                 else:
                     yield from _window(window, word)
-            case Since(window=Window() as window):
+            case Since(window=TimeWindow() as window):
                 yield from _window(window, "since")
-            case Often():
+            case MOfN():
                 yield from _often(node)
-            case Last(duration=duration) | OverTime(duration=duration):
+            case Last(duration=duration) | WindowFunction(duration=duration):
                 yield from _time(duration, getattr(node, "name", "last"))
         for part in children(node):
             yield from self.node(part)
@@ -217,7 +217,7 @@ class _Reader:
         known: Iterable[str] = {
             "object": self.scope,
             "relation": RELATION_NAMES,
-            "kind": (*KINDS, word),
+            "kind": (*PERCEPT_KINDS, word),
         }.get(wanted, (word,))
         if word not in known:
             what = f"'{word}' is no {'variable of the rule' if wanted == 'object' else wanted}"
@@ -236,7 +236,7 @@ def _time(number: Number | None, word: str) -> Iterator[Fault]:
         yield number.span, f"'{word}' wants a time above 0", None, None
 
 
-def _window(window: Window, word: str) -> Iterator[Fault]:
+def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
     yield from _time(window.high, word)
     if window.low.dimension != TIME:
         yield window.low.span, f"'{word}' wants a time", "such as 2 s", None
@@ -245,7 +245,7 @@ def _window(window: Window, word: str) -> Iterator[Fault]:
         yield window.high.span, what, "the shorter time first", None
 
 
-def _often(node: Often) -> Iterator[Fault]:
+def _often(node: MOfN) -> Iterator[Fault]:
     least, of = node.least, node.of
     if node.counts_samples:
         if not (least.unit is Unit.NONE and 1 <= least.value <= of.value):

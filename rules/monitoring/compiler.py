@@ -3,7 +3,7 @@
 Every formula becomes a step that reads the results of steps before it. Two formulas that say the
 same of the same variables, in one rule or in several, are one step. An object variable is an axis of
 the arrays, so that one step serves all choices of objects. A program only says what is to be done:
-`monitor` does it to single intervals, `machine` to those of all choices of objects.
+`monitor` does it to single intervals, `vm` to those of all choices of objects.
 
 What speaks of the future is turned into the past by waiting (Maler and Nickovic's pastification):
 `eventually[5 s] f` is told 5 s late as `f within 5 s`, and what stands beside it waits as long.
@@ -18,30 +18,37 @@ from visup.rules.formula.nodes import (
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Not,
-    Often,
     Or,
-    Past,
+    PastOperator,
     Predicate,
     Quantified,
     Rule,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import Number, ticks
 from visup.rules.monitoring.intervals import EQUAL
 from visup.rules.monitoring.operators import (
-    Counting,
-    Lasting,
-    Latching,
-    Operator,
-    Recalling,
-    Sliding,
-    SoFar,
+    BooleanWindow,
+    HysteresisLatch,
+    SampleAndHold,
+    SlidingCount,
+    SlidingWindow,
+    TemporalOperator,
+    Unbounded,
 )
 
 Scope = tuple[tuple[str, bool], ...]
@@ -49,7 +56,7 @@ Scope = tuple[tuple[str, bool], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class Operation:
     """One step of a program.
 
     Attributes:
@@ -72,11 +79,11 @@ class Step:
     numbers: tuple[float, ...] = ()
     node: Predicate | Measure | None = None
     order: tuple[int, ...] = ()
-    operator: Operator | None = None
+    operator: TemporalOperator | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ValueRef:
     """Where the value of a formula is found.
 
     Attributes:
@@ -101,10 +108,10 @@ class Program:
         places: What makes a step the same as another -> its number.
     """
 
-    steps: list[Step] = field(default_factory=list)
+    steps: list[Operation] = field(default_factory=list)
     places: dict[Hashable, int] = field(default_factory=dict)
 
-    def add(self, key: Hashable, step: Step) -> int:
+    def add(self, key: Hashable, step: Operation) -> int:
         """The step of that key, made when there is none yet."""
         if key not in self.places:
             self.steps.append(step)
@@ -115,7 +122,7 @@ class Program:
         """What is looked up, each with its step."""
         return ((k, s.node) for k, s in enumerate(self.steps) if s.node is not None)
 
-    def operators(self) -> Iterable[Operator]:
+    def operators(self) -> Iterable[TemporalOperator]:
         """What remembers."""
         return (s.operator for s in self.steps if s.operator is not None)
 
@@ -126,12 +133,12 @@ class Compiler:
     def __init__(self) -> None:
         self.program = Program()
 
-    def rule(self, rule: Rule) -> tuple[Place, ...]:
+    def rule(self, rule: Rule) -> tuple[ValueRef, ...]:
         """The places of `when` and `unless`, which come equally late."""
         scope = tuple((v, v in rule.may_repeat) for v in rule.variables)
         return tuple(self._together([self.formula(f, scope) for f in rule.formulas]))
 
-    def formula(self, node: Formula, scope: Scope = ()) -> Place:
+    def formula(self, node: Formula, scope: Scope = ()) -> ValueRef:
         """The place of a formula, after its steps have been put into the program."""
         match node:
             case Predicate():
@@ -143,110 +150,114 @@ class Compiler:
             case And(parts=parts) | Or(parts=parts):
                 join = "least" if isinstance(node, And) else "most"
                 return self._joined(join, [self.formula(p, scope) for p in parts])
-            case Past(kind=kind, part=part, window=window):
+            case PastOperator(kind=kind, part=part, window=window):
                 return self._past(kind, window, self.formula(part, scope))
             case Since(left=left, right=right, window=window):
                 sides = self._together([self.formula(left, scope), self.formula(right, scope)])
                 return self._since(window, *sides)
-            case Future(kind=kind, part=part, window=window):
+            case FutureOperator(kind=kind, part=part, window=window):
                 assert window is not None
                 past = "once" if kind == "eventually" else "always"
                 low, high = ticks(window.low.base), ticks(window.high.base)
                 return self._slid(past, 0, high - low, high, self.formula(part, scope))
             case Until(left=left, right=right, window=window):
                 return self._until(window, self.formula(left, scope), self.formula(right, scope))
-            case Often(part=part, least=least, of=of):
+            case MOfN(part=part, least=least, of=of):
                 span = round(of.base) if node.counts_samples else ticks(of.base)
-                counting = Counting(least.base, span, node.counts_samples)
+                counting = SlidingCount(least.base, span, node.counts_samples)
                 return self._operator(counting, self.formula(part, scope))
             case Last(part=part, duration=age):
                 return self._recalled(age, self.formula(part, scope))
             case Quantified():
                 return self._quantified(node, scope)
 
-    def term(self, node: Term, scope: Scope = ()) -> Place:
+    def term(self, node: Term, scope: Scope = ()) -> ValueRef:
         """The place of a quantity."""
         match node:
             case Number():
-                step = Step("number", numbers=(node.base,))
-                return Place(self.program.add(("number", node.base), step))
+                step = Operation("number", numbers=(node.base,))
+                return ValueRef(self.program.add(("number", node.base), step))
             case Measure():
                 return self._called(node, scope, certain=False)
             case Negative(part=part):
                 return self._map("not", self.term(part, scope))
             case Arithmetic(left=left, operator=operator, right=right):
                 return self._map(operator, self.term(left, scope), self.term(right, scope))
-            case Combined(name="abs", parts=(part,)):
+            case PointwiseFunction(name="abs", parts=(part,)):
                 return self._map("abs", self.term(part, scope))
-            case Combined(name=name, parts=parts):
+            case PointwiseFunction(name=name, parts=parts):
                 join = "least" if name == "min" else "most"
                 return self._joined(join, [self.term(p, scope) for p in parts])
-            case OverTime():
+            case WindowFunction():
                 return self._over_time(node, self.term(node.part, scope))
 
-    def _map(self, kind: str, *at: Place, numbers: tuple[float, ...] = ()) -> Place:
+    def _map(self, kind: str, *at: ValueRef, numbers: tuple[float, ...] = ()) -> ValueRef:
         """A step that remembers nothing."""
         axes, reads = _axes(at), tuple(p.step for p in at)
-        step = self.program.add((kind, numbers, reads), Step(kind, reads, axes, numbers))
-        return Place(step, at[0].delay, axes, all(p.certain for p in at))
+        step = self.program.add((kind, numbers, reads), Operation(kind, reads, axes, numbers))
+        return ValueRef(step, at[0].delay, axes, all(p.certain for p in at))
 
-    def _joined(self, join: str, parts: list[Place]) -> Place:
+    def _joined(self, join: str, parts: list[ValueRef]) -> ValueRef:
         together = self._together(parts)
         at = together[0]
         for part in together[1:]:
             at = self._map(join, at, part)
         return at
 
-    def _together(self, parts: list[Place]) -> list[Place]:
+    def _together(self, parts: list[ValueRef]) -> list[ValueRef]:
         """The same parts, those that come earlier made to wait for the latest one."""
         latest = max(p.delay for p in parts)
         return [self._waited(p, latest - p.delay) for p in parts]
 
-    def _waited(self, at: Place, wait: int) -> Place:
+    def _waited(self, at: ValueRef, wait: int) -> ValueRef:
         return self._slid("always", wait, wait, wait, at) if wait else at
 
     def _operator(
-        self, operator: Operator, *at: Place, delay: int = 0, certain: bool = False
-    ) -> Place:
+        self, operator: TemporalOperator, *at: ValueRef, delay: int = 0, certain: bool = False
+    ) -> ValueRef:
         """A step that remembers."""
         axes, reads = _axes(at), tuple(p.step for p in at)
-        step = Step("remember", reads, axes, operator=operator)
-        return Place(self.program.add((operator, reads), step), at[0].delay + delay, axes, certain)
+        step = Operation("remember", reads, axes, operator=operator)
+        return ValueRef(
+            self.program.add((operator, reads), step), at[0].delay + delay, axes, certain
+        )
 
-    def _slid(self, kind: str, low: int, high: int, delay: int, *at: Place) -> Place:
+    def _slid(self, kind: str, low: int, high: int, delay: int, *at: ValueRef) -> ValueRef:
         certain = all(p.certain for p in at)
         lasting = certain and low == 0 and kind in ("always", "once")
-        operator: Operator = Lasting(kind, high) if lasting else Sliding(kind, low, high)
+        operator: TemporalOperator = (
+            BooleanWindow(kind, high) if lasting else SlidingWindow(kind, low, high)
+        )
         return self._operator(operator, *at, delay=delay, certain=certain)
 
-    def _past(self, kind: str, window: Window | None, at: Place) -> Place:
+    def _past(self, kind: str, window: TimeWindow | None, at: ValueRef) -> ValueRef:
         if window is not None:
             return self._slid(kind, ticks(window.low.base), ticks(window.high.base), 0, at)
-        return self._operator(SoFar(kind), at, certain=at.certain)
+        return self._operator(Unbounded(kind), at, certain=at.certain)
 
-    def _since(self, window: Window | None, left: Place, right: Place) -> Place:
+    def _since(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         if window is None:
             certain = left.certain and right.certain
-            return self._operator(SoFar("since"), left, right, certain=certain)
+            return self._operator(Unbounded("since"), left, right, certain=certain)
         return self._slid("since", 0, ticks(window.high.base), 0, left, right)
 
-    def _until(self, window: Window | None, left: Place, right: Place) -> Place:
+    def _until(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         assert window is not None
         left, right = self._together([left, right])
         span = ticks(window.high.base)
         return self._slid("until", 0, span, span, left, right)
 
-    def _recalled(self, age: Number, at: Place) -> Place:
-        return self._operator(Recalling(ticks(age.base)), at, certain=at.certain)
+    def _recalled(self, age: Number, at: ValueRef) -> ValueRef:
+        return self._operator(SampleAndHold(ticks(age.base)), at, certain=at.certain)
 
-    def _comparison(self, node: Comparison, scope: Scope) -> Place:
+    def _comparison(self, node: Comparison, scope: Scope) -> ValueRef:
         entered = self._compared(node.operator, node.left, node.right, scope)
         if node.leave is None:
             return entered
         left = self._compared(node.operator, node.left, node.leave, scope)
-        return self._operator(Latching(), entered, left)
+        return self._operator(HysteresisLatch(), entered, left)
 
-    def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> Place:
+    def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> ValueRef:
         by = EQUAL if "=" in operator else -EQUAL
         more, less = (left, right) if operator[0] == ">" else (right, left)
         # With a number on one side nothing can fail to be a number, and half the work is saved.
@@ -257,7 +268,7 @@ class Compiler:
         sides = self.term(more, scope), self.term(less, scope)
         return self._map("compare", *sides, numbers=(by,))
 
-    def _over_time(self, node: OverTime, at: Place) -> Place:
+    def _over_time(self, node: WindowFunction, at: ValueRef) -> ValueRef:
         span = ticks(node.duration.base)
         match node.name:
             case "last":
@@ -269,26 +280,26 @@ class Compiler:
         begin = self._slid("always", span, span, 0, at)
         return self._map("rate", at, begin, numbers=(1.0 / node.duration.base,))
 
-    def _called(self, node: Predicate | Measure, scope: Scope, certain: bool) -> Place:
+    def _called(self, node: Predicate | Measure, scope: Scope, certain: bool) -> ValueRef:
         names = [name for name, _ in scope]
         # An inner variable hides an outer one of its name.
         axis = {name: i for i, name in enumerate(names)}
         order = tuple(axis[w] for w in node.words if w in axis)
         words = tuple(axis.get(w, w) for w in node.words)
         key = ("look", type(node).__name__, node.name, words)
-        step = Step("look", axes=frozenset(order), node=node, order=order)
-        return Place(self.program.add(key, step), 0, frozenset(order), certain)
+        step = Operation("look", axes=frozenset(order), node=node, order=order)
+        return ValueRef(self.program.add(key, step), 0, frozenset(order), certain)
 
-    def _quantified(self, node: Quantified, scope: Scope) -> Place:
+    def _quantified(self, node: Quantified, scope: Scope) -> ValueRef:
         axis = len(scope)
         at = self.formula(node.part, (*scope, (node.variable, node.may_repeat)))
         apart = () if node.may_repeat else tuple(i for i, (_, r) in enumerate(scope) if not r)
         axes, order = (at.axes | frozenset(apart)) - {axis}, (axis, *apart)
-        step = Step(node.kind, (at.step,), axes, order=order)
-        return Place(
+        step = Operation(node.kind, (at.step,), axes, order=order)
+        return ValueRef(
             self.program.add((node.kind, at.step, order), step), at.delay, axes, at.certain
         )
 
 
-def _axes(at: Iterable[Place]) -> frozenset[int]:
+def _axes(at: Iterable[ValueRef]) -> frozenset[int]:
     return frozenset[int]().union(*(p.axes for p in at))

@@ -14,20 +14,30 @@ added or subtracted, which changes no other number.
 
 from __future__ import annotations
 
-from math import inf, isnan
+from math import inf
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent import Truth
+
 Interval = tuple[float, float]
-Box = NDArray[np.float64]
+IntervalArray = NDArray[np.float64]
 """(2, ...) array: lower bounds, upper bounds."""
 
 UNKNOWN: Interval = (-inf, inf)
 FALSE: Interval = (-inf, -inf)
 TRUE: Interval = (inf, inf)
 EQUAL = 1e-300
+
+
+def verdict(interval: Interval) -> Truth:
+    """True when all of the interval lies above 0, false when all lies below, else unknown."""
+    low, high = interval
+    if low > 0:
+        return Truth.TRUE
+    return Truth.FALSE if high < 0 else Truth.UNKNOWN
 
 
 class Algebra(Protocol):
@@ -79,10 +89,6 @@ class Scalars:
             return v
         return w if c >= a and d >= b else (a if a > c else c, b if b > d else d)
 
-    def negated(self, v: Interval) -> Interval:
-        """Zero minus the interval: 'not'."""
-        return (-v[1], -v[0])
-
     def held(self, v: Interval) -> Interval:
         """See `Algebra`."""
         return (1.0 if v[0] > 0 else 0.0, 1.0 if v[1] >= 0 else 0.0)
@@ -90,11 +96,6 @@ class Scalars:
     def scaled(self, v: Interval, factor: float) -> Interval:
         """See `Algebra`."""
         return (v[0] * factor, v[1] * factor)
-
-    def added(self, v: Interval, w: Interval) -> Interval:
-        """The sum; what is no number becomes unknown."""
-        low, high = v[0] + w[0], v[1] + w[1]
-        return (-inf if isnan(low) else low, inf if isnan(high) else high)
 
     def tallied(self, v: Interval, w: Interval) -> Interval:
         """See `Algebra`."""
@@ -104,27 +105,11 @@ class Scalars:
         """See `Algebra`."""
         return (v[0] + by, v[1] + by)
 
-    def absolute(self, v: Interval) -> Interval:
-        """Of an interval that spans 0, all up to the farther bound."""
-        low, high = v
-        return (max(low, -high, 0.0), max(-low, high))
-
-    def times(self, v: Interval, w: Interval) -> Interval:
-        """The product; 0 times what is without end is 0."""
-        products = [0.0 if p == 0.0 or q == 0.0 else p * q for p in v for q in w]
-        return (min(products), max(products))
-
-    def over(self, v: Interval, w: Interval) -> Interval:
-        """The quotient; by an interval that holds 0, nothing is known of it."""
-        if w[0] <= 0.0 <= w[1]:
-            return UNKNOWN
-        return self.times(v, (1.0 / w[1], 1.0 / w[0]))
-
 
 class Arrays:
     """(2, cells) arrays of intervals, one for each choice of objects."""
 
-    def constant(self, value: Interval) -> Box:
+    def constant(self, value: Interval) -> IntervalArray:
         """See `Algebra`."""
         return np.array(value).reshape(2, 1)
 
@@ -135,6 +120,6 @@ class Arrays:
     shifted: Any = staticmethod(np.add)
     tallied: Any = staticmethod(np.add)
 
-    def held(self, v: Box) -> Box:
+    def held(self, v: IntervalArray) -> IntervalArray:
         """See `Algebra`."""
         return np.array((v[0] > 0, v[1] >= 0), dtype=np.float64)

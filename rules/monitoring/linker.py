@@ -1,6 +1,6 @@
 """A program laid out for a number of objects: where every interval and every state stands.
 
-Most steps are done by `machine`. Those that keep windows are done one by one between its calls, on
+Most operations are done by `vm`. Those that keep windows are done one by one between its calls, on
 what these have made; few calls are enough, since windows rarely look at windows.
 """
 
@@ -13,39 +13,46 @@ import numpy as np
 
 from visup.rules.formula.nodes import Predicate
 from visup.rules.formula.terms import Measure
-from visup.rules.monitoring import vm as machine
-from visup.rules.monitoring.compiler import Program, Step
-from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Arrays, Interval
+from visup.rules.monitoring import vm
+from visup.rules.monitoring.compiler import Operation, Program
+from visup.rules.monitoring.intervals import (
+    FALSE,
+    TRUE,
+    UNKNOWN,
+    Arrays,
+    Interval,
+)
 from visup.rules.monitoring.operators import (
     LONG_AGO,
-    REACH,
-    Counting,
-    Lasting,
-    Latching,
-    Recalling,
-    Sliding,
-    SoFar,
+    SAMPLE_HOLD,
+    BooleanWindow,
+    HysteresisLatch,
+    PointOperator,
+    SampleAndHold,
+    SlidingCount,
+    SlidingWindow,
+    Unbounded,
 )
-from visup.rules.monitoring.states import Memory, Moments, States, Window
+from visup.rules.monitoring.states import PointSlot, StateLayout, States, WindowSlot
 from visup.rules.monitoring.vm import Codes, Floats, bits
 
 _ON = Arrays()
 _KINDS = {
-    "not": machine.NOT,
-    "abs": machine.ABS,
-    "least": machine.LEAST,
-    "most": machine.MOST,
-    "above": machine.SHIFT,
-    "below": machine.BELOW,
-    "compare": machine.COMPARE,
-    "+": machine.PLUS,
-    "-": machine.MINUS,
-    "*": machine.TIMES,
-    "/": machine.OVER,
-    "rate": machine.RATE,
-    "exists": machine.SOME,
-    "forall": machine.EVERY,
-    "number": machine.NUMBER,
+    "not": vm.NOT,
+    "abs": vm.ABS,
+    "least": vm.LEAST,
+    "most": vm.MOST,
+    "above": vm.SHIFT,
+    "below": vm.BELOW,
+    "compare": vm.COMPARE,
+    "+": vm.PLUS,
+    "-": vm.MINUS,
+    "*": vm.TIMES,
+    "/": vm.OVER,
+    "rate": vm.RATE,
+    "exists": vm.SOME,
+    "forall": vm.EVERY,
+    "number": vm.NUMBER,
 }
 
 
@@ -57,7 +64,7 @@ class _Stage(NamedTuple):
     windows: list[int]
 
 
-class Layout:
+class LinkedProgram:
     """A program for a number of objects.
 
     Args:
@@ -83,8 +90,8 @@ class Layout:
         self._stages: list[_Stage] = []
         self._ready: list[int] = []  # the stage from which on each step's value is there
         self._wider: dict[tuple[int, frozenset[int]], int] = {}
-        self._moments: list[Moments] = []
-        self._windows: list[Window] = []
+        self._moments: list[PointSlot] = []
+        self._windows: list[WindowSlot] = []
         self._kept = 0
         # Quantities stand before all else, so that they are put there in one go.
         measured = [k for k, node in program.looks() if isinstance(node, Measure)]
@@ -94,11 +101,11 @@ class Layout:
             room = places.get(number)
             self.places.append(self._room(n ** len(step.axes)) if room is None else room)
             self._lay(number, step)
-        self.memory = Memory(n, tuple(self._moments), tuple(self._windows))
+        self.memory = StateLayout(n, tuple(self._moments), tuple(self._windows))
         self.fresh = self.memory.fresh()
         rows = [row for stage in self._stages for row in stage.rows]
         numbers = [pair for stage in self._stages for pair in stage.numbers]
-        self._code = np.array(rows, dtype=np.int64).reshape(-1, machine.WIDTH)
+        self._code = np.array(rows, dtype=np.int64).reshape(-1, vm.WIDTH)
         self._numbers = np.array(numbers, dtype=np.float64).reshape(-1, 2)
         self._ends = np.cumsum([len(stage.rows) for stage in self._stages]).tolist()
 
@@ -114,22 +121,21 @@ class Layout:
         Returns:
             States after; the arena holds the intervals of all steps.
         """
-        then, before, windows = states.then, states.moments, list(states.windows)
-        if then is not None and now - then > REACH:
-            before = self.memory.silenced(before, then + REACH)
+        then, before = states.then, states.moments
+        if then is not None and now - then > SAMPLE_HOLD:
+            before = self.memory.silenced(before, then + SAMPLE_HOLD)
         code, numbers, n, moment = self._code, self._numbers, self.n, float(now)
-        after, begin = np.empty_like(before), 0
+        after = np.empty_like(before) if before.size else before
+        windows, begin = list(states.windows), 0
         changed = before is not states.moments
         for end, stage in zip(self._ends, self._stages, strict=True):
-            if machine.run(code, numbers, begin, end, n, moment, facts, arena, before, after):
+            if begin < end and vm.run(
+                code, numbers, begin, end, n, moment, facts, arena, before, after
+            ):
                 changed = True
             begin = end
             for slot in stage.windows:
-                w = self._windows[slot]
-                # What is remembered must not change when the arena does.
-                parts = [arena[read].reshape(2, -1).copy() for read in w.reads]
-                windows[slot], value = w.step(windows[slot], now, *parts)
-                arena[w.place].reshape(2, -1)[:] = value
+                windows[slot] = self._windows[slot].update(windows[slot], now, arena)
         return States(now, after if changed else states.moments, tuple(windows))
 
     def interval(self, step: int, rows: tuple[int, ...], arena: Floats) -> Interval:
@@ -140,20 +146,21 @@ class Layout:
         at += self.places[step]
         return arena.item(at), arena.item(at + self.n ** len(axes))
 
-    def _lay(self, number: int, step: Step) -> None:
+    def _lay(self, number: int, step: Operation) -> None:
         """Say how a step is done."""
         cells = self.n ** len(step.axes)
         stage = max((self._ready[r] for r in step.reads), default=0)
-        if isinstance(step.operator, Sliding | Counting):
+        if isinstance(step.operator, SlidingWindow | SlidingCount):
             self._stage(stage).windows.append(len(self._windows))
-            starts = [self._wide(r, step.axes) for r in step.reads]
+            reads = tuple(self._wide(r, step.axes) for r in step.reads)
             self._windows.append(
-                Window(
+                WindowSlot(
                     step.operator,
                     step.operator.on(_ON),
                     len(step.axes),
-                    tuple(slice(at, at + 2 * cells) for at in starts),
-                    slice(self.places[number], self.places[number] + 2 * cells),
+                    reads,
+                    self.places[number],
+                    cells,
                 )
             )
             stage += 1
@@ -161,29 +168,31 @@ class Layout:
             self._put(stage, *self._row(number, step, cells))
         self._ready.append(stage)
 
-    def _row(self, number: int, step: Step, cells: int) -> tuple[list[int], tuple[float, float]]:
-        """The instruction of a step that the machine does."""
-        row, numbers = [0] * machine.WIDTH, (*step.numbers, 0.0, 0.0)
-        row[machine.DEST], row[machine.CELLS] = self.places[number], cells
-        row[machine.MASK] = bits(step.axes)
+    def _row(
+        self, number: int, step: Operation, cells: int
+    ) -> tuple[list[int], tuple[float, float]]:
+        """The instruction of a step that the virtual machine does."""
+        row, numbers = [0] * vm.WIDTH, (*step.numbers, 0.0, 0.0)
+        row[vm.DEST], row[vm.CELLS] = self.places[number], cells
+        row[vm.MASK] = bits(step.axes)
         if step.node is not None:
-            row[machine.OP], row[machine.A] = machine.FACT, self.facts[number]
-            row[machine.AXIS] = int(len(step.order) == 2 and step.order[0] > step.order[1])
+            row[vm.OP], row[vm.A] = vm.FACT, self.facts[number]
+            row[vm.AXIS] = int(len(step.order) == 2 and step.order[0] > step.order[1])
         elif step.kind in ("exists", "forall"):
             (read,) = step.reads
-            row[machine.OP], row[machine.A] = _KINDS[step.kind], self.places[read]
-            row[machine.MASK_A] = bits(self.program.steps[read].axes)
-            row[machine.AXIS], row[machine.APART] = step.order[0], bits(step.order[1:])
+            row[vm.OP], row[vm.A] = _KINDS[step.kind], self.places[read]
+            row[vm.MASK_A] = bits(self.program.steps[read].axes)
+            row[vm.AXIS], row[vm.APART] = step.order[0], bits(step.order[1:])
         else:
-            for column, read in zip((machine.A, machine.B), step.reads, strict=False):
+            for column, read in zip((vm.A, vm.B), step.reads, strict=False):
                 row[column] = self._wide(read, step.axes)
             if step.operator is None:
-                row[machine.OP] = _KINDS[step.kind]
+                row[vm.OP] = _KINDS[step.kind]
             else:
-                operator = cast("Lasting | SoFar | Latching | Recalling", step.operator)
-                row[machine.OP], span, fills = _moment(operator)
-                row[machine.STATE], numbers = self._kept, (span, 0.0)
-                self._moments.append(Moments(operator, len(step.axes), self._kept, fills))
+                operator = cast("PointOperator", step.operator)
+                row[vm.OP], span, fills = _moment(operator)
+                row[vm.STATE], numbers = self._kept, (span, 0.0)
+                self._moments.append(PointSlot(operator, len(step.axes), self._kept, fills))
                 self._kept += cells * len(fills)
         return row, (numbers[0], numbers[1])
 
@@ -194,12 +203,12 @@ class Layout:
             return self.places[read]
         if (read, axes) not in self._wider:
             cells = self.n ** len(axes)
-            row = [0] * machine.WIDTH
-            row[machine.OP], row[machine.A] = machine.SPREAD, self.places[read]
-            row[machine.DEST], row[machine.CELLS] = self._room(cells), cells
-            row[machine.MASK_A], row[machine.MASK] = bits(own), bits(axes)
+            row = [0] * vm.WIDTH
+            row[vm.OP], row[vm.A] = vm.SPREAD, self.places[read]
+            row[vm.DEST], row[vm.CELLS] = self._room(cells), cells
+            row[vm.MASK_A], row[vm.MASK] = bits(own), bits(axes)
             self._put(self._ready[read], row, (0.0, 0.0))
-            self._wider[read, axes] = row[machine.DEST]
+            self._wider[read, axes] = row[vm.DEST]
         return self._wider[read, axes]
 
     def _room(self, cells: int) -> int:
@@ -217,19 +226,17 @@ class Layout:
         pairs.append(numbers)
 
 
-def _moment(
-    operator: Lasting | SoFar | Latching | Recalling,
-) -> tuple[int, float, tuple[float, ...]]:
-    """How the machine does an operator, its span, and what its state is before the first sample."""
+def _moment(operator: PointOperator) -> tuple[int, float, tuple[float, ...]]:
+    """How the virtual machine does an operator, its span, and what its state is before the first sample."""
     match operator:
-        case Lasting(kind=kind, high=high):
+        case BooleanWindow(kind=kind, high=high):
             # Before the first sample it may have been otherwise than wanted.
-            op = machine.LASTS if kind == "always" else machine.HAPPENED
+            op = vm.LASTS if kind == "always" else vm.HAPPENED
             return op, float(high), (np.inf, -np.inf)
-        case SoFar(kind=kind):
-            ops = {"always": machine.ALWAYS, "once": machine.ONCE, "since": machine.SINCE}
+        case Unbounded(kind=kind):
+            ops = {"always": vm.ALWAYS, "once": vm.ONCE, "since": vm.SINCE}
             return ops[kind], 0.0, TRUE if kind == "always" else FALSE
-        case Latching():
-            return machine.LATCH, 0.0, (0.0,)
-        case Recalling(age=age):
-            return machine.RECALL, float(age), (*UNKNOWN, float(LONG_AGO))
+        case HysteresisLatch():
+            return vm.LATCH, 0.0, (0.0,)
+        case SampleAndHold(age=age):
+            return vm.RECALL, float(age), (*UNKNOWN, float(LONG_AGO))

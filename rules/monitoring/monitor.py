@@ -1,20 +1,34 @@
-"""One formula over plain numbers: for signals that belong to no object, from any source."""
+"""One formula over plain signals that belong to no object, from any source.
+
+It does the operations of a compiled program one by one on single intervals. What each does is defined
+in `_interval_jit` and in `operators`, for this and for the loops over all choices of objects alike.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import isnan
 from typing import Any
 
-from visup.agent import Truth
 from visup.rules.formula.nodes import Formula
 from visup.rules.formula.units import TICKS, ticks
-from visup.rules.monitoring.compiler import Compiler, Step
-from visup.rules.monitoring.intervals import UNKNOWN, Interval, Scalars
+from visup.rules.monitoring import _interval_jit as on_intervals
+from visup.rules.monitoring.compiler import Compiler, Operation
+from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval, Scalars
+from visup.rules.monitoring.operators import (
+    LONG_AGO,
+    SAMPLE_HOLD,
+    BooleanWindow,
+    HysteresisLatch,
+    SampleAndHold,
+    SlidingWindow,
+    TemporalOperator,
+    Unbounded,
+    Update,
+)
 
 Signals = Mapping[str, float | Interval | None]
 Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
-"""(values of the steps before, states before, states after, microseconds, signals) -> value."""
+"""(values of the operations before, states before, states after, microseconds, signals) -> value."""
 
 _ON = Scalars()
 
@@ -32,16 +46,16 @@ class Monitor:
         formula: Its quantities are the signals, written `name()`.
 
     Attributes:
-        delay: How many seconds late a verdict comes: what is told at t is about t - delay.
-        state: All that is remembered, an immutable value; put back an older one to go on from it.
+        delay: How many seconds late a verdict comes: what is reported at t is about t - delay.
+        state: All that is retained, an immutable value; put back an older one to go on from it.
     """
 
     def __init__(self, formula: Formula) -> None:
         compiler = Compiler()
-        place = compiler.formula(formula)
+        value = compiler.formula(formula)
         self._runs = [_run(step, k) for k, step in enumerate(compiler.program.steps)]
-        self._at = place.step
-        self.delay = place.delay / TICKS
+        self._at = value.step
+        self.delay = value.delay / TICKS
         self.state: tuple[Any, ...] = (None,) * len(self._runs)
 
     def step(self, time: float, values: Signals) -> Interval:
@@ -62,69 +76,116 @@ class Monitor:
         return found[self._at]
 
 
-def verdict(interval: Interval) -> Truth:
-    """True when all of the interval lies above 0, false when all lies below, else unknown."""
-    low, high = interval
-    if low > 0:
-        return Truth.TRUE
-    return Truth.FALSE if high < 0 else Truth.UNKNOWN
-
-
-def _run(step: Step, slot: int) -> Run:
-    """How one step of a program is done."""
+def _run(step: Operation, slot: int) -> Run:
+    """How one operation of a program is done."""
     one, other = (*step.reads, -1, -1)[:2]
+    first, second = (*step.numbers, 0.0, 0.0)[:2]
     if step.operator is not None:
-        stepped = step.operator.on(_ON)
-        if len(step.reads) == 1:
-
-            def single(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
-                after[slot], value = stepped(before[slot], now, v[one])
-                return value
-
-            return single
-
-        def several(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
-            after[slot], value = stepped(before[slot], now, v[one], v[other])
-            return value
-
-        return several
+        return _remembering(_update(step.operator), slot, one, other)
     if step.node is not None:
         name = step.node.name
         return lambda v, before, after, now, signals: _known(signals.get(name))
     if step.kind == "number":
-        number = step.numbers[0], step.numbers[0]
-        return lambda v, before, after, now, signals: number
-    function = _function(step)
+        return lambda v, before, after, now, signals: (first, first)
+    function = _FUNCTIONS[step.kind]
     if len(step.reads) == 2:
-        return lambda v, before, after, now, signals: function(v[one], v[other])
-    return lambda v, before, after, now, signals: function(v[one])
+        return lambda v, before, after, now, signals: function(v[one], v[other], first)
+    return lambda v, before, after, now, signals: function(v[one], first, second)
+
+
+def _remembering(update: Update, slot: int, one: int, other: int) -> Run:
+    """A run that takes its state from its slot and puts the next one there."""
+
+    def single(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
+        after[slot], value = update(before[slot], now, v[one])
+        return value
+
+    def pair(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Any:
+        after[slot], value = update(before[slot], now, v[one], v[other])
+        return value
+
+    return single if other < 0 else pair
 
 
 def _known(value: float | Interval | None) -> Interval:
     """What a signal says."""
-    if value.__class__ is float:
-        return UNKNOWN if isnan(value) else (value, value)
-    if value is None:
+    if isinstance(value, tuple):
+        return value
+    if value is None or value != value:  # NaN is not equal to itself
         return UNKNOWN
-    return value if isinstance(value, tuple) else (float(value), float(value))
+    return (value, value)
 
 
-def _function(step: Step) -> Callable[..., Interval]:
-    """What a step does to the intervals of one moment."""
-    a, numbers = _ON, (*step.numbers, 0.0, 0.0)
-    first, second = numbers[:2]
-    functions: dict[str, Callable[..., Interval]] = {
-        "not": a.negated,
-        "abs": a.absolute,
-        "least": a.least,
-        "most": a.most,
-        "above": lambda v: (v[0] + first + second, v[1] + first + second),
-        "below": lambda v: (-v[1] + first + second, -v[0] + first + second),
-        "compare": lambda v, w: a.shifted(a.added(v, a.negated(w)), first),
-        "+": a.added,
-        "-": lambda v, w: a.added(v, a.negated(w)),
-        "*": a.times,
-        "/": a.over,
-        "rate": lambda v, w: a.scaled(a.added(v, a.negated(w)), first),
-    }
-    return functions[step.kind]
+def _plain(function: Any) -> Callable[..., Any]:
+    """The Python function that was compiled."""
+    plain: Callable[..., Any] = function.py_func
+    return plain
+
+
+_FUNCTIONS: Mapping[str, Callable[..., Interval]] = {
+    "not": _plain(on_intervals.mirrored),
+    "above": _plain(on_intervals.shifted),
+    "below": _plain(on_intervals.mirrored),
+    "abs": _plain(on_intervals.absolute),
+    "least": lambda v, w, _: _ON.least(v, w),
+    "most": lambda v, w, _: _ON.most(v, w),
+    "compare": _plain(on_intervals.compared),
+    "+": _plain(on_intervals.added),
+    "-": _plain(on_intervals.subtracted),
+    "*": _plain(on_intervals.product),
+    "/": on_intervals.quotient,
+    "rate": _plain(on_intervals.rate),
+}
+"""What an operation without memory does: (interval, two numbers) or (two intervals, a number)."""
+
+
+def _update(operator: TemporalOperator) -> Update:
+    """How an operator takes in a sample of single intervals."""
+    match operator:
+        case Unbounded(kind=kind):
+            return _unbounded(kind)
+        case SampleAndHold(age=age):
+            recalled = _plain(on_intervals.recalled)
+
+            def hold(state: Any, now: int, v: Interval) -> tuple[Any, Interval]:
+                kept, at = state or (UNKNOWN, LONG_AGO)
+                value, kept, at = recalled(v, kept, at, now, age)
+                return (kept, at), value
+
+            return hold
+        case HysteresisLatch():
+            latched = _plain(on_intervals.latched)
+
+            def latch(
+                state: Any, now: int, enter: Interval, leave: Interval
+            ) -> tuple[Any, Interval]:
+                value, entered = latched(enter, leave, bool(state))
+                return entered, value
+
+            return latch
+        case BooleanWindow(kind=kind, high=high):
+            return SlidingWindow(kind, 0, high).on(_ON)
+    return operator.on(_ON)
+
+
+def _unbounded(kind: str) -> Update:
+    least, most = _ON.least, _ON.most
+    fold = least if kind == "always" else most
+    empty = TRUE if kind == "always" else FALSE
+
+    def single(before: Interval, v: Interval) -> Interval:
+        return fold(before, v)
+
+    def since(before: Interval, left: Interval, right: Interval) -> Interval:
+        return most(right, least(before, left))
+
+    join: Callable[..., Interval] = since if kind == "since" else single
+
+    def step(state: Any, now: int, *values: Interval) -> tuple[Any, Interval]:
+        then, before = state or (now, empty)
+        if now - then > SAMPLE_HOLD:
+            before = join(before, *(UNKNOWN,) * len(values))
+        value = join(before, *values)
+        return (now, value), value
+
+    return step

@@ -1,67 +1,46 @@
 """Operators over time: each takes in one sample and keeps an immutable state.
 
-A sample speaks from its moment to the next one, but for no longer than `REACH`: what comes after is
+A sample speaks from its moment to the next one, but for no longer than `SAMPLE_HOLD`: what comes after is
 unknown until the next sample, and so is all before the first. Windows are closed; a window holds
 every piece of time that it meets. `docs/rules.md` says it in full, and an oracle in the evaluation
 does it a second time over whole histories.
 
-What keeps but a moment of each choice of objects (`Lasting`, `SoFar`, `Recalling`, `Latching`) is
-done by `machine` for all of them at once.
+Those that retain no more than a few numbers for each choice of objects (`BooleanWindow`, `Unbounded`,
+`SampleAndHold`, `HysteresisLatch`) are done by `vm` for all choices at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from visup.rules.formula.units import ticks
-from visup.rules.monitoring.intervals import EQUAL, FALSE, TRUE, UNKNOWN, Algebra, Interval, Scalars
-from visup.rules.monitoring.sliding import Fold, Queue, Slide, changed, fresh, slide
+from visup.rules.monitoring.intervals import EQUAL, UNKNOWN, Algebra, Interval
+from visup.rules.monitoring.sliding import Fold, Queue, SlidingState, initial, mapped, slide
 
-REACH = ticks(0.5)
+SAMPLE_HOLD = ticks(0.5)
 """How long one sample speaks for what follows, microseconds."""
-SPACING = ticks(0.01)
+MIN_SPACING = ticks(0.01)
 """Samples closer than this are not taken in, which bounds what a window holds; microseconds."""
 LONG_AGO = -(2**62)
 
-Stepping = Callable[..., tuple[Any, Any]]
+Update = Callable[..., tuple[Any, Any]]
 """(state before or None at the first sample, microseconds, intervals of the parts) -> (state after,
 the interval of the whole)."""
 
 
-def most_samples(span: int) -> int:
+def max_samples(span: int) -> int:
     """Most samples of a span in microseconds, with one for each silence and one at either end."""
-    return span // SPACING + span // REACH + 2
+    return span // MIN_SPACING + span // SAMPLE_HOLD + 2
 
 
-Pick = Callable[[Any, Interval], Any]
+SelectObjects = Callable[[Any, Interval], Any]
 """(intervals, what those of new objects are) -> intervals of the objects there are now."""
 
 
-class Operator(Protocol):
-    """What remembers something of one formula or quantity from sample to sample."""
-
-    def on(self, algebra: Scalars) -> Stepping:
-        """How it takes in the values of its parts at a sample."""
-
-    @property
-    def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
-
-
-class Windowed(Protocol):
-    """An operator that keeps a whole window."""
-
-    def on(self, algebra: Algebra) -> Stepping:
-        """See `Operator`."""
-
-    def rows(self, state: Any, pick: Pick) -> Any:
-        """The same state for other objects; the new ones have no past."""
-
-
 @dataclass(frozen=True)
-class Sliding:
+class SlidingWindow:
     """The least or the greatest over a window, and `since` within one.
 
     Attributes:
@@ -74,25 +53,27 @@ class Sliding:
     low: int
     high: int
 
-    def on(self, algebra: Algebra) -> Stepping:
-        """See `Operator`."""
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its parts at a sample."""
         fold, low, high = self._fold(algebra), self.low, self.high
         nothing = algebra.constant(UNKNOWN)
         unknown = (nothing, nothing) if self._pair else nothing
 
-        def begun(state: Slide | None, now: int) -> Slide:
+        def begun(state: SlidingState | None, now: int) -> SlidingState:
             if state is None:
-                return fresh(now, unknown)
-            if now - state[0] > REACH:
-                return slide(state, state[0] + REACH, unknown, low, high, fold)[0]
+                return initial(now, unknown)
+            if now - state[0] > SAMPLE_HOLD:
+                return slide(state, state[0] + SAMPLE_HOLD, unknown, low, high, fold)[0]
             return state
 
-        def single(state: Slide | None, now: int, value: Any) -> tuple[Slide, Any]:
-            if state is None or now - state[0] > REACH:
+        def single(state: SlidingState | None, now: int, value: Any) -> tuple[SlidingState, Any]:
+            if state is None or now - state[0] > SAMPLE_HOLD:
                 state = begun(state, now)
             return slide(state, now, value, low, high, fold)
 
-        def pair(state: Slide | None, now: int, left: Any, right: Any) -> tuple[Slide, Any]:
+        def pair(
+            state: SlidingState | None, now: int, left: Any, right: Any
+        ) -> tuple[SlidingState, Any]:
             state, joined = slide(begun(state, now), now, (right, left), low, high, fold)
             return state, joined[0]
 
@@ -116,18 +97,18 @@ class Sliding:
 
     @property
     def kept(self) -> int:
-        """See `Operator`."""
-        return (2 if self._pair else 1) * (2 * most_samples(self.high) + 2)
+        """Most intervals that the state holds for one choice of objects."""
+        return (2 if self._pair else 1) * (2 * max_samples(self.high) + 2)
 
-    def rows(self, state: Slide, pick: Pick) -> Slide:
-        """See `Windowed`."""
+    def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
+        """The same state for other objects; the new ones have no past."""
         if self._pair:
-            return changed(state, lambda v: (pick(v[0], UNKNOWN), pick(v[1], UNKNOWN)))
-        return changed(state, lambda v: pick(v, UNKNOWN))
+            return mapped(state, lambda v: (pick(v[0], UNKNOWN), pick(v[1], UNKNOWN)))
+        return mapped(state, lambda v: pick(v, UNKNOWN))
 
 
 @dataclass(frozen=True)
-class Lasting:
+class BooleanWindow:
     """`for` and `within` of what is no matter of degree: its state is one moment, not a window.
 
     Attributes:
@@ -138,25 +119,14 @@ class Lasting:
     kind: str
     high: int
 
-    def on(self, algebra: Scalars) -> Stepping:
-        """See `Operator`; of single intervals it is a window like any other."""
-        return Sliding(self.kind, 0, self.high).on(algebra)
-
     @property
     def kept(self) -> int:
-        """See `Operator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 1
 
 
-class SoFarState(NamedTuple):
-    """Time of the last sample, and the fold of all samples."""
-
-    then: int
-    value: Any
-
-
 @dataclass(frozen=True)
-class SoFar:
+class Unbounded:
     """`always`, `once` and `since` over all that was watched.
 
     Attributes:
@@ -165,39 +135,16 @@ class SoFar:
 
     kind: str
 
-    def on(self, algebra: Scalars) -> Stepping:
-        """See `Operator`."""
-        least, most = algebra.least, algebra.most
-
-        def join(before: Interval, values: tuple[Interval, ...]) -> Interval:
-            if self.kind == "since":
-                return most(values[1], least(before, values[0]))
-            return (least if self.kind == "always" else most)(before, values[0])
-
-        def step(state: SoFarState | None, now: int, *values: Interval) -> tuple[Any, Any]:
-            before = self.empty if state is None else state.value
-            if state is not None and now - state.then > REACH:
-                before = join(before, (UNKNOWN,) * len(values))
-            value = join(before, values)
-            return SoFarState(now, value), value
-
-        return step
-
-    @property
-    def empty(self) -> Interval:
-        """What it comes to before the first sample."""
-        return TRUE if self.kind == "always" else FALSE
-
     @property
     def kept(self) -> int:
-        """See `Operator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 1
 
 
 MAYBE: Interval = (0.0, 1.0)
 
 
-class Tally(NamedTuple):
+class CountState(NamedTuple):
     """How much has been counted.
 
     Attributes:
@@ -220,7 +167,7 @@ class Tally(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Counting:
+class SlidingCount:
     """`f in 60 % of 2 s`, `f in 3 of 5 samples`: how much above the least it was true.
 
     Attributes:
@@ -233,20 +180,20 @@ class Counting:
     span: int
     samples: bool
 
-    def on(self, algebra: Algebra) -> Stepping:
-        """See `Operator`."""
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its part at a sample."""
         a, maybe = algebra, algebra.constant(MAYBE)
         # Counted in whole samples or microseconds, so that what just suffices is told exactly.
         enough = -self.least if self.samples else -round(self.least * self.span)
 
-        def step(state: Tally | None, now: int, value: Any) -> tuple[Tally, Any]:
+        def step(state: CountState | None, now: int, value: Any) -> tuple[CountState, Any]:
             held = a.held(value)
             if state is None:
                 clock, none = 0 if self.samples else now, a.constant((0.0, 0.0))
-                state = Tally(now, clock, clock, none, maybe, (clock, (none, maybe)), Queue())
-            elif now - state.then > REACH:
-                moment = state.clock + (0 if self.samples else REACH)
-                state = self._added(a, state, state.then + REACH, moment, maybe)
+                state = CountState(now, clock, clock, none, maybe, (clock, (none, maybe)), Queue())
+            elif now - state.then > SAMPLE_HOLD:
+                moment = state.clock + (0 if self.samples else SAMPLE_HOLD)
+                state = self._added(a, state, state.then + SAMPLE_HOLD, moment, maybe)
             clock = state.clock if self.samples else now
             state = self._added(a, state, now, clock, held)
             start = state.clock - self.span
@@ -260,7 +207,7 @@ class Counting:
 
         return step
 
-    def _added(self, a: Algebra, state: Tally, now: int, clock: int, held: Any) -> Tally:
+    def _added(self, a: Algebra, state: CountState, now: int, clock: int, held: Any) -> CountState:
         """The tally with a sample: of samples it counts at once, of time while it stands."""
         if self.samples:
             clock, total, rate = clock + 1, a.tallied(state.total, held), a.constant((0.0, 0.0))
@@ -268,15 +215,15 @@ class Counting:
             passed = a.scaled(state.rate, float(clock - state.clock))
             total, rate = a.tallied(state.total, passed), held
         queue = state.queue.push(clock, (total, rate))
-        return Tally(now, clock, state.born, total, rate, state.begin, queue)
+        return CountState(now, clock, state.born, total, rate, state.begin, queue)
 
     @property
     def kept(self) -> int:
-        """See `Operator`."""
-        return 2 * ((self.span if self.samples else most_samples(self.span)) + 2)
+        """Most intervals that the state holds for one choice of objects."""
+        return 2 * ((self.span if self.samples else max_samples(self.span)) + 2)
 
-    def rows(self, state: Tally, pick: Pick) -> Tally:
-        """See `Windowed`."""
+    def rows(self, state: CountState, pick: SelectObjects) -> CountState:
+        """The same state for other objects; the new ones have no past."""
 
         def total(clock: int, value: Any) -> Any:
             return pick(value, (0.0, float(clock - state.born)))
@@ -293,15 +240,8 @@ class Counting:
         )
 
 
-class Remembered(NamedTuple):
-    """What was known last, and when; microseconds."""
-
-    value: Interval
-    time: int
-
-
 @dataclass(frozen=True)
-class Recalling:
+class SampleAndHold:
     """`last(x, 0.5 s)`: what was known last, while it is not too old.
 
     Attributes:
@@ -310,36 +250,25 @@ class Recalling:
 
     age: int
 
-    def on(self, algebra: Scalars) -> Stepping:
-        """See `Operator`."""
-
-        def step(state: Remembered | None, now: int, value: Interval) -> tuple[Any, Any]:
-            old = state or Remembered(UNKNOWN, LONG_AGO)
-            kept = Remembered(value, now) if value != UNKNOWN else old
-            return kept, kept.value if now - kept.time <= self.age else UNKNOWN
-
-        return step
-
     @property
     def kept(self) -> int:
-        """See `Operator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 2
 
 
 @dataclass(frozen=True)
-class Latching:
+class HysteresisLatch:
     """A comparison with two thresholds: the second one counts from when it is true to when it is false."""
-
-    def on(self, algebra: Scalars) -> Stepping:
-        """See `Operator`; the values are those by the threshold to enter and to leave."""
-
-        def step(state: bool | None, now: int, enter: Interval, leave: Interval) -> tuple[Any, Any]:
-            result = leave if state else enter
-            return result[0] > 0 or (bool(state) and result[1] >= 0), result
-
-        return step
 
     @property
     def kept(self) -> int:
-        """See `Operator`."""
+        """Most intervals that the state holds for one choice of objects."""
         return 1
+
+
+PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch
+"""Operators whose state is a few numbers for each choice of objects."""
+WindowOperator = SlidingWindow | SlidingCount
+"""Operators that retain a whole window."""
+TemporalOperator = PointOperator | WindowOperator
+"""What remembers something of one formula or quantity from sample to sample."""

@@ -67,7 +67,7 @@ class Queue(NamedTuple):
         return queue
 
 
-class Slide(NamedTuple):
+class SlidingState(NamedTuple):
     """The state of a window.
 
     Attributes:
@@ -89,12 +89,14 @@ class Slide(NamedTuple):
     head: Any
 
 
-def fresh(now: int, value: Any) -> Slide:
+def initial(now: int, value: Any) -> SlidingState:
     """The state before any sample, with what is known of the time before."""
-    return Slide(now, value, None, None, None, Queue(), value)
+    return SlidingState(now, value, None, None, None, Queue(), value)
 
 
-def slide(state: Slide, now: int, value: Any, low: int, high: int, fold: Fold) -> tuple[Slide, Any]:
+def slide(
+    state: SlidingState, now: int, value: Any, low: int, high: int, fold: Fold
+) -> tuple[SlidingState, Any]:
     """Take in one sample.
 
     Args:
@@ -132,7 +134,7 @@ def slide(state: Slide, now: int, value: Any, low: int, high: int, fold: Fold) -
         # What was folded of it and all that follow it is the fold of all that is left now.
         _, current, head, front = front
     result = head if back is None else fold(head, newer)
-    return Slide(now, current, front, back, newer, waiting, head), result
+    return SlidingState(now, current, front, back, newer, waiting, head), result
 
 
 def _next(queue: Queue, limit: int) -> tuple[Queue, tuple[int, Any] | None]:
@@ -157,7 +159,7 @@ def _turned(back: Cell, fold: Fold) -> tuple[Any, ...]:
     return front
 
 
-def changed(state: Slide, change: Change) -> Slide:
+def mapped(state: SlidingState, change: Change) -> SlidingState:
     """The same state with every value changed, as when objects come and go."""
     front: Cell = None
     for time, value, folded in reversed(_listed(state.front, 3)):
@@ -165,7 +167,7 @@ def changed(state: Slide, change: Change) -> Slide:
     back: Cell = None
     for time, value in reversed(_listed(state.back, 2)):
         back = (time, change(value), back)
-    return Slide(
+    return SlidingState(
         state.then,
         change(state.current),
         front,

@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.rules.monitoring.intervals import Box, Interval
+from visup.rules.monitoring.intervals import Interval, IntervalArray
 from visup.rules.monitoring.operators import (
-    REACH,
-    Lasting,
-    Latching,
-    Recalling,
-    SoFar,
-    Stepping,
-    Windowed,
+    SAMPLE_HOLD,
+    BooleanWindow,
+    PointOperator,
+    Unbounded,
+    Update,
+    WindowOperator,
 )
 from visup.rules.monitoring.vm import Floats
 
@@ -37,7 +36,7 @@ class States(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Moments:
+class PointSlot:
     """Where the state of an operator stands that keeps but a moment.
 
     Attributes:
@@ -47,33 +46,44 @@ class Moments:
         fills: What each of its parts, one number for each choice of objects, is before the first sample.
     """
 
-    operator: Lasting | SoFar | Latching | Recalling
+    operator: PointOperator
     axes: int
     begin: int
     fills: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class WindowSlot:
     """An operator that keeps a window.
 
     Attributes:
         operator: The operator.
         step: How it takes in a sample.
         axes: How many axes its objects have.
-        reads: Where the intervals of its parts stand.
-        place: Where its own stand.
+        reads: Where the intervals of its parts begin.
+        place: Where its own begin.
+        cells: How many intervals each of these has.
     """
 
-    operator: Windowed
-    step: Stepping
+    operator: WindowOperator
+    step: Update
     axes: int
-    reads: tuple[slice, ...]
-    place: slice
+    reads: tuple[int, ...]
+    place: int
+    cells: int
+
+    def update(self, state: Any, now: int, arena: Floats) -> Any:
+        """The state after a sample, whose intervals it writes."""
+        at, size = self.place, 2 * self.cells
+        # What is retained must not change when the arena does.
+        parts = [arena[r : r + size].reshape(2, -1).copy() for r in self.reads]
+        state, value = self.step(state, now, *parts)
+        arena[at : at + size].reshape(2, -1)[:] = value
+        return state
 
 
 @dataclass(frozen=True, slots=True)
-class Memory:
+class StateLayout:
     """Where the states of a program's operators stand for a number of objects.
 
     Attributes:
@@ -83,8 +93,8 @@ class Memory:
     """
 
     n: int
-    moments: tuple[Moments, ...]
-    windows: tuple[Window, ...]
+    moments: tuple[PointSlot, ...]
+    windows: tuple[WindowSlot, ...]
 
     def fresh(self) -> States:
         """The states before the first sample."""
@@ -103,17 +113,17 @@ class Memory:
             width = self.n**m.axes
             first = moments[m.begin : m.begin + width]
             second = moments[m.begin + width : m.begin + 2 * width]
-            if isinstance(m.operator, Lasting):
+            if isinstance(m.operator, BooleanWindow):
                 first[:] = np.inf
                 second[second == np.inf] = end
-            elif isinstance(m.operator, SoFar):
+            elif isinstance(m.operator, Unbounded):
                 if m.operator.kind != "once":
                     first[:] = -np.inf
                 if m.operator.kind != "always":
                     second[:] = np.inf
         return moments
 
-    def rerowed(self, states: States, new: Memory, rows: NDArray[np.intp], now: int) -> States:
+    def rerowed(self, states: States, new: StateLayout, rows: NDArray[np.intp], now: int) -> States:
         """The states for other objects.
 
         Args:
@@ -123,9 +133,9 @@ class Memory:
             now: Microseconds of the sample at which they change.
         """
         then, moments, windows = states
-        if then is not None and now - then > REACH:
+        if then is not None and now - then > SAMPLE_HOLD:
             # The silence is not part of what was watched of those that are new.
-            moments, then = self.silenced(moments, then + REACH), now - REACH
+            moments, then = self.silenced(moments, then + SAMPLE_HOLD), now - SAMPLE_HOLD
         chosen = [_chosen(rows, self.n, axes) for axes in range(4)]
         after = new.fresh().moments
         for m, other in zip(self.moments, new.moments, strict=True):
@@ -138,7 +148,9 @@ class Memory:
             then,
             after,
             tuple(
-                None if s is None else w.operator.rows(s, _picker(chosen[w.axes], self.n**w.axes))
+                s
+                if s is None or not w.axes
+                else w.operator.rows(s, _picker(chosen[w.axes], self.n**w.axes))
                 for s, w in zip(windows, self.windows, strict=True)
             ),
         )
@@ -154,12 +166,14 @@ def _chosen(rows: NDArray[np.intp], count: int, axes: int) -> NDArray[np.intp]:
     return np.where(fresh, -1, at).ravel()
 
 
-def _picker(chosen: NDArray[np.intp], cells: int) -> Callable[[Box, Interval], Box]:
+def _picker(
+    chosen: NDArray[np.intp], cells: int
+) -> Callable[[IntervalArray, Interval], IntervalArray]:
     """Takes the intervals of some choices of objects, of the new ones what they are before all samples."""
     fresh = chosen < 0
     at = np.maximum(chosen, 0)
 
-    def pick(value: Box, fill: Interval) -> Box:
+    def pick(value: IntervalArray, fill: Interval) -> IntervalArray:
         out = np.empty((2, len(chosen)))
         if cells:
             out[:] = np.broadcast_to(value, (2, cells))[:, at]

@@ -14,9 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
+from visup.rules.monitoring._interval_jit import (
+    absolute,
+    added,
+    compared,
+    latched,
+    mirrored,
+    product,
+    quotient,
+    rate,
+    recalled,
+    shifted,
+    subtracted,
+)
 
 Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
+Ints = NDArray[np.int64]
 Codes = NDArray[np.int8]
 
 (OP, DEST, A, B, CELLS, STATE, MASK_A, MASK, AXIS, APART) = range(10)
@@ -35,7 +48,7 @@ CHOICE_BITS = 32
 
 @compiled
 def run(
-    code: Whole,
+    code: Ints,
     numbers: Floats,
     begin: int,
     end: int,
@@ -75,62 +88,50 @@ def run(
                 arena[out + k] = max(arena[a + k], arena[b + k])
         elif op in (NOT, BELOW):
             for k in range(c):
-                arena[out + k] = -arena[a + c + k] + p + q
-                arena[out + c + k] = -arena[a + k] + p + q
+                v = mirrored((arena[a + k], arena[a + c + k]), p, q)
+                arena[out + k], arena[out + c + k] = v
         elif op == SHIFT:
-            for k in range(2 * c):
-                arena[out + k] = arena[a + k] + p + q
+            for k in range(c):
+                v = shifted((arena[a + k], arena[a + c + k]), p, q)
+                arena[out + k], arena[out + c + k] = v
         elif op == NUMBER:
             arena[out], arena[out + 1] = p, p
         elif op == FACT:
-            _told(facts, code[i], n, arena)
+            _read_facts(facts, code[i], n, arena)
         elif op in (SPREAD, SOME, EVERY):
-            _along(code[i], n, arena)
+            _along_axis(code[i], n, arena)
         elif op >= ALWAYS:
-            if _kept(code[i], now, p, arena, before, after):
+            if _update_states(code[i], now, p, arena, before, after):
                 changed = True
         else:
-            _computed(op, c, a, b, p, out, arena)
+            _arithmetic(op, c, a, b, p, out, arena)
     return changed
 
 
 @compiled
-def _computed(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floats) -> None:
-    """Arithmetic of quantities; what is no number is unknown, 0 times what is without end is 0."""
+def _arithmetic(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floats) -> None:
+    """Arithmetic of quantities; see `_interval_jit`."""
     for k in range(c):
-        low, high = arena[a + k], arena[a + c + k]
-        other_low, other_high = arena[b + k], arena[b + c + k]
+        v, w = (arena[a + k], arena[a + c + k]), (arena[b + k], arena[b + c + k])
         if op == ABS:
-            low, high = max(max(low, -high), 0.0), max(-low, high)
-        elif op == OVER and other_low <= 0.0 <= other_high:
-            low, high = -np.inf, np.inf
-        elif op in (TIMES, OVER):
-            if op == OVER:
-                other_low, other_high = 1.0 / other_high, 1.0 / other_low
-            one, two = _product(low, other_low), _product(low, other_high)
-            three, four = _product(high, other_low), _product(high, other_high)
-            low = min(min(one, two), min(three, four))
-            high = max(max(one, two), max(three, four))
+            v = absolute(v, p, 0.0)
+        elif op == PLUS:
+            v = added(v, w, p)
+        elif op == MINUS:
+            v = subtracted(v, w, p)
+        elif op == COMPARE:
+            v = compared(v, w, p)
+        elif op == RATE:
+            v = rate(v, w, p)
+        elif op == TIMES:
+            v = product(v, w, p)
         else:
-            if op == PLUS:
-                low, high = low + other_low, high + other_high
-            else:
-                low, high = low - other_high, high - other_low
-            low, high = -np.inf if low != low else low, np.inf if high != high else high
-            if op == COMPARE:
-                low, high = low + p, high + p
-            elif op == RATE:
-                low, high = low * p, high * p
-        arena[out + k], arena[out + c + k] = low, high
+            v = quotient(v, w, p)
+        arena[out + k], arena[out + c + k] = v
 
 
 @compiled
-def _product(p: float, q: float) -> float:
-    return 0.0 if p == 0.0 or q == 0.0 else p * q
-
-
-@compiled
-def _told(facts: Codes, row: Whole, n: int, arena: Floats) -> None:
+def _read_facts(facts: Codes, row: Ints, n: int, arena: Floats) -> None:
     """What is true is [inf, inf], what is false [-inf, -inf]; the other way round if so asked."""
     c, out, turned = row[CELLS], row[DEST], row[AXIS]
     for k in range(c):
@@ -149,7 +150,7 @@ def _strides(mask: int, n: int) -> tuple[int, int, int]:
 
 
 @compiled
-def _along(row: Whole, n: int, arena: Floats) -> None:
+def _along_axis(row: Ints, n: int, arena: Floats) -> None:
     """The same intervals for more objects, on which they do not depend.
 
     Or the greatest (`exists`) or the least (`forall`) along an axis, of objects that are not left out.
@@ -181,56 +182,82 @@ def _along(row: Whole, n: int, arena: Floats) -> None:
 
 
 @compiled
-def _kept(
-    row: Whole, now: float, span: float, arena: Floats, before: Floats, after: Floats
+def _update_states(
+    row: Ints, now: float, span: float, arena: Floats, before: Floats, after: Floats
 ) -> bool:
-    """One operator that keeps but a moment of each choice of objects."""
-    op, c, out, a, b, changed = row[OP], row[CELLS], row[DEST], row[A], row[B], False
-    state = row[STATE]
+    """One operator that retains a few numbers of each choice of objects; whether any has changed."""
+    op = row[OP]
     if op == RECALL:
-        for k in range(c):
-            known = arena[a + k] > -np.inf or arena[a + c + k] < np.inf
-            for part in range(2):
-                kept = before[state + part * c + k]
-                after[state + part * c + k] = arena[a + part * c + k] if known else kept
-            at = state + 2 * c + k
-            after[at] = now if known else before[at]
-            recent = now - after[at] <= span
-            arena[out + k] = after[state + k] if recent else -np.inf
-            arena[out + c + k] = after[state + c + k] if recent else np.inf
-            changed |= known
-        return changed
+        return _recall(row, now, span, arena, before, after)
     if op == LATCH:
-        for k in range(c):
-            entered = before[state + k] > 0.0
-            read = b if entered else a
-            low, high = arena[read + k], arena[read + c + k]
-            arena[out + k], arena[out + c + k] = low, high
-            after[state + k] = 1.0 if low > 0.0 or (entered and high >= 0.0) else 0.0
-            changed |= after[state + k] != before[state + k]
-        return changed
+        return _latch(row, arena, before, after)
+    if op in (LASTS, HAPPENED):
+        return _boolean_window(row, now, span, arena, before, after)
+    return _accumulate(row, arena, before, after)
+
+
+@compiled
+def _recall(
+    row: Ints, now: float, span: float, arena: Floats, before: Floats, after: Floats
+) -> bool:
+    c, out, a, low, changed = row[CELLS], row[DEST], row[A], row[STATE], False
+    for k in range(c):
+        high, at = low + c + k, low + 2 * c + k
+        v, kept = (arena[a + k], arena[a + c + k]), (before[low + k], before[high])
+        v, kept, then = recalled(v, kept, before[at], now, span)
+        arena[out + k], arena[out + c + k] = v
+        after[low + k], after[high], after[at] = kept[0], kept[1], then
+        changed |= then != before[at]
+    return changed
+
+
+@compiled
+def _latch(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
+    c, out, a, b, state, changed = row[CELLS], row[DEST], row[A], row[B], row[STATE], False
+    for k in range(c):
+        enter, leave = (arena[a + k], arena[a + c + k]), (arena[b + k], arena[b + c + k])
+        v, entered = latched(enter, leave, before[state + k] > 0.0)
+        arena[out + k], arena[out + c + k] = v
+        after[state + k] = 1.0 if entered else 0.0
+        changed |= after[state + k] != before[state + k]
+    return changed
+
+
+@compiled
+def _boolean_window(
+    row: Ints, now: float, span: float, arena: Floats, before: Floats, after: Floats
+) -> bool:
+    """Since when either bound has been as wanted: infinite while it is, else up to when it was not."""
+    op, c, out, a, state, changed = row[OP], row[CELLS], row[DEST], row[A], row[STATE], False
     for k in range(2 * c):
         kept, value, at = before[state + k], arena[a + k], out + k
-        if op in (LASTS, HAPPENED):
-            # Up to when either bound was not as wanted; without end while it is not. Of `within` it
-            # is the upper bound that what is not known makes so, and which stands first.
-            if op == HAPPENED:
-                other = k + c if k < c else k - c
-                value, at = -arena[a + other], out + other
-            new = np.inf if value < 0.0 else now if kept == np.inf else kept
-            arena[at] = -np.inf if (new > now - span) == (op == LASTS) else np.inf
-        else:
-            new = max(kept, value) if op == ONCE else min(kept, value)
-            if op == SINCE:
-                new = max(arena[b + k], new)
-            arena[at] = new
+        if op == HAPPENED:
+            # Of `within` it is the upper bound that what is not known widens, and which stands first.
+            other = k + c if k < c else k - c
+            value, at = -arena[a + other], out + other
+        new = np.inf if value < 0.0 else now if kept == np.inf else kept
+        arena[at] = -np.inf if (new > now - span) == (op == LASTS) else np.inf
         after[state + k] = new
         changed |= new != kept
     return changed
 
 
 @compiled
-def choices(rules: Whole, n: int, arena: Floats, found: Whole) -> int:
+def _accumulate(row: Ints, arena: Floats, before: Floats, after: Floats) -> bool:
+    """`always`, `once`, `since` over all samples."""
+    op, out, a, b, state, changed = row[OP], row[DEST], row[A], row[B], row[STATE], False
+    for k in range(2 * row[CELLS]):
+        kept, value = before[state + k], arena[a + k]
+        new = max(kept, value) if op == ONCE else min(kept, value)
+        if op == SINCE:
+            new = max(arena[b + k], new)
+        arena[out + k] = after[state + k] = new
+        changed |= new != kept
+    return changed
+
+
+@compiled
+def find_true(rules: Ints, n: int, arena: Floats, found: Ints) -> int:
     """Every choice of objects for which a rule is true and not suspended.
 
     Args:

@@ -25,11 +25,11 @@ _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
 )
 
 
-def inputs(word: str) -> frozenset[str]:
+def percepts_read(word: str) -> frozenset[str]:
     """Kinds of percept that a word reads: regions, unless it is known to read something else."""
     return _SPECIAL.get(word, frozenset({"region"}))
 
 
-def blind(mind: Mind, word: str) -> bool:
+def inputs_missing(mind: Mind, word: str) -> bool:
     """Whether something that a word reads is unknown now."""
-    return bool(mind.unknown) and not mind.unknown.isdisjoint(inputs(word))
+    return bool(mind.unknown) and not mind.unknown.isdisjoint(percepts_read(word))

@@ -21,7 +21,7 @@ from visup.rules.wording.sentences import short
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
 YES, MAYBE, NO = 1, 0, -1
-CODE = {Truth.TRUE: YES, Truth.UNKNOWN: MAYBE, Truth.FALSE: NO}
+TRUTH_CODE = {Truth.TRUE: YES, Truth.UNKNOWN: MAYBE, Truth.FALSE: NO}
 
 ITSELF = frozenset({"equal", "outlines_equal"})
 SIGMAS = 1.0
@@ -31,7 +31,7 @@ RELATION_NAMES = (*NAMES, "coupled")
 """Relations between two objects that rules may name."""
 
 
-class Facts:
+class Snapshot:
     """One mind as rules see it; made once for each step.
 
     Args:
@@ -90,7 +90,7 @@ class Facts:
 
     def relations(self, names: tuple[str, ...]) -> Codes:
         """(k, n, n) codes of several relations, looked up in one pass; not of couplings."""
-        tables = self.mind.truths_of(names, self.ids)
+        tables = self.mind.truth_tables(names, self.ids)
         # An object is equal to itself, and nothing else.
         n = len(self.ids)
         tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)
@@ -168,7 +168,7 @@ def code(value: bool) -> int:
     return YES if value else NO
 
 
-def exactly(values: Floats) -> Floats:
+def exact(values: Floats) -> Floats:
     """(2, n) intervals of known values; NaN becomes unknown."""
     known = values.tolist()
     return np.array(
@@ -176,7 +176,7 @@ def exactly(values: Floats) -> Floats:
     )
 
 
-def between(low: Floats, high: Floats) -> Floats:
+def interval_between(low: Floats, high: Floats) -> Floats:
     """(2, ...) intervals; NaN becomes unknown."""
     both = np.empty((2, *low.shape))
     # Of NaN and a number, these take the number.

@@ -11,22 +11,22 @@ from typing import Any
 import numpy as np
 
 from visup.agent import HealthStatus, ObjectBelief, Presence, Region
-from visup.rules.formula.units import LENGTH, SHARE, SPEED, TIME, TURNING, Dimension
+from visup.rules.formula.units import ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.snapshot import (
-    CODE,
     MAYBE,
     NO,
     RELATION_NAMES,
     SIGMAS,
+    TRUTH_CODE,
     YES,
     Codes,
-    Facts,
     Floats,
-    between,
+    Snapshot,
     code,
-    exactly,
+    exact,
+    interval_between,
 )
 from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.relations.kinematics import RelationSettings
@@ -46,13 +46,13 @@ IMPLIED = MappingProxyType(
 STILL_SPEED = RelationSettings().still_speed
 KEEP_OUT = "keep_out"
 """Zones whose names begin so are forbidden to all."""
-KINDS = ("region", "hypothesis", "depth", "health")
+PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
 SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
 
 
 @dataclass(frozen=True, slots=True)
-class Word:
+class PredicateDefinition:
     """A word of the rule language that stands for something true, false or unknown.
 
     Attributes:
@@ -68,7 +68,7 @@ class Word:
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class QuantityDefinition:
     """A word of the rule language that stands for a number.
 
     Attributes:
@@ -86,7 +86,7 @@ class Quantity:
     @property
     def unit(self) -> str:
         """The unit in which it is told."""
-        return {TIME: "s", LENGTH: "px", SPEED: "px/s", TURNING: "deg/s", SHARE: "%"}[
+        return {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}[
             self.dimension
         ]
 
@@ -100,11 +100,11 @@ class Vocabulary:
         quantities: Numbers.
     """
 
-    words: Mapping[str, Word]
-    quantities: Mapping[str, Quantity]
+    words: Mapping[str, PredicateDefinition]
+    quantities: Mapping[str, QuantityDefinition]
 
 
-def expected(facts: Facts, name: str) -> Codes:
+def expected(facts: Snapshot, name: str) -> Codes:
     """Whether an active task expects a relation between two objects now."""
     codes, fine, row = facts.pairs(NO), IMPLIED.get(name) or {name}, facts.row
     for task in facts.mind.tasks:
@@ -116,26 +116,26 @@ def expected(facts: Facts, name: str) -> Codes:
     return codes
 
 
-def engaged(facts: Facts) -> Codes:
+def engaged(facts: Snapshot) -> Codes:
     """Whether an active task expects something of an object and another one now."""
     wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
     return facts.among(wanted)
 
 
-def unexpected(facts: Facts) -> Codes:
+def unexpected(facts: Snapshot) -> Codes:
     """Whether no active task explains an object; without a task nothing is unexpected."""
     told = [task.unexplained for task in facts.mind.tasks]
     nobody = set(told[0]).intersection(*told[1:]) if told else ()
     return facts.among(nobody)
 
 
-def is_actor(facts: Facts) -> Codes:
+def is_actor(facts: Snapshot) -> Codes:
     """Whether an object plays an actor of an active task."""
     bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
     return facts.among(bound)
 
 
-def is_named(facts: Facts, name: str) -> Codes:
+def is_named(facts: Snapshot, name: str) -> Codes:
     """Whether an object is believed to be that model or actor; unknown while not identified."""
 
     def look(b: ObjectBelief) -> int:
@@ -144,7 +144,7 @@ def is_named(facts: Facts, name: str) -> Codes:
     return facts.each(look)
 
 
-def moving(facts: Facts) -> Codes:
+def moving(facts: Snapshot) -> Codes:
     """Whether an object moves in the image."""
     still = STILL_SPEED * image_diagonal(facts.mind.frame_size)
     speeds = facts.one("speed").tolist()
@@ -152,7 +152,7 @@ def moving(facts: Facts) -> Codes:
     return np.array(codes, dtype=np.int8)
 
 
-def whole(facts: Facts) -> Codes:
+def whole(facts: Snapshot) -> Codes:
     """Whether an object is clear of the image border."""
     width, height = facts.mind.frame_size
 
@@ -163,28 +163,28 @@ def whole(facts: Facts) -> Codes:
     return facts.each(lambda b: code(clear(b.region)))
 
 
-def first_contact(facts: Facts) -> Codes:
+def first_contact(facts: Snapshot) -> Codes:
     """Whether the second is what the first would meet first."""
     return facts.first_contact
 
 
-def lost(facts: Facts) -> Codes:
+def lost(facts: Snapshot) -> Codes:
     """Whether an object is out of sight and nothing tells why."""
     known = presence_memory(facts.mind).of
     return facts.among([i for i in facts.ids if i in known and known[i].told == "lost"])
 
 
-def stale(facts: Facts, kind: str) -> Codes:
+def stale(facts: Snapshot, kind: str) -> Codes:
     """Whether percepts of a kind could not be observed in this step."""
     return np.array(code(kind in facts.mind.unknown), dtype=np.int8)
 
 
-def healthy(facts: Facts) -> Codes:
+def healthy(facts: Snapshot) -> Codes:
     """Whether the image is sound."""
     return np.array(code(facts.mind.health.status is HealthStatus.OK), dtype=np.int8)
 
 
-def depth_difference(facts: Facts) -> Floats:
+def depth_difference(facts: Snapshot) -> Floats:
     """Difference of depth as a share of the smaller one; both depths within their deviations."""
     depth = facts.one("depth")
     if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
@@ -194,10 +194,10 @@ def depth_difference(facts: Facts) -> Floats:
     least = np.minimum(depth[:, None], depth[None])
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(least > 0, 1.0 / least, np.nan)
-        return between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
+        return interval_between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
 
 
-def spin(facts: Facts) -> Floats:
+def spin(facts: Snapshot) -> Floats:
     """How fast an object turns about itself, degrees per second.
 
     Its deviation is that of one course of views; while another is nearly as likely the rate is unknown.
@@ -208,13 +208,13 @@ def spin(facts: Facts) -> Floats:
         return facts.unknown(1)
     rate = np.array([np.nan if s is None else s.rate for s in found], dtype=float)
     sigma = np.array([0.0 if s is None else SIGMAS * s.sigma for s in found], dtype=float)
-    return between(np.maximum(rate - sigma, 0.0), rate + sigma)
+    return interval_between(np.maximum(rate - sigma, 0.0), rate + sigma)
 
 
-def _since(moment: str) -> Callable[[Facts], Floats]:
+def _since(moment: str) -> Callable[[Snapshot], Floats]:
     read = attrgetter(moment)
 
-    def look(facts: Facts) -> Floats:
+    def look(facts: Snapshot) -> Floats:
         now = facts.mind.time
         seconds = [now - read(b) for b in facts.beliefs]
         return np.array((seconds, seconds))
@@ -222,11 +222,11 @@ def _since(moment: str) -> Callable[[Facts], Floats]:
     return look
 
 
-def _presence(wanted: Presence) -> Callable[[Facts], Codes]:
+def _presence(wanted: Presence) -> Callable[[Snapshot], Codes]:
     return lambda facts: facts.among([b.id for b in facts.beliefs if b.presence is wanted])
 
 
-def in_forbidden_zone(facts: Facts) -> Codes:
+def in_forbidden_zone(facts: Snapshot) -> Codes:
     """Whether some part of an object is in a zone that is forbidden to all."""
     zones = [z.name for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
     if not zones:
@@ -235,73 +235,89 @@ def in_forbidden_zone(facts: Facts) -> Codes:
     return codes
 
 
-def _zone(question: str) -> Callable[[Facts, str], Codes]:
+def _zone(question: str) -> Callable[[Snapshot, str], Codes]:
     return lambda facts, zone: facts.each(
-        lambda b: CODE[zone_truth(facts.mind, question, b.id, zone)]
+        lambda b: TRUTH_CODE[zone_truth(facts.mind, question, b.id, zone)]
     )
 
 
-def _relation(name: str) -> Word:
+def _relation(name: str) -> PredicateDefinition:
     meaning = f"{name.replace('_', ' ')}, a relation"
-    return Word(_TWO, lambda facts: facts.related(name), meaning)
+    return PredicateDefinition(_TWO, lambda facts: facts.related(name), meaning)
 
 
 _ONE, _TWO = ("object",), ("object", "object")
 
-WORDS: MappingProxyType[str, Word] = MappingProxyType(
+PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
     {
         **{name: _relation(name) for name in RELATION_NAMES},
-        "expected": Word(
+        "expected": PredicateDefinition(
             ("relation", "object", "object"), expected, "an active task expects the relation"
         ),
-        "engaged": Word(_ONE, engaged, "an active task expects something of the object now"),
-        "unexpected": Word(_ONE, unexpected, "no active task explains the object"),
-        "actor": Word(_ONE, is_actor, "the object plays an actor of an active task"),
-        "named": Word(("object", "name"), is_named, "the object is believed to be that"),
-        "seen": Word(_ONE, _presence(Presence.SEEN), "the object is seen"),
-        "hidden": Word(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
-        "lost": Word(_ONE, lost, "it is out of sight and nothing tells why"),
-        "moving": Word(_ONE, moving, "it moves in the image"),
-        "whole": Word(_ONE, whole, "it is clear of the image border"),
+        "engaged": PredicateDefinition(
+            _ONE, engaged, "an active task expects something of the object now"
+        ),
+        "unexpected": PredicateDefinition(_ONE, unexpected, "no active task explains the object"),
+        "actor": PredicateDefinition(_ONE, is_actor, "the object plays an actor of an active task"),
+        "named": PredicateDefinition(
+            ("object", "name"), is_named, "the object is believed to be that"
+        ),
+        "seen": PredicateDefinition(_ONE, _presence(Presence.SEEN), "the object is seen"),
+        "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
+        "lost": PredicateDefinition(_ONE, lost, "it is out of sight and nothing tells why"),
+        "moving": PredicateDefinition(_ONE, moving, "it moves in the image"),
+        "whole": PredicateDefinition(_ONE, whole, "it is clear of the image border"),
         **{
-            question: Word(("object", "zone"), _zone(question), f"{part} is in the zone")
+            question: PredicateDefinition(
+                ("object", "zone"), _zone(question), f"{part} is in the zone"
+            )
             for question, part in zip(
                 QUESTIONS, ("its centre", "some part", "all of it"), strict=True
             )
         },
-        "in_forbidden_zone": Word(
+        "in_forbidden_zone": PredicateDefinition(
             _ONE, in_forbidden_zone, f"some part is in a zone whose name begins with {KEEP_OUT}"
         ),
-        "first_contact": Word(_TWO, first_contact, "the second is what the first would meet first"),
-        "stale": Word(("kind",), stale, "percepts of that kind could not be observed"),
-        "healthy": Word((), healthy, "the image is sound"),
+        "first_contact": PredicateDefinition(
+            _TWO, first_contact, "the second is what the first would meet first"
+        ),
+        "stale": PredicateDefinition(
+            ("kind",), stale, "percepts of that kind could not be observed"
+        ),
+        "healthy": PredicateDefinition((), healthy, "the image is sound"),
     }
 )
 """Every relation and fact that a rule may name."""
 
-QUANTITIES: MappingProxyType[str, Quantity] = MappingProxyType(
+QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
     {
-        "time_to_contact": Quantity(
+        "time_to_contact": QuantityDefinition(
             _TWO, TIME, lambda f: f.of_pairs(CONTACT), "until the outlines meet"
         ),
-        "gap": Quantity(_TWO, LENGTH, lambda f: f.of_pairs(GAP), "between the outlines"),
-        "closing_speed": Quantity(_TWO, SPEED, lambda f: f.of_pairs(CLOSING), "of the distance"),
-        "relative_speed": Quantity(_TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"),
-        "speed": Quantity(_ONE, SPEED, lambda f: exactly(f.one("speed")), "in the image"),
-        "depth_difference": Quantity(_TWO, SHARE, depth_difference, "of the smaller depth"),
-        "spin": Quantity(_ONE, TURNING, spin, "about itself"),
-        "out_of_sight": Quantity(_ONE, TIME, _since("last_seen"), "since last seen"),
-        "in_view": Quantity(_ONE, TIME, _since("first_seen"), "since first seen"),
+        "gap": QuantityDefinition(_TWO, LENGTH, lambda f: f.of_pairs(GAP), "between the outlines"),
+        "closing_speed": QuantityDefinition(
+            _TWO, SPEED, lambda f: f.of_pairs(CLOSING), "of the distance"
+        ),
+        "relative_speed": QuantityDefinition(
+            _TWO, SPEED, lambda f: f.of_pairs(RELATIVE), "in the image"
+        ),
+        "speed": QuantityDefinition(_ONE, SPEED, lambda f: exact(f.one("speed")), "in the image"),
+        "depth_difference": QuantityDefinition(
+            _TWO, SHARE, depth_difference, "of the smaller depth"
+        ),
+        "spin": QuantityDefinition(_ONE, ANGULAR_SPEED, spin, "about itself"),
+        "out_of_sight": QuantityDefinition(_ONE, TIME, _since("last_seen"), "since last seen"),
+        "in_view": QuantityDefinition(_ONE, TIME, _since("first_seen"), "since first seen"),
     }
 )
 """Every quantity that a rule may compare."""
 
-RULES = Vocabulary(WORDS, QUANTITIES)
+RULES = Vocabulary(PREDICATES, QUANTITIES)
 """What rules may name."""
 
 
 def signals(*names: str) -> Vocabulary:
     """A vocabulary of plain numbers without objects, each written `name()`."""
     nothing: Mapping[str, Any] = MappingProxyType({})
-    table = {n: Quantity((), SHARE, lambda facts: np.zeros(2), "a signal") for n in names}
+    table = {n: QuantityDefinition((), SHARE, lambda facts: np.zeros(2), "a signal") for n in names}
     return Vocabulary(nothing, MappingProxyType(table))

@@ -41,7 +41,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.relation_columns import Cells, Columns
+from visup.agent.model.relation_columns import ColumnLayout, RelationBlock
 from visup.rules.geometry._fit_jit import binned_trends
 from visup.rules.geometry.ema import new_share
 from visup.rules.geometry.hysteresis import UNKNOWN, Codes, HysteresisState, advance, unknown_states
@@ -106,7 +106,7 @@ ROWS = BOX_ROWS + 7
 """Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
 
 _SURE, _MOSTLY, _TREND, _GAP, _RATE, _SIGMA, _RELATIVE = range(7)
-COLUMNS = Columns(
+COLUMNS = ColumnLayout(
     (
         Column(TREND_NAMES, (0, 0), _TREND, _RATE, _SIGMA),
         Column(("", "touching"), (1, 1), _MOSTLY, _GAP),
@@ -326,7 +326,7 @@ class RelationReasoner:
         codes[at] = found
         return codes
 
-    def _cells(self, kept: RelationMemory, mind: Mind) -> Cells:
+    def _cells(self, kept: RelationMemory, mind: Mind) -> RelationBlock:
         s, now = self.settings, kept.measured
         floor = s.rate_enter * image_diagonal(mind.frame_size) / 3.0
         found = relation_rows(
@@ -340,7 +340,7 @@ class RelationReasoner:
             DIRECTION_CONVERSE,
             (mind.time, s.image_only_confidence, floor),
         )
-        return Cells(COLUMNS, *found)
+        return RelationBlock(COLUMNS, *found)
 
 
 PairLimits = tuple[

@@ -18,26 +18,26 @@ from visup.rules.formula.nodes import (
     Rule,
     calls,
     children,
-    mark,
-    named,
+    placeholder,
+    substituted,
 )
 from visup.rules.formula.terms import Measure, Term
-from visup.rules.monitoring.compiler import Compiler, Place, Program, Scope
-from visup.rules.monitoring.linker import Layout
+from visup.rules.monitoring.compiler import Compiler, Program, Scope, ValueRef
+from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.states import States
-from visup.rules.monitoring.vm import CHOICE_BITS, Whole, bits
-from visup.rules.predicates.snapshot import RELATION_NAMES, Facts
-from visup.rules.predicates.vocabulary import RULES, Quantity, Word
+from visup.rules.monitoring.vm import CHOICE_BITS, Ints, bits
+from visup.rules.predicates.snapshot import RELATION_NAMES, Snapshot
+from visup.rules.predicates.vocabulary import RULES, PredicateDefinition, QuantityDefinition
 from visup.rules.relations.reasoner import NAMES
 
-Key = tuple[str, frozenset[int]]
+AlarmKey = tuple[str, frozenset[int]]
 """Name of a rule, and objects."""
-MOST_KEYS = 16
+MAX_KEYS = 16
 """Of so many sets of objects it is remembered what may be found of them."""
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Lookup:
     """A fact or quantity that rules look up.
 
     Attributes:
@@ -50,24 +50,26 @@ class Look:
 
     step: int
     name: str
-    ask: Callable[[Facts], Any]
+    ask: Callable[[Snapshot], Any]
     turned: bool
     axes: int
 
 
-def asked(node: Predicate | Measure) -> Callable[[Facts], Any]:
+def evaluator(node: Predicate | Measure) -> Callable[[Snapshot], Any]:
     """What a fact or quantity looks at, with those of its arguments that are no objects."""
     fact = isinstance(node, Predicate)
-    word: Word | Quantity = (RULES.words if fact else RULES.quantities)[node.name]
+    word: PredicateDefinition | QuantityDefinition = (RULES.words if fact else RULES.quantities)[
+        node.name
+    ]
     others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
     return partial(_look, word.look, others) if others else word.look
 
 
-def _look(look: Callable[..., Any], others: list[str], facts: Facts) -> Any:
+def _look(look: Callable[..., Any], others: list[str], facts: Snapshot) -> Any:
     return look(facts, *others)
 
 
-class Keys:
+class AlarmKeys:
     """What stands for whatever rules may be true of, for some objects; found once for each.
 
     Args:
@@ -75,22 +77,22 @@ class Keys:
         ids: The objects.
     """
 
-    def __init__(self, prepared: Ruled, ids: tuple[int, ...]) -> None:
+    def __init__(self, prepared: CompiledRules, ids: tuple[int, ...]) -> None:
         self._prepared, self._ids = prepared, ids
-        self._known: dict[int, Key] = {}
+        self._known: dict[int, AlarmKey] = {}
         # What was found is nearly always what was found a step ago, in whichever mind.
-        self._latest: tuple[list[int], Mapping[Key, int]] = ([], {})
+        self._latest: tuple[list[int], Mapping[AlarmKey, int]] = ([], {})
 
-    def of(self, hits: list[int]) -> Mapping[Key, int]:
-        """Each key of what `machine.choices` found, with the first choice that it stands for."""
+    def of(self, hits: list[int]) -> Mapping[AlarmKey, int]:
+        """Each key of what `vm.find_true` found, with the first choice that it stands for."""
         latest, found = self._latest
         if latest != hits:
             found = self._of(hits)
             self._latest = hits, found
         return found
 
-    def _of(self, hits: list[int]) -> Mapping[Key, int]:
-        found: dict[Key, int] = {}
+    def _of(self, hits: list[int]) -> Mapping[AlarmKey, int]:
+        found: dict[AlarmKey, int] = {}
         for hit in hits:
             key = self._known.get(hit)
             if key is None:
@@ -101,7 +103,7 @@ class Keys:
 
 
 @dataclass(frozen=True, eq=False)
-class Ruled:
+class CompiledRules:
     """Rules made ready to run.
 
     Attributes:
@@ -113,24 +115,24 @@ class Ruled:
 
     rules: tuple[Rule, ...]
     compiler: Compiler
-    places: tuple[tuple[Place, ...], ...]
-    _placed: dict[Scope, dict[int, Place]] = field(default_factory=dict, repr=False)
+    places: tuple[tuple[ValueRef, ...], ...]
+    _placed: dict[Scope, dict[int, ValueRef]] = field(default_factory=dict, repr=False)
     _related: dict[int, tuple[Predicate, ...]] = field(default_factory=dict, repr=False)
     _told: dict[int, tuple[Formula, ...]] = field(default_factory=dict, repr=False)
     _texts: dict[tuple[str, ...], dict[int, str]] = field(default_factory=dict, repr=False)
-    _layouts: dict[int, Layout] = field(default_factory=dict, repr=False)
-    _verdicts: dict[int, tuple[Whole, int]] = field(default_factory=dict, repr=False)
+    _layouts: dict[int, LinkedProgram] = field(default_factory=dict, repr=False)
+    _verdicts: dict[int, tuple[Ints, int]] = field(default_factory=dict, repr=False)
     lines: dict[tuple[str, tuple[str, ...]], tuple[Any, ...]] = field(
         default_factory=dict, repr=False
     )
-    _keys: dict[tuple[int, ...], Keys] = field(default_factory=dict, repr=False)
+    _keys: dict[tuple[int, ...], AlarmKeys] = field(default_factory=dict, repr=False)
 
     @property
     def program(self) -> Program:
         """All steps of all rules."""
         return self.compiler.program
 
-    def place(self, node: Formula | Term, scope: Scope) -> Place:
+    def place(self, node: Formula | Term, scope: Scope) -> ValueRef:
         """Where the value of a part of these rules is found."""
         known = self._placed.setdefault(scope, {})
         if id(node) not in known:
@@ -165,7 +167,7 @@ class Ruled:
         """The source of a part of these rules, with marks where its variables stand."""
         known = self._texts.setdefault(variables, {})
         if id(node) not in known:
-            known[id(node)] = str(named(node, {v: mark(v) for v in variables}))
+            known[id(node)] = str(substituted(node, {v: placeholder(v) for v in variables}))
         return known[id(node)]
 
     @cached_property
@@ -176,23 +178,23 @@ class Ruled:
         return {name: k for k, name in enumerate(sorted(named))}
 
     @cached_property
-    def facts(self) -> tuple[Look, ...]:
+    def facts(self) -> tuple[Lookup, ...]:
         """What the rules look up that is true, false or unknown; without these relations."""
         return tuple(self._looks(Predicate))
 
     @cached_property
-    def quantities(self) -> tuple[Look, ...]:
+    def quantities(self) -> tuple[Lookup, ...]:
         """What the rules look up that is a number."""
         return tuple(self._looks(Measure))
 
-    def _looks(self, kind: type) -> Iterator[Look]:
+    def _looks(self, kind: type) -> Iterator[Lookup]:
         for number, node in self.program.looks():
             if isinstance(node, kind) and node.name not in self.relations:
                 order = self.program.steps[number].order
                 turned = len(order) == 2 and order[0] > order[1]
-                yield Look(number, node.name, asked(node), turned, len(order))
+                yield Lookup(number, node.name, evaluator(node), turned, len(order))
 
-    def layout(self, n: int) -> Layout:
+    def layout(self, n: int) -> LinkedProgram:
         """The program laid out for a number of objects; relations stand before all other facts."""
         if n not in self._layouts:
             begin, places = len(self.relations) * n * n, {}
@@ -202,7 +204,7 @@ class Ruled:
             for step, node in self.program.looks():
                 if node.name in self.relations:
                     places[step] = self.relations[node.name] * n * n
-            self._layouts[n] = Layout(self.program, n, places, begin)
+            self._layouts[n] = LinkedProgram(self.program, n, places, begin)
         return self._layouts[n]
 
     @cached_property
@@ -211,7 +213,7 @@ class Ruled:
         return {rule.name: rule for rule in self.rules}
 
     def choice(self, hit: int, ids: tuple[int, ...]) -> tuple[Rule, tuple[int, ...]]:
-        """The rule and the objects of something that `machine.choices` found of some objects."""
+        """The rule and the objects of something that `vm.find_true` found of some objects."""
         rule, rows = self.rules[hit >> CHOICE_BITS], hit & (1 << CHOICE_BITS) - 1
         chosen = []
         for _ in rule.variables:
@@ -219,23 +221,23 @@ class Ruled:
             chosen.append(ids[row])
         return rule, tuple(chosen[::-1])
 
-    def keys(self, ids: tuple[int, ...]) -> Keys:
+    def keys(self, ids: tuple[int, ...]) -> AlarmKeys:
         """What stands for whatever rules may be true of, for some objects."""
         known = self._keys.get(ids)
         if known is None:
-            if len(self._keys) >= MOST_KEYS:
+            if len(self._keys) >= MAX_KEYS:
                 self._keys.clear()
-            known = self._keys.setdefault(ids, Keys(self, ids))
+            known = self._keys.setdefault(ids, AlarmKeys(self, ids))
         return known
 
     def fresh(self, n: int) -> States:
         """What is remembered before the first sample."""
         return self.layout(n).fresh
 
-    def verdicts(self, n: int) -> tuple[Whole, int]:
+    def verdicts(self, n: int) -> tuple[Ints, int]:
         """Of each rule where its values stand for a number of objects, and how many may be found.
 
-        See `machine.choices`.
+        See `vm.find_true`.
         """
         if n not in self._verdicts:
             layout, rows = self.layout(n), []
@@ -264,10 +266,10 @@ def _apart(rule: Rule) -> Iterator[tuple[int, int]]:
 
 
 @lru_cache(maxsize=16)
-def ruled(rules: tuple[Rule, ...]) -> Ruled:
+def compile_rules(rules: tuple[Rule, ...]) -> CompiledRules:
     """Rules made ready to run; the same object for the same rules."""
     compiler = Compiler()
-    return Ruled(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
+    return CompiledRules(rules, compiler, tuple(compiler.rule(rule) for rule in rules))
 
 
 def scope_of(rule: Rule) -> Scope:

@@ -17,21 +17,20 @@ from visup.rules.formula.nodes import (
     Quantified,
     Rule,
     children,
-    mark,
+    placeholder,
 )
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import TICKS, Number
-from visup.rules.monitoring.compiler import Place, Scope
-from visup.rules.monitoring.intervals import UNKNOWN, Interval
-from visup.rules.monitoring.monitor import verdict
+from visup.rules.monitoring.compiler import Scope, ValueRef
+from visup.rules.monitoring.intervals import UNKNOWN, Interval, verdict
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.safety.compiled_rules import Ruled, scope_of
-from visup.rules.safety.verdicts import Values
+from visup.rules.safety.compiled_rules import CompiledRules, scope_of
+from visup.rules.safety.verdicts import Evaluation
 from visup.rules.wording.sentences import short
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
+class RuleExplanation:
     """What a formula or quantity came to, and what it was made of.
 
     Attributes:
@@ -46,7 +45,7 @@ class Explanation:
     text: str
     interval: Interval
     verdict: Truth | None
-    parts: tuple[Explanation, ...] = ()
+    parts: tuple[RuleExplanation, ...] = ()
     late_s: float = 0.0
     unit: str = ""
 
@@ -67,7 +66,7 @@ class Explanation:
         return "\n".join(self.lines())
 
 
-def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
+def explain_rule(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> RuleExplanation:
     """Why a rule is true, false or unknown of some objects.
 
     Args:
@@ -78,7 +77,7 @@ def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
     Returns:
         The rule with `when` and `unless`; it is false where `unless` is true.
     """
-    reader = _Reader(values, rule, ids)
+    reader = _ExplanationBuilder(values, rule, ids)
     parts = [reader.node(f) for f in rule.formulas]
     suspended = len(parts) > 1 and parts[1].verdict is Truth.TRUE
     low, high = parts[0].interval
@@ -89,15 +88,15 @@ def explained(rule: Rule, ids: tuple[int, ...], values: Values) -> Explanation:
         for word, p in zip(("when", "unless"), parts, strict=False)
     )
     found = Truth.FALSE if suspended else parts[0].verdict
-    return Explanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
+    return RuleExplanation(f"{rule.name}({names})", interval, found, titled, parts[0].late_s)
 
 
-MOST_LINES = 4096
+MAX_LINES = 4096
 """Of so many rules and names of objects the texts of their evidence are remembered."""
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class EvidenceLine:
     """One line of evidence but for its values.
 
     Attributes:
@@ -106,11 +105,11 @@ class Line:
         sides: Of a comparison what is compared: text, place and unit; only a text of a number.
     """
 
-    place: Place
+    place: ValueRef
     text: str
-    sides: tuple[tuple[str, Place | None, str], ...] = ()
+    sides: tuple[tuple[str, ValueRef | None, str], ...] = ()
 
-    def told(self, values: Values, rows: tuple[int, ...]) -> str:
+    def told(self, values: Evaluation, rows: tuple[int, ...]) -> str:
         """The line for some objects.
 
         It says of a comparison what its quantities are: `gap(the arm, the probe) = 3 px < 20 px is true`;
@@ -131,52 +130,52 @@ class Line:
         )
 
 
-def evidence(rule: Rule, ids: tuple[int, ...], values: Values) -> tuple[str, ...]:
+def evidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> tuple[str, ...]:
     """One sentence for each fact and comparison of `when`: what it says of these objects."""
     facts, prepared = values.facts, values.prepared
     names = tuple([facts.short(i) for i in ids])
     lines = prepared.lines.get((rule.name, names))
     if lines is None:
-        if len(prepared.lines) >= MOST_LINES:
+        if len(prepared.lines) >= MAX_LINES:
             prepared.lines.clear()
         lines = prepared.lines.setdefault((rule.name, names), _lines(rule, names, prepared))
     rows = tuple([facts.row[i] for i in ids])
     return tuple([line.told(values, rows) for line in lines])
 
 
-def _lines(rule: Rule, names: tuple[str, ...], prepared: Ruled) -> tuple[Line, ...]:
+def _lines(rule: Rule, names: tuple[str, ...], prepared: CompiledRules) -> tuple[EvidenceLine, ...]:
     """The evidence of a rule, for objects of these names."""
     scope, named = scope_of(rule), dict(zip(rule.variables, names, strict=True))
 
-    def side(term: Term) -> tuple[str, Place | None, str]:
+    def side(term: Term) -> tuple[str, ValueRef | None, str]:
         if isinstance(term, Number):
             return str(term), None, ""
         return _text(term, named, prepared), prepared.place(term, scope), _unit(term)
 
     return tuple(
-        Line(prepared.place(f, scope), f.operator, (side(f.left), side(f.right)))
+        EvidenceLine(prepared.place(f, scope), f.operator, (side(f.left), side(f.right)))
         if isinstance(f, Comparison)
-        else Line(prepared.place(f, scope), _text(f, named, prepared))
+        else EvidenceLine(prepared.place(f, scope), _text(f, named, prepared))
         for f in prepared.told(rule)
     )
 
 
-class _Reader:
+class _ExplanationBuilder:
     """Reads the values of a rule's formulas for one choice of objects."""
 
-    def __init__(self, values: Values, rule: Rule, ids: tuple[int, ...]) -> None:
+    def __init__(self, values: Evaluation, rule: Rule, ids: tuple[int, ...]) -> None:
         self.values = values
         self.mind = values.facts.mind
         self.scope: Scope = scope_of(rule)
         self.rows = tuple(values.facts.row[i] for i in ids)
         self.names = {v: short(self.mind, i) for v, i in zip(rule.variables, ids, strict=True)}
 
-    def node(self, node: Node) -> Explanation:
+    def node(self, node: Node) -> RuleExplanation:
         """What a node came to, with what it is made of."""
         place, interval = self._value(node)
         term = isinstance(node, Term)
         whole = not isinstance(node, Predicate | Measure | Number)
-        return Explanation(
+        return RuleExplanation(
             _text(node, self.names, self.values.prepared),
             interval,
             None if term else verdict(interval),
@@ -185,17 +184,17 @@ class _Reader:
             _unit(node) if term else "",
         )
 
-    def _value(self, node: Node) -> tuple[Place, Interval]:
+    def _value(self, node: Node) -> tuple[ValueRef, Interval]:
         """Where a node stands, and what it came to for these objects."""
         place = self.values.prepared.place(node, self.scope)
         return place, self.values.interval(place, self.rows)
 
-    def _parts(self, node: Node) -> tuple[Explanation, ...]:
+    def _parts(self, node: Node) -> tuple[RuleExplanation, ...]:
         if isinstance(node, Quantified):
             return self._witness(node)
         return tuple(self.node(p) for p in children(node) if not isinstance(p, Number))
 
-    def _witness(self, node: Quantified) -> tuple[Explanation, ...]:
+    def _witness(self, node: Quantified) -> tuple[RuleExplanation, ...]:
         """The part for the object that decides: the truest one of `exists`, the least of `forall`."""
         outer = self.scope, self.rows, self.names
         found = []
@@ -214,11 +213,11 @@ class _Reader:
         return (pick(found, key=lambda e: e.interval),)
 
 
-def _text(node: Node, names: Mapping[str, str], prepared: Ruled) -> str:
+def _text(node: Node, names: Mapping[str, str], prepared: CompiledRules) -> str:
     """The source of a node, with objects by name."""
     text = prepared.text(node, tuple(names))
     for variable, name in names.items():
-        text = text.replace(mark(variable), name)
+        text = text.replace(placeholder(variable), name)
     return text
 
 

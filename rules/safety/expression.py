@@ -19,19 +19,18 @@ from math import isinf
 from typing import Any, cast
 
 from visup.agent import Mind, Truth
-from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
 from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
-from visup.rules.monitoring.intervals import Interval
-from visup.rules.monitoring.monitor import verdict
-from visup.rules.monitoring.operators import SPACING
+from visup.rules.monitoring.intervals import Interval, verdict
+from visup.rules.monitoring.operators import MIN_SPACING
 from visup.rules.monitoring.states import States
-from visup.rules.predicates.snapshot import Facts
+from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.safety.compiled_rules import ruled, scope_of
-from visup.rules.safety.explain import Explanation, explained
-from visup.rules.safety.verdicts import Values, rerowed
+from visup.rules.safety.compiled_rules import compile_rules, scope_of
+from visup.rules.safety.explain import RuleExplanation, explain_rule
+from visup.rules.safety.verdicts import Evaluation, remapped
 
 _CALL = re.compile(r"\b([A-Za-z_]\w*)\s*\(([^()]*)\)")
 _BOUND = re.compile(r"\b(?:exists|forall)\s+([A-Za-z_]\w*)")
@@ -40,7 +39,7 @@ _SAY = 'say "."'
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ExpressionValue:
     """What an expression came to for one choice of objects.
 
     Attributes:
@@ -68,7 +67,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class ExpressionResult:
     """What an expression came to at one mind.
 
     Attributes:
@@ -83,7 +82,7 @@ class Judged:
     ids: tuple[int, ...]
     before: States
     after: States
-    readings: tuple[Reading, ...]
+    readings: tuple[ExpressionValue, ...]
 
     @property
     def truths(self) -> Mapping[tuple[int, ...], Truth | Interval]:
@@ -105,32 +104,34 @@ class Expression:
     rule: Rule
     quantity: bool
 
-    def judge(self, mind: Mind, before: Judged | None = None) -> Judged:
+    def judge(self, mind: Mind, before: ExpressionResult | None = None) -> ExpressionResult:
         """What it comes to in a mind.
 
         Args:
             mind: The mind after a step.
             before: What it came to a step before; without it, windows begin here.
         """
-        prepared, now, facts = ruled((self.rule,)), ticks(mind.time), Facts(mind)
+        prepared, now, facts = compile_rules((self.rule,)), ticks(mind.time), Snapshot(mind)
         if before is not None and not now > before.now:
             before = None
         states = prepared.fresh(len(facts.ids)) if before is None else before.after
-        if before is not None and now - before.now < SPACING:
+        if before is not None and now - before.now < MIN_SPACING:
             return before
         if before is not None and before.ids != facts.ids:
-            states = rerowed(prepared, states, now, before.ids, facts.ids)
-        values = Values(prepared, facts, now, states)
+            states = remapped(prepared, states, now, before.ids, facts.ids)
+        values = Evaluation(prepared, facts, now, states)
         readings = tuple(self._reading(values, ids) for ids in self._choices(mind, facts.ids))
-        return Judged(now, facts.ids, states, values.after, readings)
+        return ExpressionResult(now, facts.ids, states, values.after, readings)
 
-    def explain(self, mind: Mind, judged: Judged, ids: tuple[int, ...]) -> Explanation:
+    def explain(
+        self, mind: Mind, judged: ExpressionResult, ids: tuple[int, ...]
+    ) -> RuleExplanation:
         """Why it is what it is for some objects, in the mind in which it was judged."""
-        values = Values(ruled((self.rule,)), Facts(mind), judged.now, judged.before)
-        whole = explained(self.rule, ids, values).parts[0]
+        values = Evaluation(compile_rules((self.rule,)), Snapshot(mind), judged.now, judged.before)
+        whole = explain_rule(self.rule, ids, values).parts[0]
         return whole.parts[0] if self.quantity else whole
 
-    def _reading(self, values: Values, ids: tuple[int, ...]) -> Reading:
+    def _reading(self, values: Evaluation, ids: tuple[int, ...]) -> ExpressionValue:
         if self.quantity:
             node = cast("Comparison", self.rule.when).left
             place, unit = values.prepared.place(node, scope_of(self.rule)), _unit(node)
@@ -138,11 +139,11 @@ class Expression:
             place, unit = values.prepared.places[0][0], ""
         low, high = values.interval(place, tuple(values.facts.row[i] for i in ids))
         truth = None if self.quantity else verdict((low, high))
-        return Reading(ids, (low, high), truth, unit)
+        return ExpressionValue(ids, (low, high), truth, unit)
 
     def _choices(self, mind: Mind, present: Sequence[int]) -> Iterator[tuple[int, ...]]:
         """Every choice of distinct objects that the names allow."""
-        meant = [named(mind, v, present) for v in self.rule.variables]
+        meant = [objects_named(mind, v, present) for v in self.rule.variables]
         for ids in product(*meant):
             if len(set(ids)) == len(ids):
                 yield ids
@@ -158,15 +159,15 @@ def expression(text: str) -> Expression:
     written, variables = _with_variables(text)
     try:
         return Expression(text, _rule(written, variables), False)
-    except (RuleError, ManyErrors) as fault:
+    except (RuleError, ErrorGroup) as fault:
         try:
             rule = _rule(f"({written}) >= ({written})", variables)
-        except (RuleError, ManyErrors):
+        except (RuleError, ErrorGroup):
             raise fault from None
         return Expression(text, rule, True)
 
 
-def named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, ...]:
+def objects_named(mind: Mind, name: str, present: Sequence[int]) -> tuple[int, ...]:
     """The objects that a name of an expression may stand for.
 
     Args:
@@ -192,7 +193,7 @@ def _rule(text: str, variables: tuple[str, ...]) -> Rule:
     try:
         (rule,) = parse_rules(lines, "<expression>")
     except RuleError as fault:
-        if isinstance(fault.where, Place) and fault.where.line > text.count("\n") + 2:
+        if isinstance(fault.where, SourceLocation) and fault.where.line > text.count("\n") + 2:
             # It was the wrapping that did not fit: the user wrote too little.
             raise RuleError(f"'{text}' ends too early", expected=fault.expected) from None
         raise

@@ -10,15 +10,15 @@ from itertools import product
 from visup.agent import Mind, Truth
 from visup.agent.model.errors import RuleError
 from visup.rules.formula.nodes import Rule
-from visup.rules.monitoring.monitor import verdict
-from visup.rules.predicates.snapshot import Facts
-from visup.rules.safety.compiled_rules import ruled
-from visup.rules.safety.explain import Explanation, explained
-from visup.rules.safety.reasoner import kept
-from visup.rules.safety.verdicts import Values
+from visup.rules.monitoring.intervals import verdict
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.safety.compiled_rules import compile_rules
+from visup.rules.safety.explain import RuleExplanation, explain_rule
+from visup.rules.safety.reasoner import rule_memory
+from visup.rules.safety.verdicts import Evaluation
 
 
-def explain(mind: Mind, rule: str, *ids: int) -> Explanation:
+def explain(mind: Mind, rule: str, *ids: int) -> RuleExplanation:
     """Why a rule is true, false or unknown of some objects in a mind.
 
     Args:
@@ -32,25 +32,25 @@ def explain(mind: Mind, rule: str, *ids: int) -> Explanation:
     Raises:
         RuleError: No such rule was judged, or the objects are not those of a choice for it.
     """
-    values = values_of(mind)
-    return explained(_choice(values, rule, ids), ids, values)
+    values = evaluation_of(mind)
+    return explain_rule(_choice(values, rule, ids), ids, values)
 
 
-def values_of(mind: Mind) -> Values:
+def evaluation_of(mind: Mind) -> Evaluation:
     """The values of all formulas of all rules in a mind, computed again from what it remembers.
 
     Raises:
         RuleError: No rules have judged it.
     """
-    memory = kept(mind)
+    memory = rule_memory(mind)
     if memory.now is None or memory.before is None:
         raise RuleError("no rule has been judged in this mind", hint="let the agent make a step")
     # Rules saw the tasks as they stood a step before.
-    facts = Facts(replace(mind, tasks=memory.tasks))
-    return Values(ruled(memory.rules), facts, memory.now, memory.before)
+    facts = Snapshot(replace(mind, tasks=memory.tasks))
+    return Evaluation(compile_rules(memory.rules), facts, memory.now, memory.before)
 
 
-def rule_named(values: Values, name: str) -> Rule:
+def rule_named(values: Evaluation, name: str) -> Rule:
     """The rule of that name.
 
     Raises:
@@ -65,7 +65,7 @@ def rule_named(values: Values, name: str) -> Rule:
     return rules[name]
 
 
-def choices(values: Values, rule: Rule) -> Iterator[tuple[int, ...]]:
+def object_choices(values: Evaluation, rule: Rule) -> Iterator[tuple[int, ...]]:
     """Every choice of objects for a rule."""
     for ids in product(values.facts.ids, repeat=len(rule.variables)):
         once = [i for i, v in zip(ids, rule.variables, strict=True) if v not in rule.may_repeat]
@@ -79,18 +79,18 @@ def verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     Raises:
         RuleError: No rules have judged the mind, or none of that name.
     """
-    values = values_of(mind)
+    values = evaluation_of(mind)
     rule = rule_named(values, name)
     places = values.prepared.places[values.prepared.rules.index(rule)]
     found = {}
-    for ids in choices(values, rule):
+    for ids in object_choices(values, rule):
         rows = tuple(values.facts.row[i] for i in ids)
         when, *unless = (verdict(values.interval(p, rows)) for p in places)
         found[ids] = Truth.FALSE if Truth.TRUE in unless else when
     return found
 
 
-def _choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:
+def _choice(values: Evaluation, name: str, ids: tuple[int, ...]) -> Rule:
     """The rule of that name, when the objects are a choice for it."""
     rule = rule_named(values, name)
     if len(ids) != len(rule.variables):
@@ -100,6 +100,6 @@ def _choice(values: Values, name: str, ids: tuple[int, ...]) -> Rule:
         if object_id not in values.facts.row:
             known = ", ".join(map(str, values.facts.ids)) or "none"
             raise RuleError(f"there is no object {object_id} in view", expected=f"one of {known}")
-    if ids not in set(choices(values, rule)):
+    if ids not in set(object_choices(values, rule)):
         raise RuleError(f"'{name}' is about distinct objects", expected="each object once")
     return rule

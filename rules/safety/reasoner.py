@@ -9,18 +9,18 @@ from types import MappingProxyType
 from visup.agent import Mind, Observation, Outcome, TaskBelief
 from visup.rules.formula.nodes import Rule
 from visup.rules.formula.units import ticks
-from visup.rules.monitoring.operators import SPACING
+from visup.rules.monitoring.operators import MIN_SPACING
 from visup.rules.monitoring.states import States
-from visup.rules.predicates.snapshot import Facts
-from visup.rules.safety.alarm_condition import Held, stand
-from visup.rules.safety.compiled_rules import Key, Ruled, ruled
-from visup.rules.safety.verdicts import Values, rerowed
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.safety.alarm_condition import ActiveCondition, update
+from visup.rules.safety.compiled_rules import AlarmKey, CompiledRules, compile_rules
+from visup.rules.safety.verdicts import Evaluation, remapped
 
 SAFETY = "rules.safety"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Kept:
+class RuleMemory:
     """What rules remember. States of operators share all but their newest cells with older ones.
 
     Attributes:
@@ -42,8 +42,10 @@ class Kept:
     before: States | None = None
     after: States | None = None
     tasks: tuple[TaskBelief, ...] = ()
-    held: MappingProxyType[Key, Held] = field(default_factory=lambda: MappingProxyType({}))
-    cooling: Mapping[Key, float] = field(default_factory=lambda: MappingProxyType({}))
+    held: MappingProxyType[AlarmKey, ActiveCondition] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    cooling: Mapping[AlarmKey, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,30 +56,30 @@ class RuleReasoner:
     """
 
     rules: tuple[Rule, ...]
-    _prepared: Ruled = field(init=False, repr=False, compare=False)
+    _prepared: CompiledRules = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # Rules are long trees: to look up by them what was prepared costs as much as a rule.
-        object.__setattr__(self, "_prepared", ruled(self.rules))
+        object.__setattr__(self, "_prepared", compile_rules(self.rules))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old, now = kept(mind), ticks(mind.time)
+        old, now = rule_memory(mind), ticks(mind.time)
         # To compare the trees costs more than all that is done with them.
         same = old.rules is self.rules or old.rules == self.rules
         if not same or (old.now is not None and now < old.now):
-            old = Kept(self.rules)
-        if old.now is not None and now - old.now < SPACING:
-            return Outcome(mind, concerns=tuple(h.concern for h in old.held.values()))
-        prepared, facts = self._prepared, Facts(mind)
+            old = RuleMemory(self.rules)
+        if old.now is not None and now - old.now < MIN_SPACING:
+            return Outcome(mind, conditions=tuple(h.concern for h in old.held.values()))
+        prepared, facts = self._prepared, Snapshot(mind)
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
-            before = rerowed(prepared, old.after, now, old.ids, facts.ids)
-        values = Values(prepared, facts, now, before)
-        held, cooling = stand(values, old.held, old.cooling, old.time)
+            before = remapped(prepared, old.after, now, old.ids, facts.ids)
+        values = Evaluation(prepared, facts, now, before)
+        held, cooling = update(values, old.held, old.cooling, old.time)
         mind = mind.remember(
             SAFETY,
-            Kept(
+            RuleMemory(
                 self.rules,
                 now,
                 mind.time,
@@ -89,10 +91,10 @@ class RuleReasoner:
                 cooling,
             ),
         )
-        return Outcome(mind, concerns=tuple([h.concern for h in held.values()]))
+        return Outcome(mind, conditions=tuple([h.concern for h in held.values()]))
 
 
-def kept(mind: Mind) -> Kept:
+def rule_memory(mind: Mind) -> RuleMemory:
     """What rules remember in a mind."""
-    found: Kept = mind.memory.get(SAFETY, Kept())
+    found: RuleMemory = mind.memory.get(SAFETY, RuleMemory())
     return found

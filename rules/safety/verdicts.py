@@ -7,17 +7,17 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from visup.rules.formula.nodes import Rule
-from visup.rules.monitoring.compiler import Place
+from visup.rules.monitoring.compiler import ValueRef
 from visup.rules.monitoring.intervals import Interval
-from visup.rules.monitoring.linker import Layout
+from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.states import States
-from visup.rules.monitoring.vm import Codes, Floats, Whole, choices
-from visup.rules.predicates.inputs_missing import blind
-from visup.rules.predicates.snapshot import MAYBE, Facts
-from visup.rules.safety.compiled_rules import Key, Ruled
+from visup.rules.monitoring.vm import Codes, Floats, Ints, find_true
+from visup.rules.predicates.inputs_missing import inputs_missing
+from visup.rules.predicates.snapshot import MAYBE, Snapshot
+from visup.rules.safety.compiled_rules import AlarmKey, CompiledRules
 
 
-class Values:
+class Evaluation:
     """The values of all formulas at one step.
 
     Args:
@@ -30,10 +30,10 @@ class Values:
         after: States after.
     """
 
-    def __init__(self, prepared: Ruled, facts: Facts, now: int, before: States) -> None:
-        self.prepared: Ruled = prepared
-        self.facts: Facts = facts
-        self._layout: Layout = prepared.layout(len(facts.ids))
+    def __init__(self, prepared: CompiledRules, facts: Snapshot, now: int, before: States) -> None:
+        self.prepared: CompiledRules = prepared
+        self.facts: Snapshot = facts
+        self._layout: LinkedProgram = prepared.layout(len(facts.ids))
         self._arena: Floats = np.empty(self._layout.size)
         if prepared.quantities:
             np.concatenate(self._measured(), out=self._arena[: self._layout.looked])
@@ -47,7 +47,7 @@ class Values:
         codes: Codes = np.concatenate([related, *looked])
         if facts.mind.unknown:
             for step, node in prepared.program.looks():
-                if step in layout.facts and blind(facts.mind, node.name):
+                if step in layout.facts and inputs_missing(facts.mind, node.name):
                     at = layout.facts[step]
                     codes[at : at + layout.n ** len(layout.axes[step])] = MAYBE
         return codes
@@ -58,7 +58,7 @@ class Values:
         told = [look.ask(facts) for look in self.prepared.quantities]
         if facts.mind.unknown:
             told = [
-                facts.unknown(look.axes) if blind(facts.mind, look.name) else value
+                facts.unknown(look.axes) if inputs_missing(facts.mind, look.name) else value
                 for look, value in zip(self.prepared.quantities, told, strict=True)
             ]
         return [
@@ -66,7 +66,7 @@ class Values:
             for look, value in zip(self.prepared.quantities, told, strict=True)
         ]
 
-    def interval(self, place: Place, rows: tuple[int, ...]) -> Interval:
+    def interval(self, place: ValueRef, rows: tuple[int, ...]) -> Interval:
         """The interval of a formula for one choice of objects, by the rows of these."""
         return self._layout.interval(place.step, rows, self._arena)
 
@@ -74,21 +74,21 @@ class Values:
         """Every rule with every choice of objects for which it is true and not suspended."""
         return (self.prepared.choice(hit, self.facts.ids) for hit in self.found())
 
-    def true_of(self) -> Mapping[Key, int]:
+    def true_of(self) -> Mapping[AlarmKey, int]:
         """For each rule and set of objects of which it is true the first choice, as `found` tells it."""
         return self.prepared.keys(self.facts.ids).of(self.found())
 
     def found(self) -> list[int]:
-        """What is true as numbers, by rules and by choices; `Ruled.choice` tells what they stand for."""
+        """What is true as numbers, by rule and choice; `CompiledRules.choice` decodes them."""
         rules, most = self.prepared.verdicts(self._layout.n)
-        found: Whole = np.empty(most, dtype=np.int64)
-        count = choices(rules, self._layout.n, self._arena, found)
+        found: Ints = np.empty(most, dtype=np.int64)
+        count = find_true(rules, self._layout.n, self._arena, found)
         told: list[int] = found[:count].tolist()
         return told
 
 
-def rerowed(
-    prepared: Ruled, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
+def remapped(
+    prepared: CompiledRules, states: States, now: int, old: tuple[int, ...], new: tuple[int, ...]
 ) -> States:
     """The states of the operators for other objects.
 

@@ -47,7 +47,7 @@ class RelationEventReasoner:
         """Judge one step; see `Reasoner`."""
         told: dict[tuple[int, ...], Told] = dict(self._memory(mind))
         events = []
-        for objects, name in mind.held(*TEMPLATES):
+        for objects, name in mind.holding_objects(*TEMPLATES):
             if not self._new(name, told.get(objects), mind):
                 continue
             relation = mind.relation(name, *objects)

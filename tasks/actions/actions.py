@@ -1,7 +1,7 @@
 """What each action means: when it holds, begins, progresses, is over, and what is its contrary.
 
 The actions of tasks stand in one table, `ACTIONS`; the words in it are names of relations in the
-mind. `known_actions` adds the words and quantities of rules (`vocabulary.py`) and what installed
+mind. `known_actions` adds the words and quantities of rules (`task_vocabulary.py`) and what installed
 packages offer under the entry point group `visup.actions`.
 """
 
@@ -21,7 +21,7 @@ ALL_PERCEPTS = frozenset({"region", "hypothesis", "depth", "health"})
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
+class ActionDefinition:
     """The meaning of an action, in terms of relations between its actors.
 
     Attributes:
@@ -77,7 +77,7 @@ class Meaning:
 
 
 _TABLE = (
-    Meaning(
+    ActionDefinition(
         "converging",
         holds=("converging",),
         lasts=True,
@@ -85,7 +85,7 @@ _TABLE = (
         text="converging",
         about="they draw nearer",
     ),
-    Meaning(
+    ActionDefinition(
         "diverging",
         holds=("diverging",),
         lasts=True,
@@ -93,7 +93,7 @@ _TABLE = (
         text="diverging",
         about="they draw apart",
     ),
-    Meaning(
+    ActionDefinition(
         "keeping_distance",
         holds=("keeping_distance", "moving_together", "coupled"),
         lasts=True,
@@ -101,7 +101,7 @@ _TABLE = (
         text="keeping their distance",
         about="their distance stays, or they move as one",
     ),
-    Meaning(
+    ActionDefinition(
         "moving_together",
         holds=("moving_together", "coupled"),
         lasts=True,
@@ -109,7 +109,7 @@ _TABLE = (
         text="moving together",
         about="they move as one",
     ),
-    Meaning(
+    ActionDefinition(
         "touching",
         holds=("touching", "coupled"),
         hold_s=0.2,
@@ -119,7 +119,7 @@ _TABLE = (
         text="touching",
         about="they touch",
     ),
-    Meaning(
+    ActionDefinition(
         "coupled",
         holds=("coupled",),
         entry=("coupled", "touching"),
@@ -130,7 +130,7 @@ _TABLE = (
         text="coupled",
         about="they are rigidly connected",
     ),
-    Meaning(
+    ActionDefinition(
         "decoupled",
         holds=("decoupled",),
         hold_s=0.5,
@@ -140,7 +140,7 @@ _TABLE = (
         text="decoupled",
         about="they are known not to be connected",
     ),
-    Meaning(
+    ActionDefinition(
         "apart",
         holds=("apart",),
         hold_s=0.5,
@@ -148,7 +148,7 @@ _TABLE = (
         text="apart",
         about="they are known not to touch",
     ),
-    Meaning(
+    ActionDefinition(
         "present",
         holds=("present",),
         arity=1,
@@ -156,10 +156,10 @@ _TABLE = (
         text="present",
         about="it is in the scene, seen or hidden",
     ),
-    Meaning(
+    ActionDefinition(
         "gone", holds=("gone",), arity=1, hold_s=0.5, text="gone", about="it has left the scene"
     ),
-    Meaning(
+    ActionDefinition(
         "inside",
         holds=("inside",),
         arity=2,
@@ -168,7 +168,7 @@ _TABLE = (
         takes=("object", "zone"),
         about="its centre is in the zone",
     ),
-    Meaning(
+    ActionDefinition(
         "outside",
         holds=("outside",),
         arity=2,
@@ -179,26 +179,28 @@ _TABLE = (
     ),
 )
 
-ACTIONS: Mapping[str, Meaning] = MappingProxyType({m.name: m for m in _TABLE})
+ACTIONS: Mapping[str, ActionDefinition] = MappingProxyType({m.name: m for m in _TABLE})
 """The actions that visup supervises with a meaning of their own."""
 
 
 @lru_cache(maxsize=1)
-def known_actions() -> Mapping[str, Meaning]:
+def known_actions() -> Mapping[str, ActionDefinition]:
     """All that a task may ask for, by name: `ACTIONS`, the words of rules, those of plug-ins.
 
     Raises:
         TaskError: A plug-in's action cannot be loaded, or its name is taken.
     """
-    from visup.tasks.actions.vocabulary import words  # rules bring NumPy with them
+    from visup.tasks.actions.vocabulary import rule_actions  # rules bring NumPy with them
 
-    known: Mapping[str, Meaning] = {**{m.name: m for m in words()}, **ACTIONS}
+    known: Mapping[str, ActionDefinition] = {**{m.name: m for m in rule_actions()}, **ACTIONS}
     for point in sorted(entry_points(group=GROUP), key=lambda p: (p.name, p.value)):
         known = with_actions(known, [_loaded(point)])
     return MappingProxyType(known)
 
 
-def with_actions(known: Mapping[str, Meaning], more: Iterable[Meaning]) -> dict[str, Meaning]:
+def with_actions(
+    known: Mapping[str, ActionDefinition], more: Iterable[ActionDefinition]
+) -> dict[str, ActionDefinition]:
     """Some actions and more of them.
 
     Raises:
@@ -212,7 +214,7 @@ def with_actions(known: Mapping[str, Meaning], more: Iterable[Meaning]) -> dict[
     return joined
 
 
-def _loaded(point: EntryPoint) -> Meaning:
+def _loaded(point: EntryPoint) -> ActionDefinition:
     try:
         made = point.load()
     except Exception as fault:
@@ -220,12 +222,12 @@ def _loaded(point: EntryPoint) -> Meaning:
         raise TaskError(
             f"action `{point.name}` cannot be loaded: {said}", where=point.value
         ) from fault
-    if not isinstance(made, Meaning):
-        expected = f"a `Meaning` (entry point group `{GROUP}`)"
+    if not isinstance(made, ActionDefinition):
+        expected = f"a `ActionDefinition` (entry point group `{GROUP}`)"
         raise TaskError(f"`{point.name}` is no action", where=point.value, expected=expected)
     return made
 
 
-def contradict(a: Meaning, b: Meaning) -> bool:
+def contradict(a: ActionDefinition, b: ActionDefinition) -> bool:
     """Whether two actions between the same actors can never hold at the same time."""
     return bool(set(a.holds) <= set(b.contrary) or set(b.holds) <= set(a.contrary))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.grammar.units import UNITS
 
 NAMES = {"object": ("a", "b", "c"), "zone": ("zone", "zone", "zone")}
 
 
-def written(meaning: Meaning) -> str:
+def written(meaning: ActionDefinition) -> str:
     """How an action is written, with letters for its actors: `gap(a, b) < 5 px`."""
     actors = ", ".join(NAMES.get(k, NAMES["object"])[i] for i, k in enumerate(meaning.kinds))
     unit = next((u for u, (d, by) in UNITS.items() if (d, by) == (meaning.measures, 1.0)), "%")
@@ -16,7 +16,7 @@ def written(meaning: Meaning) -> str:
     return f"{meaning.name}({actors}){compared}"
 
 
-def described(meaning: Meaning) -> str:
+def described(meaning: ActionDefinition) -> str:
     """An action in some lines of Markdown: how it is written, when it holds, ends and fails."""
     lines = [f"`{written(meaning)}`", meaning.about or meaning.text]
     if meaning.measures:

@@ -14,16 +14,16 @@ from types import MappingProxyType
 import numpy as np
 
 from visup.agent import Truth
-from visup.rules.formula.units import ANGLE, LENGTH, SHARE, SPEED, TIME, TURNING, Dimension
-from visup.rules.predicates.inputs_missing import blind
-from visup.rules.predicates.snapshot import MAYBE, NO, YES, Facts
-from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
+from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
+from visup.rules.predicates.inputs_missing import inputs_missing
+from visup.rules.predicates.snapshot import MAYBE, NO, YES, Snapshot
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.relations.zones import contains, zone_truth
-from visup.tasks.actions.actions import ACTIONS, Meaning
+from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
 from visup.tasks.grammar.nodes import Action, Actors, Task, walk
-from visup.tasks.grammar.statement import WORDS as RESERVED
-from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.statement import RESERVED_WORDS as RESERVED
+from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 
 OF_TASKS = frozenset({"unexpected", "expected", "actor"})
@@ -37,22 +37,22 @@ MEASURES: Mapping[Dimension, str] = {
     SPEED: "speed",
     SHARE: "share",
     ANGLE: "angle",
-    TURNING: "angular_speed",
+    ANGULAR_SPEED: "angular_speed",
 }
 """Dimension of a quantity of rules -> what tasks call it; see `units.py`."""
 
 TRUTHS = {YES: Truth.TRUE, MAYBE: Truth.UNKNOWN, NO: Truth.FALSE}
 
-Look = Callable[[Facts, tuple[int, ...]], Truth]
+FactEvaluator = Callable[[Snapshot, tuple[int, ...]], Truth]
 """Whether something holds between objects, by id, in a mind as rules see it."""
 
 
-def words() -> Iterator[Meaning]:
+def rule_actions() -> Iterator[ActionDefinition]:
     """Every word and quantity of rules that a task may ask for."""
-    for name, word in WORDS.items():
+    for name, word in PREDICATES.items():
         if _fits(name, word.takes):
             text = name.replace("_", " ")
-            yield Meaning(
+            yield ActionDefinition(
                 name,
                 holds=(name,),
                 arity=len(word.takes),
@@ -63,7 +63,7 @@ def words() -> Iterator[Meaning]:
             )
     for name, quantity in QUANTITIES.items():
         if _fits(name, quantity.takes):
-            yield Meaning(
+            yield ActionDefinition(
                 name,
                 holds=(),
                 arity=len(quantity.takes),
@@ -81,7 +81,7 @@ def _fits(name: str, takes: tuple[str, ...]) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Vocabulary:
+class TaskVocabulary:
     """What the facts of one task mean.
 
     Attributes:
@@ -89,11 +89,11 @@ class Vocabulary:
         looks: Key or word -> whether it holds; plain relations of the mind are not among them.
     """
 
-    meanings: Mapping[str, Meaning]
-    looks: Mapping[str, Look]
+    meanings: Mapping[str, ActionDefinition]
+    looks: Mapping[str, FactEvaluator]
 
 
-def vocabulary(task: Task, actions: Mapping[str, Meaning]) -> Vocabulary:
+def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> TaskVocabulary:
     """What the facts of a task mean.
 
     Args:
@@ -101,9 +101,9 @@ def vocabulary(task: Task, actions: Mapping[str, Meaning]) -> Vocabulary:
         actions: All actions.
     """
     zones = {z.name for z in task.zones}
-    meanings, looks = dict(actions), {n: _word(n) for n in WORDS if n not in ACTIONS}
+    meanings, looks = dict(actions), {n: _word(n) for n in PREDICATES if n not in ACTIONS}
     for fact in _facts(task):
-        name, key = action_of(fact).name, keyed(task, fact)[0]
+        name, key = action_of(fact).name, fact_key(task, fact)[0]
         if key == name or name not in actions:
             continue
         text = actions[name].text
@@ -119,7 +119,7 @@ def vocabulary(task: Task, actions: Mapping[str, Meaning]) -> Vocabulary:
         meanings[key] = replace(
             actions[name], name=key, holds=(key,), arity=len(takes), takes=takes, text=text
         )
-    return Vocabulary(MappingProxyType(meanings), MappingProxyType(looks))
+    return TaskVocabulary(MappingProxyType(meanings), MappingProxyType(looks))
 
 
 def _facts(task: Task) -> Iterator[Fact]:
@@ -136,17 +136,17 @@ def _facts(task: Task) -> Iterator[Fact]:
         yield from facts_of(invariant.condition)
 
 
-def _word(name: str) -> Look:
-    def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
+def _word(name: str) -> FactEvaluator:
+    def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
-        if rows is None or blind(facts.mind, name):
+        if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        return TRUTHS[int(WORDS[name].look(facts)[rows])]
+        return TRUTHS[int(PREDICATES[name].look(facts)[rows])]
 
     return look
 
 
-def _rows(facts: Facts, ids: tuple[int, ...]) -> tuple[int, ...] | None:
+def _rows(facts: Snapshot, ids: tuple[int, ...]) -> tuple[int, ...] | None:
     """Where objects stand among the facts, or None when one of them is not there."""
     return tuple(facts.row[i] for i in ids) if facts.row.keys() >= set(ids) else None
 
@@ -160,12 +160,12 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 }
 
 
-def _comparison(name: str, sign: str, bound: float) -> Look:
+def _comparison(name: str, sign: str, bound: float) -> FactEvaluator:
     """A quantity against a bound: true or false when all of its interval says so."""
 
-    def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
+    def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
-        if rows is None or blind(facts.mind, name):
+        if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
         low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
         told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
@@ -174,13 +174,13 @@ def _comparison(name: str, sign: str, bound: float) -> Look:
     return look
 
 
-def _zone_look(task: Task, name: str, zone: str) -> Look:
+def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
     """A zone drawn in the task is looked at as it is; one of the settings as rules judge it."""
     corners = next(z.corners for z in task.zones if z.name == zone)
     polygon = np.asarray(corners, dtype=float)
     question = "reaching" if name == "outside" else name
 
-    def look(facts: Facts, ids: tuple[int, ...]) -> Truth:
+    def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None:
             return Truth.UNKNOWN

@@ -23,10 +23,10 @@ from visup.tasks.grammar.nodes import (
     Choice,
     Clause,
     Comparison,
+    Conditioned,
     Counted,
     Course,
     Hold,
-    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -35,7 +35,7 @@ from visup.tasks.grammar.nodes import (
     Timed,
     Together,
 )
-from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 
 W = TypeVar("W")
@@ -231,7 +231,7 @@ def enter(
         case Timed(item=item, clauses=clauses):
             timed = _timed(task, replace(continuation, course=item), clauses, now)
             yield from enter(task, timed, payload, now, depth)
-        case Judged(item=item, conditions=conditions):
+        case Conditioned(item=item, conditions=conditions):
             kinds = {c.kind for c in conditions}
             kept = tuple(c for c in continuation.conditions if c.kind not in kinds)
             judged = replace(continuation, course=item, conditions=(*kept, *conditions))
@@ -275,7 +275,7 @@ def derivatives(task: Task, state: State[W], payload: W, now: float) -> Iterator
 def _enter_fact(
     task: Task, continuation: Continuation, fact: Fact, payload: W
 ) -> Iterator[State[W] | None]:
-    key, actors = keyed(task, fact)
+    key, actors = fact_key(task, fact)
     step = TaskStep(
         key,
         actors,

@@ -1,1 +1,6 @@
-"""checks."""
+"""What a parsed task must satisfy, and loading of task files.
+
+Read in this order: `load.py` and `files.py` (task files by path or name), `diagnose.py` (all errors
+of a file at once), `semantics.py` (known names, reachable stages), `courses.py`, `names.py` and
+`ambiguity.py` (one kind of check each).
+"""

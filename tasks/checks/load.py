@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from visup.agent.model.errors import TaskError
-from visup.tasks.actions.actions import Meaning
-from visup.tasks.checks.examine import examine, raise_all
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.checks.diagnose import diagnose, raise_all
 from visup.tasks.checks.files import read_text, shipped_tasks
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import tasks_of
@@ -16,7 +16,7 @@ __all__ = ["load_task", "load_tasks", "parse_task", "read_text", "shipped_tasks"
 
 
 def parse_task(
-    text: str, file: str = "<text>", actions: Mapping[str, Meaning] | None = None
+    text: str, file: str = "<text>", actions: Mapping[str, ActionDefinition] | None = None
 ) -> Task:
     """The task that a text describes.
 
@@ -33,12 +33,14 @@ def parse_task(
         TaskError: When it has one mistake.
         ManyErrors: When it has several; all are told at once, in the order of the text.
     """
-    task, faults = examine(text, file, actions)
+    task, faults = diagnose(text, file, actions)
     raise_all(faults)
     return task
 
 
-def load_task(path_or_name: str | Path, actions: Mapping[str, Meaning] | None = None) -> Task:
+def load_task(
+    path_or_name: str | Path, actions: Mapping[str, ActionDefinition] | None = None
+) -> Task:
     """The task in a file, or the shipped task of that name.
 
     Args:
@@ -61,7 +63,7 @@ def load_task(path_or_name: str | Path, actions: Mapping[str, Meaning] | None = 
 
 
 def load_tasks(
-    path_or_name: str | Path, actions: Mapping[str, Meaning] | None = None
+    path_or_name: str | Path, actions: Mapping[str, ActionDefinition] | None = None
 ) -> tuple[Task, ...]:
     """The tasks in a file, or the shipped task of that name.
 

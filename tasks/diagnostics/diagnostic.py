@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from difflib import get_close_matches
 
-from visup.agent.model.errors import Place, TaskError
+from visup.agent.model.errors import SourceLocation, TaskError
 from visup.tasks.grammar.nodes import Span
 
 CODES = {
@@ -84,7 +84,7 @@ CODES = {
 """Every code with what it stands for; a code never changes its meaning."""
 
 
-class TaskFault(TaskError):
+class Diagnostic(TaskError):
     """A mistake in a task file.
 
     Args:
@@ -99,7 +99,7 @@ class TaskFault(TaskError):
         self,
         code: str,
         message: str,
-        where: Place,
+        where: SourceLocation,
         *,
         expected: str | None = None,
         hint: str | None = None,
@@ -126,16 +126,18 @@ class Source:
         self.included: dict[str, Source] = {}
         self._lines = text.split("\n")
 
-    def place(self, line: int, column: int, length: int = 1) -> Place:
+    def place(self, line: int, column: int, length: int = 1) -> SourceLocation:
         """The place at a line and column, counted from 1; past the end it is the end."""
         if line > len(self._lines) or line < 1:
             line = len(self._lines)
             column = len(self._line(line)) + 1
         text = self._line(line)
         column = max(1, min(column, len(text) + 1))
-        return Place(self.file, line, column, text, max(1, min(length, len(text) - column + 1)))
+        return SourceLocation(
+            self.file, line, column, text, max(1, min(length, len(text) - column + 1))
+        )
 
-    def at(self, span: Span) -> Place:
+    def at(self, span: Span) -> SourceLocation:
         """The place of a node; of a node over several lines, its part of the first."""
         if span.file:
             return self.included[span.file].at(replace(span, file=""))
@@ -150,9 +152,9 @@ class Source:
         span: Span,
         expected: str | None = None,
         hint: str | None = None,
-    ) -> TaskFault:
+    ) -> Diagnostic:
         """A fault at the place of a node."""
-        return TaskFault(code, what, self.at(span), expected=expected, hint=hint)
+        return Diagnostic(code, what, self.at(span), expected=expected, hint=hint)
 
     def _line(self, line: int) -> str:
         return self._lines[line - 1].rstrip("\r")

@@ -1,15 +1,14 @@
-"""Mistakes that people make in a statement, each recognised by how it looks.
+"""Errors that people often make in a statement, each recognised by a pattern of the text.
 
-The first recogniser that finds its mistake names it, so the surest ones stand first. Those of a
-statement as a whole stand here, those inside a course in `slips.py`.
+The first pattern that matches names the error, so the surest ones stand first. Those of a statement
+as a whole stand here, those inside a course in `course_error_patterns.py`.
 """
 
 from __future__ import annotations
 
 import re
 
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault
-from visup.tasks.diagnostics.error_patterns_more import (
+from visup.tasks.diagnostics.course_error_patterns import (
     action_in_angles,
     any_order,
     brackets,
@@ -27,44 +26,51 @@ from visup.tasks.diagnostics.error_patterns_more import (
     signs,
     times,
 )
-from visup.tasks.grammar.statement import NAME, WORDS, Chunk, Mistake, Recogniser
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
+from visup.tasks.grammar.statement import (
+    NAME,
+    RESERVED_WORDS,
+    ErrorPattern,
+    RecognisedError,
+    StatementText,
+)
 
 
-def name_mistake(chunk: Chunk, source: Source) -> TaskFault | None:
+def recognise_error(chunk: StatementText, source: Source) -> Diagnostic | None:
     """The fault of a statement when it is one that people make, or None."""
-    for recognise in RECOGNISERS:
+    for recognise in PATTERNS:
         m = recognise(chunk.text)
         if m is not None:
             place = source.place(*chunk.position(m.start), m.length)
-            return TaskFault(m.code, m.what, place, expected=m.expected, hint=m.hint)
+            return Diagnostic(m.code, m.what, place, expected=m.expected, hint=m.hint)
     return None
 
 
-def _foreign_comment(text: str) -> Mistake | None:
+def _foreign_comment(text: str) -> RecognisedError | None:
     m = re.search(r"//|/\*|(?<!\S)--|(?m:^\s*[%;])", text)
     if m is None:
         return None
     mark = m[0].strip()
     start = m.end() - len(mark)
-    return Mistake("E121", start, len(mark), f"`{mark}` does not begin a comment", "`#`")
+    return RecognisedError("E121", start, len(mark), f"`{mark}` does not begin a comment", "`#`")
 
 
-def _not_in_language(text: str) -> Mistake | None:
+def _not_in_language(text: str) -> RecognisedError | None:
     m = re.match(r"\s*(import|param|stage)\b(?=[ ]+[\w<\"'./])", text)
     if m is not None:
         what = f"`{m[1]}` is not part of the language of task files"
         meant = {"import": '`include "common.task"`', "stage": "`<approach> ::= ...`"}
         expected = meant.get(m[1], "`parameter patience is 90 s`")
-        return Mistake("E127", m.start(1), len(m[1]), what, expected)
+        return RecognisedError("E127", m.start(1), len(m[1]), what, expected)
     m = re.search(r"(?<=[\s)>])(?:until|unless|after|before|while|if)\b(?!\s*[,)])", text)
     if m is not None:
         what = f"`{m[0]}` is not part of the language of task files"
         hint = "in turn is `<a> <b>`, at the same time `<a> & <b>`; a stage `ends when ...`"
-        return Mistake("E127", m.start(), len(m[0]), what, hint=hint)
+        return RecognisedError("E127", m.start(), len(m[0]), what, hint=hint)
     return None
 
 
-def _heading(text: str) -> Mistake | None:
+def _heading(text: str) -> RecognisedError | None:
     m = re.match(r"\s*((task|actor|stage|zone|parameter)s?)\s*:(?!:=)", text, re.I)
     if m is None:
         return None
@@ -76,39 +82,39 @@ def _heading(text: str) -> Mistake | None:
     }
     expected = meant.get(m[2].lower(), "`actor satellite is spartan or hubble`")
     what = f"`{m[1]}:` does not begin a statement"
-    return Mistake("E127", m.start(1), m.end() - m.start(1), what, expected)
+    return RecognisedError("E127", m.start(1), m.end() - m.start(1), what, expected)
 
 
-def _definer(text: str) -> Mistake | None:
+def _definer(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*<[ ]*{NAME}[ ]*>\s*(?!::=(?!=))(::==+|:=|==|=>|=|::(?!=)|:|->|→)", text)
     if m is None:
         return None
     what = f"`{m[1]}` stands where `::=` should"
-    return Mistake("E102", m.start(1), len(m[1]), what, "`::=` after the name of a stage")
+    return RecognisedError("E102", m.start(1), len(m[1]), what, "`::=` after the name of a stage")
 
 
-def _bare_head(text: str) -> Mistake | None:
+def _bare_head(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*({NAME})\s*(?:::=|:=|=)", text)
-    if m is None or m[1] in WORDS:
+    if m is None or m[1] in RESERVED_WORDS:
         return None
     what = f"the name of stage `{m[1]}` stands without angle brackets"
-    return Mistake("E103", m.start(1), len(m[1]), what, f"`<{m[1]}> ::= ...`")
+    return RecognisedError("E103", m.start(1), len(m[1]), what, f"`<{m[1]}> ::= ...`")
 
 
-def _open_head(text: str) -> Mistake | None:
+def _open_head(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*(<[ ]*({NAME}))\s*(?:::=|:=|=)", text)
     if m is not None:
-        return Mistake(
+        return RecognisedError(
             "E107", m.start(1), len(m[1]), f"`<{m[2]}` is not closed", f"`<{m[2]}> ::= ...`"
         )
     m = re.match(rf"\s*({NAME})[ ]*>", text)
     if m is not None:
         what = f"`{m[1]}>` is not opened"
-        return Mistake("E107", m.start(1), len(m[1]) + 1, what, f"`<{m[1]}>`")
+        return RecognisedError("E107", m.start(1), len(m[1]) + 1, what, f"`<{m[1]}>`")
     return None
 
 
-def _not_a_name(text: str) -> Mistake | None:
+def _not_a_name(text: str) -> RecognisedError | None:
     for m in re.finditer(r"<([^<>()|&\n]*)>", text):
         inner = m[1].strip()
         if re.fullmatch(NAME, inner):
@@ -119,15 +125,15 @@ def _not_a_name(text: str) -> Mistake | None:
         if re.fullmatch(NAME, made):
             hint = f"letters, digits and `_` make a name, such as `<{made}>`"
         expected = "a name that begins with a letter"
-        return Mistake("E108", m.start(), len(m[0]), said, expected, hint)
+        return RecognisedError("E108", m.start(), len(m[0]), said, expected, hint)
     return None
 
 
-def _empty_stage(text: str) -> Mistake | None:
+def _empty_stage(text: str) -> RecognisedError | None:
     m = re.fullmatch(rf"\s*(<[ ]*({NAME})[ ]*>)\s*::=\s*", text)
     if m is None:
         return None
-    return Mistake(
+    return RecognisedError(
         "E109",
         m.start(1),
         len(m[1]),
@@ -136,28 +142,30 @@ def _empty_stage(text: str) -> Mistake | None:
     )
 
 
-def _word_as_name(text: str) -> Mistake | None:
-    words = "|".join(WORDS)
+def _word_as_name(text: str) -> RecognisedError | None:
+    words = "|".join(RESERVED_WORDS)
     m = re.search(rf"\((?:[^()]*,)?\s*({words})\s*[,)]|\b({words})\s*\(", text)
     if m is None:
         return None
     word = m[1] or m[2]
     start = m.start(1) if m[1] else m.start(2)
-    return Mistake("E123", start, len(word), f"`{word}` is a word of the language", "another name")
+    return RecognisedError(
+        "E123", start, len(word), f"`{word}` is a word of the language", "another name"
+    )
 
 
-def _actor(text: str) -> Mistake | None:
+def _actor(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*(?:optional\s+)?actor\b\s*({NAME})?\s*(\S*)", text)
     if m is None:
         return None
     expected = "`actor satellite is spartan or hubble`"
-    if m[1] is None or m[1] in WORDS:
+    if m[1] is None or m[1] in RESERVED_WORDS:
         start = m.end() - len(m[0].lstrip())
-        return Mistake("E124", start, 5, "the name of the actor is missing", expected)
+        return RecognisedError("E124", start, 5, "the name of the actor is missing", expected)
     size = re.search(r"\bsize\b(?!\s*\d+(?:\.\d+)?\s*[^\W\d])", text)
     if size is not None:
         what = "`size` is not followed by a number and a unit"
-        return Mistake("E124", size.start(), 4, what, "such as `size 1.6 m`")
+        return RecognisedError("E124", size.start(), 4, what, "such as `size 1.6 m`")
     if m[2] == "is":
         hint = "several models are parted by `or`" if re.search(r"[,|/]|\band\b", text) else None
         spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
@@ -166,20 +174,20 @@ def _actor(text: str) -> Mistake | None:
         what = f"actor `{m[1]}` is declared with something that is not a model"
         if not text[m.end() :].strip(" "):
             what = f"actor `{m[1]}` is declared without a model"
-        return Mistake("E124", m.start(1), len(m[1]), what, expected, hint)
+        return RecognisedError("E124", m.start(1), len(m[1]), what, expected, hint)
     what = f"`is` is missing after actor `{m[1]}`"
-    return Mistake("E124", m.start(1), len(m[1]), what, expected)
+    return RecognisedError("E124", m.start(1), len(m[1]), what, expected)
 
 
-def _include(text: str) -> Mistake | None:
+def _include(text: str) -> RecognisedError | None:
     m = re.match(r"\s*(include)\b", text)
     if m is None:
         return None
     what = "`include` is not followed by a file name in double quotes"
-    return Mistake("E130", m.start(1), 7, what, '`include "common.task"`')
+    return RecognisedError("E130", m.start(1), 7, what, '`include "common.task"`')
 
 
-def _zone(text: str) -> Mistake | None:
+def _zone(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*(zone)\b\s*({NAME})?\s*(is\b)?", text)
     if m is None:
         return None
@@ -191,10 +199,10 @@ def _zone(text: str) -> Mistake | None:
         what = what if m[3] else f"`is` is missing after zone `{m[2]}`"
     start = m.start(2) if m[2] else m.start(1)
     expected = f"`zone {m[2] or 'berth'} is (100, 50) (300, 50) (300, 200)`, in pixels"
-    return Mistake("E131", start, len(m[2] or m[1]), what, expected)
+    return RecognisedError("E131", start, len(m[2] or m[1]), what, expected)
 
 
-def _parameter(text: str) -> Mistake | None:
+def _parameter(text: str) -> RecognisedError | None:
     m = re.match(rf"\s*(parameter)\b\s*({NAME})?\s*(is\b)?", text)
     if m is None:
         return None
@@ -204,23 +212,25 @@ def _parameter(text: str) -> Mistake | None:
         what = what if m[3] else f"`is` is missing after parameter `{m[2]}`"
     start = m.start(2) if m[2] else m.start(1)
     expected = f"`parameter {m[2] or 'patience'} is 90 s`"
-    return Mistake("E132", start, len(m[2] or m[1]), what, expected)
+    return RecognisedError("E132", start, len(m[2] or m[1]), what, expected)
 
 
-def _invariant(text: str) -> Mistake | None:
+def _invariant(text: str) -> RecognisedError | None:
     m = re.match(r"\s*(never|always)\b", text)
     if m is None:
         return None
     place = re.search(r"\b(?:in|while|at)\s+(?=<)", text)
     if place is not None:
         what = f"`{place[0].strip()}` stands where `during` should"
-        return Mistake("E125", place.start(), len(place[0].strip()), what, "`during <approach>`")
+        return RecognisedError(
+            "E125", place.start(), len(place[0].strip()), what, "`during <approach>`"
+        )
     what = f"`{m[1]}` is not followed by a condition"
     expected = f"`{m[1]} touching(arm, radiator)`, perhaps with `during <stage>`"
-    return Mistake("E125", m.start(1), len(m[1]), what, expected)
+    return RecognisedError("E125", m.start(1), len(m[1]), what, expected)
 
 
-RECOGNISERS: tuple[Recogniser, ...] = (
+PATTERNS: tuple[ErrorPattern, ...] = (
     _foreign_comment,
     _heading,
     _include,

@@ -11,7 +11,7 @@ from visup.tasks.diagnostics.diagnostic import CODES, did_you_mean
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
+class CodeExplanation:
     """A code in words.
 
     Attributes:
@@ -36,7 +36,7 @@ class Explanation:
         return "\n".join(said)
 
 
-def explain(code: str) -> Explanation:
+def explain(code: str) -> CodeExplanation:
     """The explanation of a code, in upper or lower case.
 
     Raises:
@@ -53,17 +53,17 @@ def explain(code: str) -> Explanation:
 
 
 @lru_cache(maxsize=1)
-def _all() -> dict[str, Explanation]:
+def _all() -> dict[str, CodeExplanation]:
     text = files("visup.tasks.diagnostics").joinpath("explanations.txt").read_text(encoding="utf-8")
     made = (_read(block.split("\n")) for block in text.strip().split("\n\n"))
     return {e.code: e for e in made}
 
 
-def _read(lines: list[str]) -> Explanation:
+def _read(lines: list[str]) -> CodeExplanation:
     code, *rest = lines
 
     def marked(mark: str) -> str:
         return "\n".join(line[2:] for line in rest if line.startswith(mark))
 
     why = " ".join(line for line in rest if not line.startswith(("- ", "+ ")))
-    return Explanation(code, CODES[code], why, marked("- "), marked("+ "))
+    return CodeExplanation(code, CODES[code], why, marked("- "), marked("+ "))

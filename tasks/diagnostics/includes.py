@@ -7,16 +7,16 @@ from dataclasses import dataclass, field, replace
 
 from visup.agent.model.errors import TaskError
 from visup.tasks.diagnostics.diagnostic import Source
-from visup.tasks.diagnostics.normalise import clean
-from visup.tasks.diagnostics.recovery import Parsed, parse
+from visup.tasks.diagnostics.normalise import normalise
+from visup.tasks.diagnostics.recovery import ParsedFile, parse
 from visup.tasks.grammar.nodes import Include, Task
-from visup.tasks.grammar.parser import moved
+from visup.tasks.grammar.parser import relocated
 
 Read = Callable[[str, str], tuple[str, str]]
 """(path, the file that includes it) -> (name of the file, its text); raises TaskError."""
 
 
-def join_included(parsed: Parsed, source: Source, read: Read) -> Parsed:
+def join_included(parsed: ParsedFile, source: Source, read: Read) -> ParsedFile:
     """A file with the statements of the files that it includes behind its own.
 
     Args:
@@ -42,13 +42,13 @@ class _Joiner:
     read: Read
     taken: set[str] = field(default_factory=set)
 
-    def join(self, parsed: Parsed, chain: tuple[str, ...]) -> Parsed:
+    def join(self, parsed: ParsedFile, chain: tuple[str, ...]) -> ParsedFile:
         whole = replace(parsed, task=replace(parsed.task, includes=()))
         for include in parsed.task.includes:
             whole = _joined(whole, self.included(include, chain))
         return whole
 
-    def included(self, include: Include, chain: tuple[str, ...]) -> Parsed:
+    def included(self, include: Include, chain: tuple[str, ...]) -> ParsedFile:
         try:
             file, text = self.read(include.path, chain[-1])
         except TaskError as e:
@@ -61,23 +61,23 @@ class _Joiner:
             hint = "move what both need to a third file"
             return self.fault("E222", f"files include each other: {circle}", include, None, hint)
         if file in self.taken:
-            return Parsed(Task(()))
+            return ParsedFile(Task(()))
         self.taken.add(file)
         source = self.source.included[file] = Source(text, file)
-        code, odd = clean(text, source)
+        code, odd = normalise(text, source)
         parsed = parse(code, source)
-        task = moved(parsed.task, file)
+        task = relocated(parsed.task, file)
         stages = tuple(replace(s, is_task=False) for s in task.stages)
         told = replace(parsed, task=replace(task, stages=stages), faults=(*odd, *parsed.faults))
         return self.join(told, (*chain, file))
 
     def fault(
         self, code: str, what: str, include: Include, expected: str | None, hint: str | None
-    ) -> Parsed:
-        return Parsed(Task(()), (self.source.fault(code, what, include.span, expected, hint),))
+    ) -> ParsedFile:
+        return ParsedFile(Task(()), (self.source.fault(code, what, include.span, expected, hint),))
 
 
-def _joined(one: Parsed, other: Parsed) -> Parsed:
+def _joined(one: ParsedFile, other: ParsedFile) -> ParsedFile:
     a, b = one.task, other.task
     task = replace(
         a,
@@ -87,6 +87,6 @@ def _joined(one: Parsed, other: Parsed) -> Parsed:
         zones=(*a.zones, *b.zones),
         parameters=(*a.parameters, *b.parameters),
     )
-    return Parsed(
+    return ParsedFile(
         task, (*one.faults, *other.faults), one.defined | other.defined, one.used | other.used
     )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 
-from visup.agent.model.errors import Place
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault
+from visup.agent.model.errors import SourceLocation
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 
 COMMENT = re.compile(r"#.*")
 TEXT = re.compile(r"""(?:::=|\binclude\b)\s*("[^"\n]*"|[“”„«][^“”»"\n]*[“”»])""")
 OWN_LINE = re.compile(r"""\s*("[^"\n]*"|[“”„«][^“”»"\n]*[“”»])""")
 
-LIKE = {
+LOOKALIKES = {
     "：": ":", "＝": "=", "＜": "<", "＞": ">", "（": "(", "）": ")", "，": ",", "｜": "|",
     "＊": "*", "＋": "+", "？": "?", "＆": "&", "‹": "<", "›": ">", "⟨": "<", "⟩": ">",
     "〈": "<", "〉": ">", "¦": "|", "∣": "|", "\u00a0": " ", "\u2009": " ", "\u202f": " ",
@@ -21,7 +21,7 @@ QUOTES = "\"'`“”‘’„‚«»′″"
 UNUSUAL = re.compile(r"[#\x00-\x0c\x0e-\x1f\x7f\"'`]")
 
 
-def clean(text: str, source: Source) -> tuple[str, list[TaskFault]]:
+def normalise(text: str, source: Source) -> tuple[str, list[Diagnostic]]:
     """The text without what only looks wrong, so that it hides nothing else.
 
     Args:
@@ -32,7 +32,7 @@ def clean(text: str, source: Source) -> tuple[str, list[TaskFault]]:
         Text of the same length, in which tabs, quotes and typographic characters are what was
         meant and comments are blank; and one fault for each run of them.
     """
-    faults: list[TaskFault] = []
+    faults: list[Diagnostic] = []
     lines = text.split("\n")
     before = ""
     for number, line in enumerate(lines, 1):
@@ -46,7 +46,7 @@ def clean(text: str, source: Source) -> tuple[str, list[TaskFault]]:
 
 
 def _clean_line(
-    line: str, before: str, number: int, source: Source, faults: list[TaskFault]
+    line: str, before: str, number: int, source: Source, faults: list[Diagnostic]
 ) -> str:
     """The line as it was meant; of each kind of odd character the line is told once."""
     text = _text_in(line, before)
@@ -57,7 +57,7 @@ def _clean_line(
     if text[1][0] != '"':
         what = f"typographic quotes `{text[1][0]}`"
         place = source.place(number, start + 1, end - start)
-        faults.append(TaskFault("E105", what, place, expected='`"` on both sides'))
+        faults.append(Diagnostic("E105", what, place, expected='`"` on both sides'))
     said = "".join(" " if _odd(c) in ("E104", "E106") else c for c in line[start + 1 : end - 1])
     rest = COMMENT.sub(lambda m: " " * len(m[0]), line[end:])
     first = _clean_code(line[:start], 0, number, source, faults)
@@ -71,7 +71,7 @@ def _text_in(line: str, before: str) -> re.Match[str] | None:
 
 
 def _clean_code(
-    code: str, offset: int, number: int, source: Source, faults: list[TaskFault]
+    code: str, offset: int, number: int, source: Source, faults: list[Diagnostic]
 ) -> str:
     told = set()
     for i, char in enumerate(code):
@@ -93,7 +93,7 @@ def _quoted(line: str, start: int) -> int:
 def _odd(char: str) -> str:
     if char == "\t":
         return "E106"
-    if char in QUOTES or char in LIKE:
+    if char in QUOTES or char in LOOKALIKES:
         return "E105"
     if (char < " " and char != "\r") or char in "\x7f\ufffd":
         return "E104"
@@ -101,30 +101,30 @@ def _odd(char: str) -> str:
 
 
 def _meant(char: str) -> str:
-    return LIKE.get(char, " ")
+    return LOOKALIKES.get(char, " ")
 
 
-def _odd_fault(code: str, char: str, place: Place) -> TaskFault:
+def _odd_fault(code: str, char: str, place: SourceLocation) -> Diagnostic:
     if code == "E106":
-        return TaskFault(code, "a tab", place, expected="spaces", hint="use spaces")
+        return Diagnostic(code, "a tab", place, expected="spaces", hint="use spaces")
     if code == "E104":
-        return TaskFault(code, f"a character that is not text (U+{ord(char):04X})", place)
+        return Diagnostic(code, f"a character that is not text (U+{ord(char):04X})", place)
     if char in QUOTES:
         what = "typographic quotes" if ord(char) > 127 else "quotes"
         hint = "names are written without quotes"
-        return TaskFault(code, f"{what} `{char}`", place, expected="a name", hint=hint)
-    plain = LIKE[char]
+        return Diagnostic(code, f"{what} `{char}`", place, expected="a name", hint=hint)
+    plain = LOOKALIKES[char]
     shown = "an ordinary space" if plain == " " else f"`{plain}`"
     what = f"`{char}` (U+{ord(char):04X}) only looks like {shown}"
-    return TaskFault(code, what, place, expected=shown, hint="type it on the keyboard")
+    return Diagnostic(code, what, place, expected=shown, hint="type it on the keyboard")
 
 
-def _one_for_tabs(faults: list[TaskFault]) -> list[TaskFault]:
+def _one_for_tabs(faults: list[Diagnostic]) -> list[Diagnostic]:
     """All tabs of a file are one habit, told once."""
     tabs = [f for f in faults if f.code == "E106"]
     if len(tabs) < 2:
         return faults
     lines = len({f.place.line for f in tabs})
     what = f"tabs, here and in {lines} lines" if lines > 1 else "tabs"
-    first = TaskFault("E106", what, tabs[0].place, expected="spaces", hint="use spaces")
+    first = Diagnostic("E106", what, tabs[0].place, expected="spaces", hint="use spaces")
     return [first if f is tabs[0] else f for f in faults if f is tabs[0] or f.code != "E106"]

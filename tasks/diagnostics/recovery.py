@@ -10,11 +10,11 @@ from itertools import pairwise
 
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault, did_you_mean
-from visup.tasks.diagnostics.error_patterns import name_mistake
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, did_you_mean
+from visup.tasks.diagnostics.error_patterns import recognise_error
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import collect, read, read_statements
-from visup.tasks.grammar.statement import WORDS, Chunk, without_texts
+from visup.tasks.grammar.statement import RESERVED_WORDS, StatementText, blank_strings
 
 NAME = r"[^\W\d]\w*"
 HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
@@ -32,7 +32,7 @@ LONGEST = 4000  # characters of a statement that mistakes are looked for in
 
 
 @dataclass(frozen=True, slots=True)
-class Parsed:
+class ParsedFile:
     """What could be read of a text.
 
     Attributes:
@@ -43,7 +43,7 @@ class Parsed:
     """
 
     task: Task
-    faults: tuple[TaskFault, ...] = ()
+    faults: tuple[Diagnostic, ...] = ()
     defined: frozenset[str] = frozenset()
     used: frozenset[str] = frozenset()
 
@@ -53,7 +53,7 @@ class Parsed:
         return any(f.code in ("E130", "E221", "E222") for f in self.faults)
 
 
-def parse(text: str, source: Source) -> Parsed:
+def parse(text: str, source: Source) -> ParsedFile:
     """Read a cleaned text; where it is not in the grammar, statement by statement.
 
     Args:
@@ -63,40 +63,40 @@ def parse(text: str, source: Source) -> Parsed:
     Returns:
         The tree of all well written statements, one fault for each other one.
     """
-    deep = _too_deep(without_texts(text), source)
+    deep = _too_deep(blank_strings(text), source)
     if deep:
-        return Parsed(Task(()), (deep,))
+        return ParsedFile(Task(()), (deep,))
     try:
-        return Parsed(read(text, source.file))
+        return ParsedFile(read(text, source.file))
     except UnexpectedInput:
         return _parse_in_parts(text, source)
 
 
-def _parse_in_parts(text: str, source: Source) -> Parsed:
+def _parse_in_parts(text: str, source: Source) -> ParsedFile:
     statements: list[object] = []
-    faults: list[TaskFault] = []
+    faults: list[Diagnostic] = []
     defined: set[str] = set()
     used: set[str] = set()
     for chunk in split(text):
         try:
             statements += read_statements(_in_place(chunk))
         except UnexpectedInput as e:
-            faults.append(name_mistake(_near(chunk, e), source) or _unexpected(e, chunk, source))
+            faults.append(recognise_error(_near(chunk, e), source) or _unexpected(e, chunk, source))
             first = DECLARES.match(chunk.text)
             defined |= {first[1]} if first else set()
             used |= set(re.findall(NAME, chunk.text))
     if not faults:  # each part reads well, but not all of them together
         faults = [_whole(text, source)]
     task = collect(statements, source.file)
-    return Parsed(task, tuple(faults), frozenset(defined), frozenset(used))
+    return ParsedFile(task, tuple(faults), frozenset(defined), frozenset(used))
 
 
-def _in_place(chunk: Chunk) -> str:
+def _in_place(chunk: StatementText) -> str:
     """The statement with so much blank before it that its places are those in its file."""
     return "\n" * (chunk.line - 1) + " " * (chunk.column - 1) + chunk.raw
 
 
-def _near(chunk: Chunk, error: UnexpectedInput) -> Chunk:
+def _near(chunk: StatementText, error: UnexpectedInput) -> StatementText:
     """A statement, cut around the error when it is so long that looking at all of it takes long."""
     if len(chunk.text) <= LONGEST:
         return chunk
@@ -106,16 +106,16 @@ def _near(chunk: Chunk, error: UnexpectedInput) -> Chunk:
     at = min(len(chunk.text), max(0, starts[row] + column))
     start, end = max(0, at - LONGEST // 2), at + LONGEST // 4
     line, column = chunk.position(start)
-    return Chunk(chunk.text[start:end], line, column)
+    return StatementText(chunk.text[start:end], line, column)
 
 
-def split(text: str) -> Iterator[Chunk]:
+def split(text: str) -> Iterator[StatementText]:
     """A cleaned text, cut where statements begin, as far as that can be told.
 
     Statements begin at `<name> ::=` anywhere, at lines that look like the beginning of one,
     and at unindented lines that begin with a name that is not defined elsewhere.
     """
-    code = without_texts(text)
+    code = blank_strings(text)
     heads = {m[0].split(">")[0].strip("< ") for m in HEAD.finditer(code)}
     starts = {m.start() for m in MARKED_HEAD.finditer(code)}
     lines = [0]
@@ -130,7 +130,7 @@ def split(text: str) -> Iterator[Chunk]:
         if code[a:b].strip() or text[a:b].strip():
             row = bisect_right(lines, a)
             raw = text[a:b].rstrip()
-            yield Chunk(code[a : a + len(raw)], row, a - lines[row - 1] + 1, raw)
+            yield StatementText(code[a : a + len(raw)], row, a - lines[row - 1] + 1, raw)
 
 
 def _begins(line: str, before: str, heads: set[str]) -> bool:
@@ -142,7 +142,7 @@ def _begins(line: str, before: str, heads: set[str]) -> bool:
     return bool(first) and first[1] not in heads if first else False
 
 
-def _too_deep(text: str, source: Source) -> TaskFault | None:
+def _too_deep(text: str, source: Source) -> Diagnostic | None:
     depth = 0
     for match in re.finditer(r"[()]", text):
         depth = depth + 1 if match[0] == "(" else max(0, depth - 1)
@@ -150,16 +150,16 @@ def _too_deep(text: str, source: Source) -> TaskFault | None:
             line = text.count("\n", 0, match.start()) + 1
             column = match.start() - text.rfind("\n", 0, match.start())
             what = f"brackets are nested more than {DEEPEST} deep"
-            return TaskFault("E128", what, source.place(line, column), hint="name a stage instead")
+            return Diagnostic("E128", what, source.place(line, column), hint="name a stage instead")
     return None
 
 
-def _whole(text: str, source: Source) -> TaskFault:
+def _whole(text: str, source: Source) -> Diagnostic:
     try:
         read(text)
     except UnexpectedInput as e:
-        return _unexpected(e, Chunk(text, 1, 1, text), source)
-    return TaskFault("E101", "text that is not part of the language", source.place(1, 1))
+        return _unexpected(e, StatementText(text, 1, 1, text), source)
+    return Diagnostic("E101", "text that is not part of the language", source.place(1, 1))
 
 
 SAID = {
@@ -189,12 +189,12 @@ SAID = {
     "$END": "the end of the file",
 }
 KEYWORDS = (
-    *WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
+    *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "when", "and", "not",
 )  # fmt: skip
 
 
-def _unexpected(error: UnexpectedInput, chunk: Chunk, source: Source) -> TaskFault:
+def _unexpected(error: UnexpectedInput, chunk: StatementText, source: Source) -> Diagnostic:
     """The fault when no particular mistake was recognised: what stands there, what could."""
     if isinstance(error, UnexpectedToken):
         token, allowed = error.token, error.accepts or error.expected
@@ -205,7 +205,7 @@ def _unexpected(error: UnexpectedInput, chunk: Chunk, source: Source) -> TaskFau
     ended = isinstance(error, UnexpectedToken) and error.token.type == "$END"
     line, column = (*chunk.end,) if ended or error.line < 1 else (error.line, error.column)
     what = "the statement ends too early" if ended else f"unexpected `{found}`"
-    return TaskFault(
+    return Diagnostic(
         "E101",
         what,
         source.place(line, column, max(1, len(found))),
@@ -227,7 +227,7 @@ def _said(terminals: set[str]) -> str | None:
     return ordered[0] if len(ordered) == 1 else f"{', '.join(ordered[:-1])} or {ordered[-1]}"
 
 
-def _word_at(chunk: Chunk, line: int, column: int) -> str:
+def _word_at(chunk: StatementText, line: int, column: int) -> str:
     rows = chunk.raw.split("\n")
     row = rows[min(max(0, line - chunk.line), len(rows) - 1)]
     start = column - 1 - (chunk.column - 1 if line == chunk.line else 0)

@@ -10,17 +10,17 @@ from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 from visup.tasks.grammar.conditions import Fact, action_of
-from visup.tasks.grammar.graphs import circles, reach, sorted_by_need
+from visup.tasks.grammar.graphs import cycles, dependencies_first, reachable
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
     AnyOrder,
     Choice,
     Comparison,
+    Conditioned,
     Counted,
     Course,
     Hold,
-    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -70,38 +70,38 @@ class Grammar:
     @cached_property
     def reached(self) -> frozenset[str]:
         """Stages that the tasks of the file can come to, themselves with them."""
-        return reach(self.mentions, [r for r in self.task.roots if r in self.stages])
+        return reachable(self.mentions, [r for r in self.task.roots if r in self.stages])
 
-    def unreached(self) -> list[Stage]:
+    def unreachable(self) -> list[Stage]:
         """Stages that the task never comes to; of those that lead to each other only the first."""
         lost = [s for s in self.stages.values() if s.name not in self.reached]
         named = {n for s in lost for n in self.mentions[s.name] if n != s.name}
         roots = [s for s in lost if s.name not in named]
         return roots or lost[:1]
 
-    def may_be_left_out(self, course: Course) -> bool:
+    def nullable(self, course: Course) -> bool:
         """Whether nothing need be seen of a course."""
         return self._empty(course, self._empty_stages)
 
-    def begin_with_themselves(self) -> list[Stage]:
+    def left_recursive(self) -> list[Stage]:
         """Stages that come to themselves before any action; of each circle only the first."""
         order = {name: i for i, name in enumerate(self.stages)}
         firsts = {name: tuple(self._first_of(stage)) for name, stage in self.stages.items()}
-        found = [min(circle, key=order.__getitem__) for circle in circles(firsts)]
+        found = [min(circle, key=order.__getitem__) for circle in cycles(firsts)]
         return [self.stages[n] for n in sorted(found, key=order.__getitem__)]
 
-    def never_end(self) -> list[Stage]:
+    def non_terminating(self) -> list[Stage]:
         """Stages all of whose courses go on for ever, the first only."""
         lasting = [s for n, s in self.stages.items() if self._least_times[n] == NEVER]
         named = {n for s in lasting for n in self.mentions[s.name]}
         own = [s for s in lasting if s.name in named]
         return (own or lasting)[:1]
 
-    def least_time(self, course: Course) -> float:
+    def min_duration(self, course: Course) -> float:
         """Seconds that a course takes at least, by its `for` clauses."""
         return self._least(course, self._least_times)
 
-    def follows_on(self, course: Course) -> bool:
+    def is_sequential(self, course: Course) -> bool:
         """Whether a course has things in it that follow one another."""
         return self._has_turns(walk(course), self._turning)
 
@@ -110,7 +110,7 @@ class Grammar:
         seen = set()
         while True:
             match course:
-                case Timed(item=item) | Judged(item=item):
+                case Timed(item=item) | Conditioned(item=item):
                     course = item
                 case Reference(stage=name):
                     fact = self._as_fact(course)
@@ -143,7 +143,7 @@ class Grammar:
     @cached_property
     def _bottom_up(self) -> list[tuple[str, Course]]:
         """Stages with a course, each after those that it refers to, as far as there are no circles."""
-        named = ((n, self.stages[n].body) for n in sorted_by_need(self.mentions))
+        named = ((n, self.stages[n].body) for n in dependencies_first(self.mentions))
         return [(n, body) for n, body in named if not isinstance(body, Actors)]
 
     @cached_property
@@ -168,7 +168,7 @@ class Grammar:
                 return any(self._empty(o, stages) for o in options)
             case Sequence(items=parts) | Together(parts=parts) | AnyOrder(items=parts):
                 return all(self._empty(p, stages) for p in parts)
-            case Timed(item=item) | Judged(item=item):
+            case Timed(item=item) | Conditioned(item=item):
                 return self._empty(item, stages)
             case Repeated(item=item, mark=mark):
                 return mark != "+" or self._empty(item, stages)
@@ -185,13 +185,15 @@ class Grammar:
                 return [name] if name in self.stages else []
             case Choice(options=parts) | Together(parts=parts) | AnyOrder(items=parts):
                 return [n for p in parts for n in self._first(p)]
-            case Timed(item=item) | Repeated(item=item) | Counted(item=item) | Judged(item=item):
+            case (
+                Timed(item=item) | Repeated(item=item) | Counted(item=item) | Conditioned(item=item)
+            ):
                 return self._first(item)
             case Sequence(items=items):
                 found: list[str] = []
                 for item in items:
                     found += self._first(item)
-                    if not self.may_be_left_out(item):
+                    if not self.nullable(item):
                         break
                 return found
         return []
@@ -225,7 +227,7 @@ class Grammar:
                 return self._least(item, times) if mark == "+" else 0.0
             case Counted(item=item, least=least):
                 return least * self._least(item, times) if least else 0.0
-            case Judged(item=item):
+            case Conditioned(item=item):
                 return self._least(item, times)
             case Timed(item=item, clauses=clauses):
                 amounts = (self.task.amount(c.duration) for c in clauses if isinstance(c, Hold))
@@ -245,7 +247,7 @@ class Grammar:
             for n, body in bodies
             if not isinstance(body, Actors) and self._has_turns(walk(body), frozenset())
         ]
-        return reach({n: tuple(users.get(n, ())) for n in self.stages}, own)
+        return reachable({n: tuple(users.get(n, ())) for n in self.stages}, own)
 
     def _has_turns(self, courses: Iterable[Course], turning: frozenset[str]) -> bool:
         return any(

@@ -1,6 +1,6 @@
 """Courses: what stages ask for, as frozen nodes that print themselves back as source.
 
-Read before: `conditions.py` (actions and conditions). Read next: `tree.py` (the file as a whole).
+Read before: `conditions.py` (actions and conditions). Read next: `nodes.py` (the file as a whole).
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class Timed:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class Conditioned:
     """`a begins when b fails when c`: a course with signs of its own."""
 
     item: Course
@@ -181,7 +181,7 @@ Course: TypeAlias = (
     | Sequence
     | Together
     | AnyOrder
-    | Judged
+    | Conditioned
     | Timed
     | Counted
     | Repeated
@@ -196,7 +196,7 @@ BINDS: dict[type, int] = {
     Choice: CHOICE,
     Sequence: SEQUENCE,
     Together: TOGETHER,
-    Judged: JUDGED,
+    Conditioned: JUDGED,
     Timed: CLAUSED,
     Counted: CLAUSED,
     Repeated: REPEATED,
@@ -210,7 +210,7 @@ def children(course: Course) -> tuple[Course, ...]:
             return inner
         case Sequence(items=inner) | AnyOrder(items=inner):
             return inner
-        case Timed(item=item) | Repeated(item=item) | Counted(item=item) | Judged(item=item):
+        case Timed(item=item) | Repeated(item=item) | Counted(item=item) | Conditioned(item=item):
             return (item,)
     return ()
 

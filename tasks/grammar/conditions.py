@@ -2,7 +2,7 @@
 
 Frozen nodes of the tree of a task file, each of which prints itself back as source.
 
-Read next: `tree.py` (courses, and the file as a whole).
+Read next: `ast_courses.py` (courses), `nodes.py` (the file as a whole).
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True)
-class Denied:
+class Not:
     """`not touching(arm, satellite)`."""
 
     item: Condition
@@ -97,37 +97,37 @@ class Denied:
 
 
 @dataclass(frozen=True, slots=True)
-class Both:
+class And:
     """`touching(a, b) and present(c)`: all of them."""
 
     parts: tuple[Condition, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return " and ".join(_within(p, (Action, Comparison, Denied)) for p in self.parts)
+        return " and ".join(_within(p, (Action, Comparison, Not)) for p in self.parts)
 
 
 @dataclass(frozen=True, slots=True)
-class Either:
+class Or:
     """`touching(a, b) or coupled(a, b)`: at least one of them."""
 
     parts: tuple[Condition, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return " or ".join(_within(p, (Action, Comparison, Denied, Both)) for p in self.parts)
+        return " or ".join(_within(p, (Action, Comparison, Not, And)) for p in self.parts)
 
 
 Fact: TypeAlias = Action | Comparison
-Condition: TypeAlias = Action | Comparison | Denied | Both | Either
+Condition: TypeAlias = Action | Comparison | Not | And | Or
 
 
 def parts_of(condition: Condition) -> tuple[Condition, ...]:
     """The conditions directly inside one."""
     match condition:
-        case Both(parts=parts) | Either(parts=parts):
+        case And(parts=parts) | Or(parts=parts):
             return parts
-        case Denied(item=item):
+        case Not(item=item):
             return (item,)
     return ()
 

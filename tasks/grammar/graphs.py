@@ -8,7 +8,7 @@ Graph = Mapping[str, tuple[str, ...]]
 """Name -> the names that it leads to, all of them keys."""
 
 
-def reach(graph: Graph, starts: Iterable[str]) -> frozenset[str]:
+def reachable(graph: Graph, starts: Iterable[str]) -> frozenset[str]:
     """All that can be come to from some nodes, themselves with them."""
     seen: set[str] = set()
     todo = list(starts)
@@ -20,7 +20,7 @@ def reach(graph: Graph, starts: Iterable[str]) -> frozenset[str]:
     return frozenset(seen)
 
 
-def sorted_by_need(graph: Graph) -> list[str]:
+def dependencies_first(graph: Graph) -> list[str]:
     """All nodes, each after those that it leads to, as far as there are no circles."""
     done: dict[str, None] = {}
     entered: set[str] = set()
@@ -41,7 +41,7 @@ def sorted_by_need(graph: Graph) -> list[str]:
     return list(done)
 
 
-def circles(graph: Graph) -> list[list[str]]:
+def cycles(graph: Graph) -> list[list[str]]:
     """The strongly connected parts of a graph that hold a circle (by Kosaraju)."""
     back: dict[str, list[str]] = {n: [] for n in graph}
     for node, following in graph.items():
@@ -49,7 +49,7 @@ def circles(graph: Graph) -> list[list[str]]:
             back[other].append(node)
     found: list[list[str]] = []
     told: set[str] = set()
-    for start in reversed(sorted_by_need(graph)):
+    for start in reversed(dependencies_first(graph)):
         part, todo = [], [start]
         while todo:
             node = todo.pop()

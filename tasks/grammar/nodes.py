@@ -3,8 +3,7 @@
 `str(node)` is text of the task language and reads back as the same node; where a node stands in
 its file (`span`) takes no part in equality. Spacing, comments and needless brackets are not kept.
 
-Read before: `conditions.py` and `courses.py`. Read next: `read.py` (text to tree),
-`check.py` (what a tree must also satisfy).
+Read before: `conditions.py` and `ast_courses.py`. Read next: `parser.py` (text to tree).
 """
 
 from __future__ import annotations
@@ -16,11 +15,11 @@ from visup.tasks.grammar.ast_courses import (
     AnyOrder,
     Choice,
     Clause,
+    Conditioned,
     Counted,
     Course,
     Deadline,
     Hold,
-    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -52,13 +51,13 @@ __all__ = [
     "Clause",
     "Comparison",
     "Condition",
+    "Conditioned",
     "Counted",
     "Course",
     "Deadline",
     "Hold",
     "Include",
     "Invariant",
-    "Judged",
     "Name",
     "Parameter",
     "Reference",

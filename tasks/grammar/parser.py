@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol, TypeVar, cast
 
 from lark import Lark, Token, Transformer
 
-from visup.tasks.grammar.conditions import Both, Condition, Denied, Either, Fact
+from visup.tasks.grammar.conditions import And, Condition, Fact, Not, Or
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -20,13 +20,13 @@ from visup.tasks.grammar.nodes import (
     Choice,
     Clause,
     Comparison,
+    Conditioned,
     Counted,
     Course,
     Deadline,
     Hold,
     Include,
     Invariant,
-    Judged,
     Name,
     Parameter,
     Reference,
@@ -118,11 +118,11 @@ def _parser() -> Lark:
         parser="lalr",
         lexer="contextual",
         maybe_placeholders=False,
-        transformer=_ToTree(),  # at once: a tree of Lark's own in between costs half of the time
+        transformer=_TaskBuilder(),  # at once: a tree of Lark's own in between costs half of the time
     )
 
 
-class _ToTree(Transformer[Token, Any]):
+class _TaskBuilder(Transformer[Token, Any]):
     """One method for each rule of the grammar."""
 
     def start(self, items: list[Any]) -> list[Any]:
@@ -185,8 +185,8 @@ class _ToTree(Transformer[Token, Any]):
         first, *courses, last = items
         return AnyOrder(tuple(courses), _over(_of(first), _of(last)))
 
-    def judged(self, items: list[Any]) -> Judged:
-        return Judged(items[0], tuple(items[1:]), _all(items))
+    def judged(self, items: list[Any]) -> Conditioned:
+        return Conditioned(items[0], tuple(items[1:]), _all(items))
 
     def timed(self, items: list[Any]) -> Timed:
         return Timed(items[0], cast("tuple[Clause, ...]", tuple(items[1:])), _all(items))
@@ -234,15 +234,15 @@ class _ToTree(Transformer[Token, Any]):
     def reference(self, items: list[Token]) -> Reference:
         return Reference(_bare(items[0]), _of(items[0]))
 
-    def either(self, items: list[Condition]) -> Either:
-        return Either(tuple(items), _all(items))
+    def either(self, items: list[Condition]) -> Or:
+        return Or(tuple(items), _all(items))
 
-    def both(self, items: list[Condition]) -> Both:
-        return Both(tuple(items), _all(items))
+    def both(self, items: list[Condition]) -> And:
+        return And(tuple(items), _all(items))
 
-    def denied(self, items: list[Any]) -> Denied:
+    def denied(self, items: list[Any]) -> Not:
         item = cast("Fact", items[1])
-        return Denied(item, _over(_of(items[0]), item.span))
+        return Not(item, _over(_of(items[0]), item.span))
 
 
 def _names(tokens: list[Token]) -> tuple[Name, ...]:
@@ -274,7 +274,7 @@ def _all(items: Several[_Placed]) -> Span:
     return _over(items[0].span, items[-1].span)
 
 
-def moved(task: Task, file: str) -> Task:
+def relocated(task: Task, file: str) -> Task:
     """The same tree with every place said to be in an included file."""
     return cast("Task", _moved(task, file))
 

@@ -7,20 +7,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 NAME = r"[^\W\d]\w*"
-WORDS = (
+RESERVED_WORDS = (
     "actor", "is", "or", "never", "always", "during", "for", "within", "include", "parameter",
     "zone",
 )  # fmt: skip
-SAID = re.compile(r'"[^"\n]*"')
+QUOTED = re.compile(r'"[^"\n]*"')
 
 
-def without_texts(text: str) -> str:
+def blank_strings(text: str) -> str:
     """A text with what stands in double quotes blank, so that no word of it is taken for code."""
-    return SAID.sub(lambda m: " " * len(m[0]), text) if '"' in text else text
+    return QUOTED.sub(lambda m: " " * len(m[0]), text) if '"' in text else text
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
+class StatementText:
     """A statement that does not parse, and where it begins in its file (counted from 1).
 
     Attributes:
@@ -48,7 +48,7 @@ class Chunk:
 
 
 @dataclass(frozen=True, slots=True)
-class Mistake:
+class RecognisedError:
     """A recognised mistake: offsets in the statement, and what is said of it."""
 
     code: str
@@ -59,5 +59,5 @@ class Mistake:
     hint: str | None = None
 
 
-Recogniser = Callable[[str], Mistake | None]
+ErrorPattern = Callable[[str], RecognisedError | None]
 """Looks at the text of a statement and finds its mistake, or None."""

@@ -8,14 +8,23 @@ from functools import wraps
 from typing import TypeVar
 
 from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
-from visup.tasks.grammar.nodes import Action, Actors, Course, Judged, Reference, Stage, Task, walk
+from visup.tasks.grammar.nodes import (
+    Action,
+    Actors,
+    Conditioned,
+    Course,
+    Reference,
+    Stage,
+    Task,
+    walk,
+)
 from visup.tasks.grammar.units import value
 
 T = TypeVar("T")
-MOST_TASKS = 64  # of so many tasks what was read off is remembered
+MAX_CACHED = 64  # of so many tasks what was read off is remembered
 
 
-def once(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
+def cached_by_identity(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
     """A function of a task that is worked out once for each, as long as it is the same object.
 
     Supervision asks at each step; comparing whole trees would take as long as reading them.
@@ -26,7 +35,7 @@ def once(read_off: Callable[[Task], T]) -> Callable[[Task], T]:
     def remembered(task: Task) -> T:
         found = known.get(id(task))
         if found is None or found[0] is not task:
-            if len(known) >= MOST_TASKS:
+            if len(known) >= MAX_CACHED:
                 known.clear()
             found = known[id(task)] = (task, read_off(task))
         return found[1]
@@ -45,7 +54,7 @@ def tasks_of(file: Task) -> tuple[Task, ...]:
     return tuple(found)
 
 
-@once
+@cached_by_identity
 def stage_names(task: Task) -> tuple[str, ...]:
     """The stages that ask for actions themselves, in the order in which the task comes to them."""
     root = task.stage(task.name)
@@ -68,20 +77,22 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(a for n in walk(rule.body) for a in _names(task, n)))
 
 
-@once
+@cached_by_identity
 def task_actors(task: Task) -> tuple[str, ...]:
     """All actors of a task, in the order in which its stages ask for them."""
     staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
-    watched = [a for i in task.invariants for f in facts_of(i.condition) for a in keyed(task, f)[1]]
+    watched = [
+        a for i in task.invariants for f in facts_of(i.condition) for a in fact_key(task, f)[1]
+    ]
     return tuple(dict.fromkeys((*staged, *watched)))
 
 
-def undrawn(task: Task) -> tuple[str, ...]:
+def undrawn_zones(task: Task) -> tuple[str, ...]:
     """The zones that a task names without corners: someone else must have drawn them."""
     return tuple(z.name for z in task.zones if not z.corners)
 
 
-def sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) -> dict[str, float]:
+def declared_sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) -> dict[str, float]:
     """The real sizes that some tasks declare, by model.
 
     Args:
@@ -100,7 +111,7 @@ def sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) -> dict[str
     return found
 
 
-def keyed(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
+def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     """The key of a fact of a task, and the actors of whom it speaks.
 
     A plain action is its own key; in that of a comparison stand its sign and amount, in that of an
@@ -117,14 +128,14 @@ def keyed(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
 def _names(task: Task, node: Course) -> tuple[str, ...]:
     match node:
         case Action() | Comparison():
-            return keyed(task, node)[1]
-        case Judged(conditions=signs):
+            return fact_key(task, node)[1]
+        case Conditioned(conditions=signs):
             facts = (f for s in signs for f in facts_of(s.condition))
-            return tuple(a for f in facts for a in keyed(task, f)[1])
+            return tuple(a for f in facts for a in fact_key(task, f)[1])
         case Reference(stage=name):
             rule = task.stage(name)
             if rule is not None and isinstance(rule.body, Actors):
-                return keyed(task, Action(rule.name, rule.body.names))[1]
+                return fact_key(task, Action(rule.name, rule.body.names))[1]
     return ()
 
 

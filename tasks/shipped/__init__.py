@@ -1,1 +1,1 @@
-"""The task files that ship with visup, found by their names."""
+"""The task files that ship with visup; `visup task list` names them."""

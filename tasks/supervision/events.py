@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from visup.agent import (
-    Concern,
+    AlertCondition,
     Event,
     Mind,
     Severity,
@@ -117,7 +117,7 @@ def _done(belief: TaskBelief) -> set[str]:
     return {s.stage for s in belief.stages if s.status is Status.DONE}
 
 
-def stage_concerns(belief: TaskBelief) -> Iterator[Concern]:
+def stage_concerns(belief: TaskBelief) -> Iterator[AlertCondition]:
     """A concern for each stage that is failing or has failed.
 
     A task that was interrupted is not expected to go on, so its stages are no concern any more.
@@ -127,7 +127,7 @@ def stage_concerns(belief: TaskBelief) -> Iterator[Concern]:
     for stage in belief.stages:
         if stage.status in BAD:
             cause = stage_sentence("stage_failing", stage.stage, belief.task, stage.evidence)
-            yield Concern(
+            yield AlertCondition(
                 "stage_failing",
                 _objects(belief),
                 Severity.WARNING,

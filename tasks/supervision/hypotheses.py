@@ -17,8 +17,8 @@ from functools import cached_property
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning
-from visup.tasks.actions.vocabulary import Look
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.backpointers import Backpointer, extended
 from visup.tasks.automaton.derivatives import Leaf, State, TaskStep, leaves, with_leaves
@@ -87,16 +87,16 @@ class HypothesisTracker:
 
     Attributes:
         task: The task.
-        actions: Meanings of its actions, with those of comparisons and zones (see `vocabulary`).
+        actions: Meanings of its actions, with those of comparisons and zones (see `task_vocabulary`).
         settings: Patience.
         looks: Whether what is no plain relation of the mind holds.
         hmm: The probabilities of the model.
     """
 
     task: Task
-    actions: Mapping[str, Meaning]
+    actions: Mapping[str, ActionDefinition]
     settings: TaskSettings
-    looks: Mapping[str, Look] = field(default_factory=dict)
+    looks: Mapping[str, FactEvaluator] = field(default_factory=dict)
     hmm: StageHmm = SUPERVISION_HMM
 
     @cached_property

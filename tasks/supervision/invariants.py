@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from visup.agent import Concern, Event, Mind, Severity, Truth
+from visup.agent import AlertCondition, Event, Mind, Severity, Truth
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.conditions import facts_of
 from visup.tasks.grammar.nodes import Invariant
-from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.supervision.belief import TaskSnapshot
 from visup.tasks.supervision.events import played
@@ -51,16 +51,16 @@ def patience(tracker: HypothesisTracker, invariant: Invariant) -> float:
     return value(tracker.task.amount(invariant.lasting.duration))
 
 
-def invariant_concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[Concern]:
+def invariant_concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[AlertCondition]:
     """A concern for each invariant that has been broken for as long as counts."""
     for invariant, since in zip(tracker.task.invariants, memory.broken_since, strict=True):
         if since is not None and memory.time - since >= patience(tracker, invariant):
             facts = facts_of(invariant.condition)
-            actors = (a for f in facts for a in keyed(tracker.task, f)[1])
+            actors = (a for f in facts for a in fact_key(tracker.task, f)[1])
             objects = played(memory.belief, tuple(dict.fromkeys(actors)))
             cause = f"`{invariant}` has not held since {since:.1f} s."
             key = f"{tracker.task.name}: {invariant}"
-            yield Concern("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
+            yield AlertCondition("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
 
 
 def invariant_events(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from visup.agent import Status, TaskBelief, Verdict
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.verification.step_monitor import StepMonitor
 
@@ -17,7 +17,7 @@ def names(words: Sequence[str]) -> str:
 
 
 def evidence(
-    step: TaskStep, meaning: Meaning, monitor: StepMonitor, now: float, actions: Words
+    step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor, now: float, actions: Words
 ) -> str:
     """Why a step stands as it does: one clause, without capital and full stop.
 
@@ -56,7 +56,7 @@ def evidence(
 
 
 def outcome(
-    step: TaskStep, meaning: Meaning, monitor: StepMonitor, now: float
+    step: TaskStep, meaning: ActionDefinition, monitor: StepMonitor, now: float
 ) -> tuple[Status, str]:
     """How a step that has been left ended, and why.
 
@@ -94,7 +94,7 @@ def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
     return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
 
 
-Words = Mapping[str, Meaning]
+Words = Mapping[str, ActionDefinition]
 
 STAGE_WORDS = {
     "stage_started": "Stage `{stage}` of task `{task}` has begun",

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from visup.agent import (
+    AlertCondition,
     Binding,
-    Concern,
     Event,
     Mind,
     Observation,
@@ -25,8 +25,8 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning, known_actions
-from visup.tasks.actions.vocabulary import vocabulary
+from visup.tasks.actions.actions import ActionDefinition, known_actions
+from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
@@ -61,7 +61,7 @@ UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often t
 def task_reasoner(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
-    actions: Mapping[str, Meaning] | None = None,
+    actions: Mapping[str, ActionDefinition] | None = None,
 ) -> Reasoner:
     """The reasoner that supervises some tasks.
 
@@ -109,9 +109,9 @@ def finish(belief: TaskBelief) -> Verdict:
 
 
 def _follower(
-    task: Task, actions: Mapping[str, Meaning], settings: TaskSettings
+    task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
 ) -> HypothesisTracker:
-    words = vocabulary(task, actions)
+    words = task_vocabulary(task, actions)
     tracker = HypothesisTracker(task, words.meanings, settings, words.looks)
     tracker.success(tracker.start(0.0))  # so that no step has to work out the whole course
     return tracker
@@ -239,7 +239,7 @@ def _events(
     yield from invariant_events(tracker, memory, new, mind)
 
 
-def _concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[Concern]:
+def _concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[AlertCondition]:
     yield from stage_concerns(memory.belief)
     yield from invariant_concerns(tracker, memory)
 

@@ -11,9 +11,9 @@ from visup.tasks.grammar.nodes import (
     AnyOrder,
     Choice,
     Comparison,
+    Conditioned,
     Counted,
     Course,
-    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -61,7 +61,7 @@ class Flow:
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _Fragment:
     """A part of the picture: where it begins, where it ends, whether it may be left out."""
 
     first: tuple[str, ...]
@@ -120,17 +120,17 @@ class _Drawer:
     flow: Flow
     drawn: set[str] = field(default_factory=set)
 
-    def stage(self, stage: Stage) -> _Part:
+    def stage(self, stage: Stage) -> _Fragment:
         self.drawn.add(stage.name)
         if isinstance(stage.body, Actors):
             return self.box(str(Action(stage.name, stage.body.names)), stage=stage.name)
         return self.course(stage.body, stage.name, ())
 
-    def box(self, *lines: str, stage: str = "") -> _Part:
+    def box(self, *lines: str, stage: str = "") -> _Fragment:
         number = self.flow.add(Node(lines, stage))
-        return _Part((number,), (number,))
+        return _Fragment((number,), (number,))
 
-    def course(self, course: Course, stage: str, said: tuple[str, ...]) -> _Part:
+    def course(self, course: Course, stage: str, said: tuple[str, ...]) -> _Fragment:
         """A part of the picture; `said` are the clauses around it, written into its boxes."""
         match course:
             case Action() | Comparison():
@@ -139,11 +139,11 @@ class _Drawer:
                 return self.reference(name, stage, said)
             case Timed(item=item, clauses=clauses):
                 return self.course(item, stage, (*map(str, clauses), *said))
-            case Judged(item=item, conditions=signs):
+            case Conditioned(item=item, conditions=signs):
                 return self.course(item, stage, (*map(str, signs), *said))
             case Choice(options=options):
                 parts = [self.course(o, stage, said) for o in options]
-                return _Part(
+                return _Fragment(
                     tuple(x for p in parts for x in p.first),
                     tuple(x for p in parts for x in p.last),
                     any(p.empty for p in parts),
@@ -158,13 +158,13 @@ class _Drawer:
                 part = self.course(item, stage, said)
                 if mark != "?":
                     self.flow.link(part.last, part.first, "again")
-                return _Part(part.first, part.last, part.empty or mark != "+")
+                return _Fragment(part.first, part.last, part.empty or mark != "+")
             case Counted(item=item, least=least, times=times):
                 part = self.course(item, stage, said)
                 self.flow.link(part.last, part.first, times)
-                return _Part(part.first, part.last, part.empty or least == 0)
+                return _Fragment(part.first, part.last, part.empty or least == 0)
 
-    def reference(self, name: str, stage: str, said: tuple[str, ...]) -> _Part:
+    def reference(self, name: str, stage: str, said: tuple[str, ...]) -> _Fragment:
         target = self.task.stage(name)
         if target is None:
             return self.box(f"<{name}>", *said, stage=name)
@@ -176,7 +176,7 @@ class _Drawer:
         self.drawn.add(name)
         return self.course(target.body, name, said)
 
-    def sequence(self, parts: list[_Part]) -> _Part:
+    def sequence(self, parts: list[_Fragment]) -> _Fragment:
         first: list[str] = []
         last: list[str] = []
         empty = True
@@ -186,15 +186,15 @@ class _Drawer:
                 first += part.first
             last = [*part.last, *(last if part.empty else ())]
             empty = empty and part.empty
-        return _Part(tuple(first), tuple(last), empty)
+        return _Fragment(tuple(first), tuple(last), empty)
 
     def fork(
         self, title: str, items: tuple[Course, ...], stage: str, said: tuple[str, ...]
-    ) -> _Part:
+    ) -> _Fragment:
         opening = self.box(title)
         parts = [self.course(i, stage, said) for i in items]
         closing = self.box("all of them")
         for part in parts:
             self.flow.link(opening.last, part.first)
             self.flow.link(part.last, closing.first)
-        return _Part(opening.first, closing.last, all(p.empty for p in parts))
+        return _Fragment(opening.first, closing.last, all(p.empty for p in parts))

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from visup.tasks.actions.actions import known_actions
 from visup.tasks.actions.describe import described, written
-from visup.tasks.checks.examine import examine
+from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import shipped_tasks
 from visup.tasks.diagnostics.diagnostic import Source
-from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.nodes import Span, Task
 from visup.tasks.grammar.statement import NAME
 from visup.tasks.grammar.units import UNITS
@@ -35,7 +35,7 @@ WORDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Word:
+class NameUse:
     """A name in a file.
 
     Attributes:
@@ -50,7 +50,7 @@ class Word:
 
 
 @dataclass(frozen=True, slots=True)
-class Proposal:
+class Completion:
     """A word that may be put in, with what it means."""
 
     text: str
@@ -64,28 +64,28 @@ PATTERN = re.compile(
 )
 
 
-def words(text: str) -> Iterator[Word]:
+def names(text: str) -> Iterator[NameUse]:
     """Every name of a file, also of one with mistakes; comments and texts are passed over."""
-    code, _ = clean(text, Source(text, ""))
+    code, _ = normalise(text, Source(text, ""))
     for number, line in enumerate(code.split("\n"), 1):
         for match in PATTERN.finditer(line):
             kind = match.lastgroup
             if kind is not None:
                 start, end = match.span(kind)
-                yield Word(match[kind], kind, Span(number, start + 1, number, end + 1))
+                yield NameUse(match[kind], kind, Span(number, start + 1, number, end + 1))
 
 
-def word_at(text: str, line: int, column: int) -> Word | None:
+def name_at(text: str, line: int, column: int) -> NameUse | None:
     """The name at a place, also just behind it, or None."""
-    for word in words(text):
+    for word in names(text):
         if word.span.line == line and word.span.column <= column <= word.span.end_column:
             return word
     return None
 
 
-def meaning(text: str, file: str, word: Word) -> str | None:
+def hover(text: str, file: str, word: NameUse) -> str | None:
     """What a name means, in Markdown, or None."""
-    task, _ = examine(text, file)
+    task, _ = diagnose(text, file)
     action = known_actions().get(word.name)
     if word.kind == "stage":
         stage = task.stage(word.name)
@@ -100,9 +100,9 @@ def meaning(text: str, file: str, word: Word) -> str | None:
     return None
 
 
-def definition(text: str, file: str, word: Word) -> Span | None:
+def definition(text: str, file: str, word: NameUse) -> Span | None:
     """Where a stage, actor, zone or parameter is defined, or None; `span.file` tells the file."""
-    task, _ = examine(text, file)
+    task, _ = diagnose(text, file)
     if word.kind == "include":
         return None
     if word.kind == "stage":
@@ -110,7 +110,7 @@ def definition(text: str, file: str, word: Word) -> Span | None:
     return next((d.span for d in task.declared if d.name == word.name), None)
 
 
-def same_names(text: str, word: Word) -> list[Word]:
+def references(text: str, word: NameUse) -> list[NameUse]:
     """All places of this file that mean the same stage, or the same actor, zone or parameter.
 
     A stage in the strict form is an action too; both change together, so neither can be renamed.
@@ -118,34 +118,34 @@ def same_names(text: str, word: Word) -> list[Word]:
     if word.kind not in ("stage", "name"):
         return []
     if word.kind == "stage" and word.name in known_actions():
-        task, _ = examine(text)
+        task, _ = diagnose(text)
         stage = task.stage(word.name)
         if stage is not None and not hasattr(stage.body, "span"):
             return []
-    return [w for w in words(text) if (w.kind, w.name) == (word.kind, word.name)]
+    return [w for w in names(text) if (w.kind, w.name) == (word.kind, word.name)]
 
 
-def proposals(text: str, file: str, line: int, column: int) -> list[Proposal]:
+def completions(text: str, file: str, line: int, column: int) -> list[Completion]:
     """What may stand at a place, by what stands before it in its line."""
     rows = text.split("\n")
     before = rows[line - 1][: column - 1] if 0 < line <= len(rows) else ""
-    task, _ = examine(text, file)
+    task, _ = diagnose(text, file)
     if re.search(r"#", before):
         return []
     if re.search(r'\binclude\s+"[^"]*$', before):
-        return [Proposal(n, "file", "a task that ships with visup") for n in shipped_tasks()]
+        return [Completion(n, "file", "a task that ships with visup") for n in shipped_tasks()]
     if re.search(rf"<[ ]*(?:{NAME})?$", before):
-        return [Proposal(s.name, "stage", str(s)) for s in task.stages]
+        return [Completion(s.name, "stage", str(s)) for s in task.stages]
     if re.search(rf"\d\s*(?:{NAME})?$", before) and not re.search(rf"{NAME}$", before):
-        return [Proposal(u, "unit", d.replace("_", " ")) for u, (d, _) in UNITS.items()]
+        return [Completion(u, "unit", d.replace("_", " ")) for u, (d, _) in UNITS.items()]
     if re.search(r"\([^()]*$", before):
         return _named(text, task)
     known = [
-        Proposal(m.name, "action", f"{written(m)}: {m.about}") for m in known_actions().values()
+        Completion(m.name, "action", f"{written(m)}: {m.about}") for m in known_actions().values()
     ]
-    said = [Proposal(w, "keyword", about) for w, about in WORDS.items()]
-    stages = [Proposal(f"<{s.name}>", "stage", str(s)) for s in task.stages]
-    starts = [Proposal(w, "keyword", "begins a statement") for w in STATEMENTS]
+    said = [Completion(w, "keyword", about) for w, about in WORDS.items()]
+    stages = [Completion(f"<{s.name}>", "stage", str(s)) for s in task.stages]
+    starts = [Completion(w, "keyword", "begins a statement") for w in STATEMENTS]
     if re.fullmatch(rf"\s*(?:{NAME})?", before):
         return [*starts, *known, *stages]
     return [*known, *stages, *said, *_named(text, task, ("zones", "parameters"))]
@@ -153,19 +153,19 @@ def proposals(text: str, file: str, line: int, column: int) -> list[Proposal]:
 
 def _named(
     text: str, task: Task, kinds: tuple[str, ...] = ("actors", "zones", "parameters")
-) -> list[Proposal]:
+) -> list[Completion]:
     declared = {d.name: str(d) for k in kinds for d in getattr(task, k)}
     if "actors" in kinds:
         for word in _actors(text):
             declared.setdefault(word.name, "an actor")
-    return [Proposal(n, "actor", about) for n, about in sorted(declared.items())]
+    return [Completion(n, "actor", about) for n, about in sorted(declared.items())]
 
 
-def _actors(text: str) -> list[Word]:
+def _actors(text: str) -> list[NameUse]:
     """Names that stand in brackets, where actors stand."""
-    code, _ = clean(text, Source(text, ""))
+    code, _ = normalise(text, Source(text, ""))
     rows = code.split("\n")
-    inside = (w for w in words(text) if w.kind == "name")
+    inside = (w for w in names(text) if w.kind == "name")
     return [
         w for w in inside if re.search(r"\([^()]*$", rows[w.span.line - 1][: w.span.column - 1])
     ]

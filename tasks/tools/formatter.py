@@ -13,7 +13,7 @@ from itertools import pairwise
 from lark import Token
 
 from visup.tasks.diagnostics.diagnostic import Source
-from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.parser import tokens
 
 WIDTH = 100
@@ -23,7 +23,7 @@ TIGHT_BEFORE = frozenset({"RPAR", "COMMA", "REPEAT"})
 
 
 @dataclass(frozen=True, slots=True)
-class _Word:
+class _Token:
     """A token, or a comment.
 
     Attributes:
@@ -63,10 +63,10 @@ def formatted(text: str) -> str:
     return "\n".join(lines) + "\n" if lines else ""
 
 
-def _words(text: str) -> Iterator[_Word]:
+def _words(text: str) -> Iterator[_Token]:
     """Tokens and comments in the order of the text."""
     source = text.split("\n")
-    code, _ = clean(text, Source(text, ""))
+    code, _ = normalise(text, Source(text, ""))
     comments = _comments(source, code.split("\n"))
     found = [(t.line or 0, t.column or 0, t) for t in tokens(code)]
     ends = {t.end_line for _, _, t in found}
@@ -81,7 +81,7 @@ def _words(text: str) -> Iterator[_Word]:
         else:
             last = line
             own = line not in ends
-            yield _Word(item, "#", own, blank)
+            yield _Token(item, "#", own, blank)
 
 
 def _comments(source: list[str], code: list[str]) -> list[tuple[int, int, str]]:
@@ -95,23 +95,23 @@ def _comments(source: list[str], code: list[str]) -> list[tuple[int, int, str]]:
     return found
 
 
-def _token_words(token: Token, blank: bool) -> Iterator[_Word]:
+def _token_words(token: Token, blank: bool) -> Iterator[_Token]:
     if token.type == "HEAD":
         name = str(token)[1 : str(token).index(">")].strip(" ")
-        yield _Word(f"<{name}>", "HEAD", blank_before=blank)
-        yield _Word("::=", "DEFINER")
+        yield _Token(f"<{name}>", "HEAD", blank_before=blank)
+        yield _Token("::=", "DEFINER")
     elif token.type == "STAGE":
-        yield _Word(f"<{str(token)[1:-1].strip(' ')}>", "STAGE", blank_before=blank)
+        yield _Token(f"<{str(token)[1:-1].strip(' ')}>", "STAGE", blank_before=blank)
     else:
-        yield _Word(str(token), token.type, blank_before=blank)
+        yield _Token(str(token), token.type, blank_before=blank)
 
 
-def _statements(words: list[_Word]) -> Iterator[list[_Word]]:
+def _statements(words: list[_Token]) -> Iterator[list[_Token]]:
     """Statements, and comments between them by themselves.
 
     Comments on their own lines before a statement do not belong to the one before it.
     """
-    current: list[_Word] = []
+    current: list[_Token] = []
     for i, word in enumerate(words):
         begins = word.kind in STARTERS or (word.kind == "HEAD" and not _is_marked(current))
         if word.kind == "ACTOR" and current and current[-1].kind == "OPTIONAL":
@@ -128,27 +128,27 @@ def _statements(words: list[_Word]) -> Iterator[list[_Word]]:
         yield current
 
 
-def _is_marked(current: list[_Word]) -> bool:
+def _is_marked(current: list[_Token]) -> bool:
     return bool(current) and current[-1].kind == "TASK"
 
 
-def _no_more(words: list[_Word], i: int) -> bool:
+def _no_more(words: list[_Token], i: int) -> bool:
     """Whether nothing but comments stands between a place and the next statement."""
     rest = (w for w in words[i:] if w.kind != "#")
     following = next(rest, None)
     return following is None or following.kind in STARTERS or following.kind == "HEAD"
 
 
-def _has_head(statement: list[_Word]) -> bool:
+def _has_head(statement: list[_Token]) -> bool:
     return any(w.kind == "HEAD" for w in statement)
 
 
-def _head(statement: list[_Word]) -> str:
+def _head(statement: list[_Token]) -> str:
     at = next(i for i, w in enumerate(statement) if w.kind == "HEAD")
     return " ".join(w.text for w in statement[: at + 1] if w.kind != "#")
 
 
-def _laid_out(statement: list[_Word], width: int) -> Iterator[str]:
+def _laid_out(statement: list[_Token], width: int) -> Iterator[str]:
     """The lines of one statement: as long as they may be, broken before `|` where they must."""
     indent = 4
     words = statement
@@ -158,7 +158,7 @@ def _laid_out(statement: list[_Word], width: int) -> Iterator[str]:
         if len(head) > LONGEST_HEAD:
             indent = 4
         at = next(i for i, w in enumerate(statement) if w.kind == "HEAD")
-        words = [_Word(head.ljust(width), "HEAD"), *statement[at + 1 :]]
+        words = [_Token(head.ljust(width), "HEAD"), *statement[at + 1 :]]
     line, empty = "", True
     for before, word in pairwise([None, *words]):
         assert word is not None
@@ -182,7 +182,7 @@ def _laid_out(statement: list[_Word], width: int) -> Iterator[str]:
         yield line.rstrip()
 
 
-def _unbroken(words: list[_Word], word: _Word) -> int:
+def _unbroken(words: list[_Token], word: _Token) -> int:
     """How long what must stay on one line with a word is: up to the next blank."""
     at = next(i for i, w in enumerate(words) if w is word)
     length = len(word.text)
@@ -193,7 +193,7 @@ def _unbroken(words: list[_Word], word: _Word) -> int:
     return length
 
 
-def _tight(before: _Word, word: _Word) -> bool:
+def _tight(before: _Token, word: _Token) -> bool:
     """Whether two words stand together without a blank."""
     if word.kind in TIGHT_BEFORE or before.kind == "LPAR":
         return True

@@ -12,9 +12,9 @@ from visup.tasks.grammar.nodes import (
     AnyOrder,
     Choice,
     Comparison,
+    Conditioned,
     Counted,
     Course,
-    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -102,7 +102,7 @@ def _course(task: Task, course: Course, stage: str, drawn: set[str]) -> Iterator
                     else _course(task, part, stage, drawn)
                 )
             yield Branch(TITLES[type(course)], "way", stage, tuple(inside))
-        case Timed(item=item, clauses=said) | Judged(item=item, conditions=said):
+        case Timed(item=item, clauses=said) | Conditioned(item=item, conditions=said):
             yield under(" ".join(map(str, said)), "clause", item)
         case Repeated(item=item, mark=mark):
             yield under(REPEATS[mark], "way", item)

@@ -27,11 +27,11 @@ MOST_LOOKED_AT = 50_000  # beginnings of courses that a listing looks at
 Moment = tuple[str, ...]
 """What is under way at the same time, as text: `<approach> converging(arm, satellite)`."""
 
-Course = tuple[Moment, ...]
+Trace = tuple[Moment, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Position:
     """Where one is in a task.
 
     Attributes:
@@ -46,26 +46,26 @@ class Place:
         return _moment(self.state) if self.state is not None else ()
 
 
-def beginnings(task: Task) -> tuple[Place, ...]:
+def initial_positions(task: Task) -> tuple[Position, ...]:
     """The places where a task can begin; one at the end when nothing need be seen."""
     return _distinct(enter(task, begin(task), None, 0.0))
 
 
-def followings(task: Task, place: Place) -> tuple[Place, ...]:
+def successors(task: Task, place: Position) -> tuple[Position, ...]:
     """The places that can come next; none after the end."""
     if place.state is None:
         return ()
     return _distinct(m.state for m in derivatives(task, place.state, None, 0.0))
 
 
-def courses(task: Task) -> Iterator[Course]:
+def traces(task: Task) -> Iterator[Trace]:
     """The courses of a task, each once, those of few moments first.
 
     It stops by itself when a task has so many that `MOST_LOOKED_AT` beginnings were looked at.
     """
-    told: set[Course] = set()
+    told: set[Trace] = set()
     looked_at: set[object] = set()
-    todo: deque[tuple[Course, Place]] = deque(((), p) for p in beginnings(task))
+    todo: deque[tuple[Trace, Position]] = deque(((), p) for p in initial_positions(task))
     for _ in range(MOST_LOOKED_AT):
         if not todo:
             return
@@ -76,27 +76,27 @@ def courses(task: Task) -> Iterator[Course]:
                 yield before
         else:
             now = (*before, place.moment)
-            for following in followings(task, place):
+            for following in successors(task, place):
                 key = (now, None if following.state is None else structural_key(following.state))
                 if key not in looked_at:  # several ways may have led there
                     looked_at.add(key)
                     todo.append((now, following))
 
 
-def sample(task: Task, rng: Random) -> tuple[Course, bool]:
+def sample(task: Task, rng: Random) -> tuple[Trace, bool]:
     """A course drawn at random, and whether it came to its end within `LONGEST` moments."""
-    place = rng.choice(beginnings(task))
+    place = rng.choice(initial_positions(task))
     course: list[Moment] = []
     while place.state is not None and len(course) < LONGEST:
         course.append(place.moment)
-        place = rng.choice(followings(task, place))
+        place = rng.choice(successors(task, place))
     return tuple(course), place.state is None
 
 
-def _distinct(states: Iterator[State[None] | None]) -> tuple[Place, ...]:
-    found: dict[object, Place] = {}
+def _distinct(states: Iterator[State[None] | None]) -> tuple[Position, ...]:
+    found: dict[object, Position] = {}
     for state in states:
-        found.setdefault(None if state is None else structural_key(state), Place(state))
+        found.setdefault(None if state is None else structural_key(state), Position(state))
     return tuple(found.values())
 
 

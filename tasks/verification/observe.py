@@ -8,11 +8,11 @@ from functools import cached_property
 from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
-from visup.rules.predicates.snapshot import Facts
-from visup.tasks.actions.actions import Meaning
-from visup.tasks.actions.vocabulary import Look
+from visup.rules.predicates.snapshot import Snapshot
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.actions.vocabulary import FactEvaluator
 
-NOTHING: Mapping[str, Look] = MappingProxyType({})
+NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NEVER: Mapping[str, float] = MappingProxyType({})
 
 
@@ -50,14 +50,14 @@ class RelationLookup:
 
     Args:
         mind: The mind.
-        looks: Words and keys that are not plain relations of the mind (see `vocabulary`).
+        looks: Words and keys that are not plain relations of the mind (see `task_vocabulary`).
         before: Since when what `lasting` was told of has been true, by key.
     """
 
     def __init__(
         self,
         mind: Mind,
-        looks: Mapping[str, Look] = NOTHING,
+        looks: Mapping[str, FactEvaluator] = NOTHING,
         before: Mapping[str, float] = NEVER,
     ) -> None:
         self._mind = mind
@@ -94,8 +94,8 @@ class RelationLookup:
         return self._mind.time
 
     @cached_property
-    def _facts(self) -> Facts:
-        return Facts(self._mind)
+    def _facts(self) -> Snapshot:
+        return Snapshot(self._mind)
 
     def _look(self, name: str, objects: tuple[int, ...]) -> Relation:
         key = (name, objects)
@@ -142,7 +142,7 @@ class RelationLookup:
 
 
 def observe(
-    meaning: Meaning, objects: tuple[int | None, ...], relations: RelationLookup
+    meaning: ActionDefinition, objects: tuple[int | None, ...], relations: RelationLookup
 ) -> ActionObservation:
     """What is seen of an action.
 
@@ -172,7 +172,7 @@ def observe(
     )
 
 
-def _holds(meaning: Meaning, ids: tuple[int, ...], relations: RelationLookup) -> Truth:
+def _holds(meaning: ActionDefinition, ids: tuple[int, ...], relations: RelationLookup) -> Truth:
     """True when one of the relations is, false when all that are known are false."""
     if relations.first_true(meaning.holds, ids) is not None:
         return Truth.TRUE

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from visup.agent import Relation, Truth
 from visup.tasks.actions.vocabulary import OPPOSITE
 from visup.tasks.automaton.derivatives import TaskStep
-from visup.tasks.grammar.conditions import Both, Condition, Denied, Either
+from visup.tasks.grammar.conditions import And, Condition, Not, Or
 from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
-from visup.tasks.grammar.structure import keyed
+from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.verification.observe import ActionObservation, RelationLookup
 
@@ -39,12 +39,12 @@ class ConditionEvaluator:
         """Whether a condition holds; unknown when what decides it was not observed."""
         match condition:
             case Action() | Comparison():
-                return self.holds(*keyed(self.task, condition))
-            case Denied(item=item):
+                return self.holds(*fact_key(self.task, condition))
+            case Not(item=item):
                 return OPPOSITE[self.truth(item)]
-            case Both(parts=parts):
+            case And(parts=parts):
                 return min((self.truth(p) for p in parts), key=FIRM.index)
-            case Either(parts=parts):
+            case Or(parts=parts):
                 return max((self.truth(p) for p in parts), key=FIRM.index)
 
     def relation(self, condition: Condition, lasting: Hold | None) -> Relation:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
@@ -39,7 +39,7 @@ class StepMonitor:
         ceased: Whether it once held and then was seen not to.
         unseen_since: Since when nothing is known about it, or None.
         denied: Whether what the course says of its end was last seen not to hold.
-        opened: Whether what the course says of its beginning was seen (see `Sign`).
+        opened: Whether what the course says of its beginning was seen (see `StageCondition`).
         confidence: Of the last sighting, 0 to 1.
     """
 
@@ -75,7 +75,7 @@ def entered(now: float) -> StepMonitor:
 def update(
     monitor: StepMonitor,
     step: TaskStep,
-    meaning: Meaning,
+    meaning: ActionDefinition,
     seen: ActionObservation,
     now: float,
     dt: float,
@@ -122,7 +122,7 @@ def update(
     )
 
 
-def over(monitor: StepMonitor, step: TaskStep, meaning: Meaning) -> bool:
+def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> bool:
     """Whether a step is over by itself, whatever comes next."""
     told = step.hold_s is not None or step.condition("ends") is not None
     return monitor.fulfilled and (not meaning.lasts or told)
@@ -136,7 +136,7 @@ def overdue(step: TaskStep, now: float) -> bool:
 def _note_progress(
     monitor: StepMonitor,
     step: TaskStep,
-    meaning: Meaning,
+    meaning: ActionDefinition,
     seen: ActionObservation,
     now: float,
     dt: float,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from visup.agent import (
-    Concern,
+    AlertCondition,
     Contract,
     Directive,
     Event,
@@ -41,26 +41,26 @@ class Scripted:
         self.directives: list[tuple[Directive, ...]] = []
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         self.directives.append(tuple(directives))
         value = self.says(frame.index)
         return [Percept(self.contract.gives[0], value, frame.time, self.contract.name)]
 
 
-def counting(mind: Mind, seen: Observation) -> Outcome:
+def counting(mind: Mind, observation: Observation) -> Outcome:
     """Remembers how often it thought and tells an event each time."""
     count = mind.memory.get("counting", 0) + 1
-    event = Event("counted", seen.time, seen.frame_index, f"I counted {count}.")
+    event = Event("counted", observation.time, observation.frame_index, f"I counted {count}.")
     return Outcome(mind.remember("counting", count), (event,))
 
 
 def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation], Outcome]:
     """A reasoner with one concern while a predicate of time holds."""
 
-    def think(mind: Mind, seen: Observation) -> Outcome:
-        concern = Concern("worry", (1,), Severity.WARNING, "This is a worry.", ("because",))
-        return Outcome(mind, concerns=(concern,) if holds(seen.time) else ())
+    def think(mind: Mind, observation: Observation) -> Outcome:
+        concern = AlertCondition("worry", (1,), Severity.WARNING, "This is a worry.", ("because",))
+        return Outcome(mind, conditions=(concern,) if holds(observation.time) else ())
 
     return think
 
@@ -68,9 +68,9 @@ def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation
 def exploding_at(index: int) -> Callable[[Mind, Observation], Outcome]:
     """A reasoner that raises at one frame, after having half-made a mind."""
 
-    def think(mind: Mind, seen: Observation) -> Outcome:
-        if seen.frame_index == index:
+    def think(mind: Mind, observation: Observation) -> Outcome:
+        if observation.frame_index == index:
             raise RuntimeError("the fuse blew")
-        return Outcome(mind.remember("exploding", seen.frame_index))
+        return Outcome(mind.remember("exploding", observation.frame_index))
 
     return think

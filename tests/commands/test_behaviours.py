@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
 from visup.agent.model.errors import VisupError
-from visup.agent.plugins.loader import load
+from visup.agent.plugins.factory import load_behaviours
 from visup.cli import app
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
@@ -31,7 +31,7 @@ def visup(*words: object) -> tuple[int, str]:
 def test_a_new_behaviour_runs_at_once(name: str, tmp_path: Path) -> None:
     code, _ = visup("behaviours", "new", name, "--out", tmp_path)
     assert code == 0
-    (made,) = load(str(tmp_path / f"{name}.py"))
+    (made,) = load_behaviours(str(tmp_path / f"{name}.py"))
     assert made.contract.name == name
     check_behaviour(made)
     assert len((tmp_path / f"{name}.py").read_text().splitlines()) < 40
@@ -118,7 +118,7 @@ def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(tmp_path:
         "from visup.agent import Contract\n"
         "class Mine:\n"
         "    contract = Contract('mine', gives=('mine',))\n"
-        "    def perceive(self, frame, seen, directives):\n"
+        "    def perceive(self, frame, observation, directives):\n"
         "        os._exit(7)\n"
     )
     command = [sys.executable, "-m", "visup.cli", "watch", str(clip), "--json", "--no-video"]

@@ -10,17 +10,24 @@ from visup.rules.formula.nodes import (
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Not,
-    Often,
     Or,
-    Past,
+    PastOperator,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import Number, Unit
 
 Interval = tuple[float, float]
@@ -53,22 +60,22 @@ def random_formula(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Form
         case 2:
             return Or((part(), part()))
         case 3 | 4:
-            return Past(rng.choice(("always", "once")), part(), _window(rng, 0.3))
+            return PastOperator(rng.choice(("always", "once")), part(), _window(rng, 0.3))
         case 5:
-            return Past(rng.choice(("always", "once")), part())
+            return PastOperator(rng.choice(("always", "once")), part())
         case 6 | 7:
-            return Since(part(), part(), rng.choice((None, Window(ZERO, _span(rng)))))
+            return Since(part(), part(), rng.choice((None, TimeWindow(ZERO, _span(rng)))))
         case 8:
             kind = rng.choice(("eventually", "henceforth"))
-            return Future(kind, part(), _window(rng, 0.5))
+            return FutureOperator(kind, part(), _window(rng, 0.5))
         case 9:
-            return Until(part(), part(), Window(ZERO, _span(rng)))
+            return Until(part(), part(), TimeWindow(ZERO, _span(rng)))
         case 10:
             of = rng.randint(1, 6)
-            return Often(part(), Number(float(rng.randint(1, of))), Number(float(of)))
+            return MOfN(part(), Number(float(rng.randint(1, of))), Number(float(of)))
         case 11:
             share = Number(float(rng.choice((10, 25, 50, 60, 80, 100))), Unit.PERCENT)
-            return Often(part(), share, _span(rng))
+            return MOfN(part(), share, _span(rng))
     return Last(part(), _span(rng))
 
 
@@ -98,11 +105,11 @@ def random_term(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Term:
         case 3:
             return Negative(part())
         case 4:
-            return Combined("abs", (part(),))
+            return PointwiseFunction("abs", (part(),))
         case 5:
-            return Combined(rng.choice(("min", "max")), (part(), part()))
+            return PointwiseFunction(rng.choice(("min", "max")), (part(), part()))
     name = rng.choice(("rate", "before", "lowest", "highest", "last"))
-    return OverTime(name, part(), _span(rng))
+    return WindowFunction(name, part(), _span(rng))
 
 
 def _span(rng: Random) -> Number:
@@ -111,11 +118,11 @@ def _span(rng: Random) -> Number:
     return Number(float(steps * STEP_MS + rng.choice((0, 0, 0, 7))), Unit.MS)
 
 
-def _window(rng: Random, later: float) -> Window:
+def _window(rng: Random, later: float) -> TimeWindow:
     high = _span(rng)
     if rng.random() >= later:
-        return Window(ZERO, high)
-    return Window(Number(high.value * rng.choice((0.25, 0.5)), Unit.MS), high)
+        return TimeWindow(ZERO, high)
+    return TimeWindow(Number(high.value * rng.choice((0.25, 0.5)), Unit.MS), high)
 
 
 def random_times(rng: Random, count: int) -> list[float]:

@@ -15,17 +15,24 @@ from visup.rules.formula.nodes import (
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Not,
-    Often,
     Or,
-    Past,
+    PastOperator,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import Number
 
 Interval = tuple[float, float]
@@ -89,14 +96,14 @@ class _Oracle:
                 return self.joined([self.formula(p) for p in parts], _both)
             case Or(parts=parts):
                 return self.joined([self.formula(p) for p in parts], _either)
-            case Past(kind=kind, part=part, window=None):
+            case PastOperator(kind=kind, part=part, window=None):
                 s = self.formula(part)
                 join = _both if kind == "always" else _either
                 return Signal(self.each(lambda k: _fold(self.so_far(k, s), join)), s.delay)
-            case Past(kind=kind, part=part, window=Window(low=low, high=high)):
+            case PastOperator(kind=kind, part=part, window=TimeWindow(low=low, high=high)):
                 join = _both if kind == "always" else _either
                 return self.past(self.formula(part), join, _micro(low), _micro(high))
-            case Future(kind=kind, part=part, window=Window(low=low, high=high)):
+            case FutureOperator(kind=kind, part=part, window=TimeWindow(low=low, high=high)):
                 join = _either if kind == "eventually" else _both
                 s, a, b = self.formula(part), _micro(low), _micro(high)
                 late = s.delay + b
@@ -108,9 +115,9 @@ class _Oracle:
                 return Signal(self.each(ahead), late)
             case Since(left=left, right=right, window=window):
                 return self.since(self.formula(left), self.formula(right), window)
-            case Until(left=left, right=right, window=Window(high=high)):
+            case Until(left=left, right=right, window=TimeWindow(high=high)):
                 return self.until(self.formula(left), self.formula(right), _micro(high))
-            case Often():
+            case MOfN():
                 return self.often(f)
             case Last(part=part, duration=age):
                 return self.last(self.formula(part), _micro(age))
@@ -162,7 +169,7 @@ class _Oracle:
         values = [_fold(list(v), join) for v in zip(*(s.values for s in signals), strict=True)]
         return Signal(values, signals[0].delay)
 
-    def since(self, left: Signal, right: Signal, window: Window | None) -> Signal:
+    def since(self, left: Signal, right: Signal, window: TimeWindow | None) -> Signal:
         left, right = self.waited([left, right])
 
         def at(k: int) -> Interval:
@@ -192,7 +199,7 @@ class _Oracle:
 
         return Signal(self.each(at), late)
 
-    def often(self, f: Often) -> Signal:
+    def often(self, f: MOfN) -> Signal:
         s = self.formula(f.part)
         need = f.least.base
 
@@ -252,22 +259,22 @@ class _Oracle:
                 return [known.get(name, ANYTHING) for _, known in self.history]
             case Negative(part=part):
                 return [(-h, -low) for low, h in self.term(part)]
-            case Combined(name="abs", parts=(part,)):
+            case PointwiseFunction(name="abs", parts=(part,)):
                 return [_absolute(v) for v in self.term(part)]
-            case Combined(name=name, parts=parts):
+            case PointwiseFunction(name=name, parts=parts):
                 join = _both if name == "min" else _either
                 return [_fold(list(v), join) for v in zip(*map(self.term, parts), strict=True)]
             case Arithmetic(left=left, operator=operator, right=right):
                 sides = zip(self.term(left), self.term(right), strict=True)
                 return [_computed(operator, v, w) for v, w in sides]
-            case OverTime(name="last", part=part, duration=age):
+            case WindowFunction(name="last", part=part, duration=age):
                 return self.last(Signal(self.term(part)), _micro(age)).values
-            case OverTime(name="lowest" | "highest" as name, part=part, duration=span):
+            case WindowFunction(name="lowest" | "highest" as name, part=part, duration=span):
                 join = _both if name == "lowest" else _either
                 return self.past(Signal(self.term(part)), join, 0, _micro(span)).values
-            case OverTime(name="before", part=part, duration=span):
+            case WindowFunction(name="before", part=part, duration=span):
                 return self.past(Signal(self.term(part)), _both, _micro(span), _micro(span)).values
-            case OverTime(part=part, duration=span):
+            case WindowFunction(part=part, duration=span):
                 now = self.term(part)
                 then = self.past(Signal(now), _both, _micro(span), _micro(span)).values
                 return [

@@ -14,15 +14,15 @@ from visup.rules.formula.nodes import (
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Not,
     Or,
-    Past,
+    PastOperator,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Term
+from visup.rules.formula.terms import Arithmetic, Measure, PointwiseFunction, Term
 from visup.rules.formula.units import Number, Unit
 
 STEP_MS = 40
@@ -92,7 +92,7 @@ def written(node: Formula | Term) -> str:
             return name
         case Arithmetic(left=left, operator=operator, right=right):
             return f"({written(left)} {operator} {written(right)})"
-        case Combined(name="abs", parts=(part,)):
+        case PointwiseFunction(name="abs", parts=(part,)):
             return f"abs({written(part)})"
         case Comparison(left=left, operator=operator, right=right):
             return f"({written(left)} {operator} {written(right)})"
@@ -101,10 +101,10 @@ def written(node: Formula | Term) -> str:
         case And(parts=parts) | Or(parts=parts):
             word = " and " if isinstance(node, And) else " or "
             return f"({word.join(written(p) for p in parts)})"
-        case Past(kind=kind, part=part, window=window):
+        case PastOperator(kind=kind, part=part, window=window):
             word = "historically" if kind == "always" else "once"
             return f"{word}{_counted(window)}({written(part)})"
-        case Future(kind=kind, part=part, window=window):
+        case FutureOperator(kind=kind, part=part, window=window):
             word = "eventually" if kind == "eventually" else "always"
             return f"{word}{_counted(window)}({written(part)})"
         case Since(left=left, right=right, window=window):
@@ -114,7 +114,7 @@ def written(node: Formula | Term) -> str:
     raise TypeError(f"rtamt has nothing like {node}")
 
 
-def _counted(window: Window | None) -> str:
+def _counted(window: TimeWindow | None) -> str:
     if window is None:
         return ""
     low, high = (round(n.base * 1000 / STEP_MS) for n in (window.low, window.high))
@@ -137,22 +137,22 @@ def shared_formula(rng: Random, depth: int) -> Formula:
         case 2:
             return Or((part(), part()))
         case 3 | 4:
-            return Past(rng.choice(("always", "once")), part(), _window(rng, 0.3))
+            return PastOperator(rng.choice(("always", "once")), part(), _window(rng, 0.3))
         case 5:
-            return Past(rng.choice(("always", "once")), _comparison(rng))
+            return PastOperator(rng.choice(("always", "once")), _comparison(rng))
         case 6:
             return Since(_comparison(rng), _comparison(rng))
         case 7:
             return Since(part(), part(), _window(rng, 0.0))
     if rng.random() < 0.5:
         return Until(part(), part(), _window(rng, 0.0))
-    return Future(rng.choice(("eventually", "henceforth")), part(), _window(rng, 0.5))
+    return FutureOperator(rng.choice(("eventually", "henceforth")), part(), _window(rng, 0.5))
 
 
 def horizon(node: Formula | Term) -> int:
     """How many samples before the moment that is spoken of a formula looks at."""
     match node:
-        case Past(part=part, window=window):
+        case PastOperator(part=part, window=window):
             return _samples(window) + horizon(part)
         case Since(left=left, right=right, window=window):
             return _samples(window) + max(horizon(left), horizon(right))
@@ -160,19 +160,19 @@ def horizon(node: Formula | Term) -> int:
             return max(horizon(left), horizon(right))
         case And(parts=parts) | Or(parts=parts):
             return max(map(horizon, parts))
-        case Not(part=part) | Future(part=part):
+        case Not(part=part) | FutureOperator(part=part):
             return horizon(part)
     return 0
 
 
-def _samples(window: Window | None) -> int:
+def _samples(window: TimeWindow | None) -> int:
     return 0 if window is None else round(window.high.base * 1000 / STEP_MS)
 
 
 def _comparison(rng: Random) -> Comparison:
     x, y = Measure("x"), Measure("y")
     term: Term = rng.choice(
-        (x, y, Arithmetic(x, "+", y), Arithmetic(x, "-", y), Combined("abs", (y,)))
+        (x, y, Arithmetic(x, "+", y), Arithmetic(x, "-", y), PointwiseFunction("abs", (y,)))
     )
     # Numbers of two kinds, so that nothing is equal and the conventions for that do not matter.
     return Comparison(
@@ -180,10 +180,10 @@ def _comparison(rng: Random) -> Comparison:
     )
 
 
-def _window(rng: Random, later: float) -> Window:
+def _window(rng: Random, later: float) -> TimeWindow:
     high = rng.choice((1, 2, 3, 5, 8))
     low = rng.randint(1, high) if rng.random() < later else 0
     if low == high:
         low = 0
     begin = ZERO if low == 0 else Number(float(low * STEP_MS), Unit.MS)
-    return Window(begin, Number(float(high * STEP_MS), Unit.MS))
+    return TimeWindow(begin, Number(float(high * STEP_MS), Unit.MS))

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from visup.agent.model.errors import SettingsError
-from visup.commands.eval.clips import clips_table
+from visup.commands.eval.tables import clips_table
 from visup.evaluation.motion.rendered_clips import (
     MARK,
     Bar,

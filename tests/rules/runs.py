@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from visup.agent import (
+    AlertCondition,
     Binding,
-    Concern,
     Event,
     Expectation,
     Mind,
@@ -25,7 +25,7 @@ from visup.rules.reasoners import default_reasoners
 class Thought:
     mind: Mind
     events: tuple[Event, ...]
-    concerns: tuple[Concern, ...]
+    conditions: tuple[AlertCondition, ...]
 
 
 def think(
@@ -41,11 +41,11 @@ def think(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )
         events: tuple[Event, ...] = ()
-        concerns: tuple[Concern, ...] = ()
+        concerns: tuple[AlertCondition, ...] = ()
         for reasoner in chain:
             outcome = reasoner(mind, seen)
             mind, events = outcome.mind, events + outcome.events
-            concerns += outcome.concerns
+            concerns += outcome.conditions
         yield Thought(mind, events, concerns)
 
 

@@ -7,12 +7,12 @@ import re
 import pytest
 
 from tests.paths import ROOT
-from visup.rules.formula.units import DIMENSION, TICKS
-from visup.rules.language.cost import MOST_KEPT, MOST_VARIABLES
+from visup.rules.formula.units import TICKS, UNITS
+from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.monitoring.operators import REACH, SPACING
+from visup.rules.monitoring.operators import MIN_SPACING, SAMPLE_HOLD
 from visup.rules.predicates.snapshot import SIGMAS
-from visup.rules.predicates.vocabulary import IMPLIED, KEEP_OUT, QUANTITIES, WORDS
+from visup.rules.predicates.vocabulary import IMPLIED, KEEP_OUT, PREDICATES, QUANTITIES
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.step_context import PresenceSettings
 from visup.rules.reasoners import ReasonerSettings
@@ -33,7 +33,7 @@ def test_every_example_of_the_page_is_in_the_language(block: str) -> None:
 
 def test_the_page_explains_every_word_and_quantity_with_its_arguments() -> None:
     told = {n: len(words.split(", ")) if words else 0 for r in ROWS for n, words in _calls(r[0])}
-    known = {n: len(w.takes) for n, w in WORDS.items()}
+    known = {n: len(w.takes) for n, w in PREDICATES.items()}
     known |= {n: len(q.takes) for n, q in QUANTITIES.items()}
     assert told == known
 
@@ -45,7 +45,7 @@ def _calls(cell: str) -> list[tuple[str, str]]:
 
 
 def test_units_of_quantities_are_those_of_their_dimension() -> None:
-    units = {str(unit): dimension for unit, (dimension, _) in DIMENSION.items()}
+    units = {str(unit): dimension for unit, (dimension, _) in UNITS.items()}
     assert KEEP_OUT in PAGE
     rows = {n: r[1].strip("`") for r in ROWS if len(r) == 3 for n, _ in _calls(r[0])}
     assert {name: units[unit] for name, unit in rows.items()} == {
@@ -66,10 +66,10 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("speaks for what follows it, but for no more than {:g} s", REACH / TICKS),
-        ("closer than {:g} ms", 1000 * SPACING / TICKS),
-        ("at most {:,} values", MOST_KEPT),
-        ("at most {} objects together", MOST_VARIABLES),
+        ("speaks for what follows it, but for no more than {:g} s", SAMPLE_HOLD / TICKS),
+        ("closer than {:g} ms", 1000 * MIN_SPACING / TICKS),
+        ("at most {:,} values", MAX_STATE),
+        ("at most {} objects together", MAX_VARIABLES),
         ("value +- {:g} standard deviation", SIGMAS),
         ("trend above {} D/s", RelationSettings().rate_enter),
         ("below {} D/s, or turned", RelationSettings().rate_exit),

@@ -93,14 +93,14 @@ def test_what_an_intruder_hides_reappears_as_itself(noise: Noise) -> None:
         2: "spartan201_approx",
     }
     assert thoughts[-1].mind.objects[3].presence is Presence.LEFT
-    assert {c.kind for t in thoughts for c in t.concerns} == {"unexpected_object"}
+    assert {c.kind for t in thoughts for c in t.conditions} == {"unexpected_object"}
 
 
 def test_an_intruder_that_comes_near_is_unexpected_and_on_a_collision_course() -> None:
     thoughts, who = run("intruder_on_collision_course", HALF)
     first: dict[tuple[str, tuple[str, ...]], float] = {}
     for t in thoughts:
-        for c in t.concerns:
+        for c in t.conditions:
             key = (c.kind, tuple(sorted(who[i] for i in c.objects)))
             first.setdefault(key, t.mind.time)
     assert set(first) == {
@@ -123,7 +123,7 @@ def test_thinking_is_a_pure_function() -> None:
     name, noise = "capture_fails", Noise(seed=3, every=5)
     seen = [o for o, _ in observations(name, noise)][:60]
     stories = [
-        [(t.mind.time, t.events, t.mind.relations, t.concerns)
+        [(t.mind.time, t.events, t.mind.relations, t.conditions)
          for t in reason(seen, actors=actors_of(name))]
         for _ in range(2)
     ]  # fmt: skip

@@ -18,7 +18,7 @@ from tests.percepts.video.test_live_source import FakeCapture
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
-from visup.agent.storage.codec import packed
+from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
@@ -58,7 +58,7 @@ def outcome(folder: Path) -> object:
     run = Recording.open(folder)
     facts = run.facts()
     told = (folder / "events.jsonl").read_bytes(), facts["verdict"], facts["steps"]
-    return told, list(run.summaries()), [packed(o) for o in run.observations()]
+    return told, list(run.summaries()), [pack_observation(o) for o in run.observations()]
 
 
 def test_killed_runs_that_are_resumed_equal_an_unbroken_one() -> None:

@@ -12,7 +12,7 @@ from tests.stepping.timelines import plain_stepper, reasoning_course, reasoning_
 from visup.agent import Mind, Truth
 from visup.agent.model.errors import RuleError, SettingsError, VisupError
 from visup.agent.model.step import Step
-from visup.rules.predicates.snapshot import Facts
+from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.queries import explain
 from visup.stepping import parse_condition
 
@@ -36,7 +36,7 @@ def changes(value: Callable[[Mind], object], nothing: object = None) -> Scan:
 
 
 def unexpected(mind: Mind, object_id: int) -> Truth | None:
-    if object_id not in Facts(mind).ids:
+    if object_id not in Snapshot(mind).ids:
         return Truth.UNKNOWN
     return explain(mind, "unexpected_object", object_id).verdict
 

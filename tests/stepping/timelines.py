@@ -8,7 +8,7 @@ from tests.agent.scripted import Scripted, counting, frames, worried_while
 from visup.agent import Directive, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
-from visup.agent.storage.checkpoint import frozen
+from visup.agent.storage.checkpoint import dump_state
 from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.evaluation.runtime.stepping import whole
 from visup.runs.settings import WatchSettings
@@ -21,9 +21,11 @@ SETTINGS = WatchSettings(
 )
 
 
-def asking(mind: Mind, seen: Observation) -> Outcome:
+def asking(mind: Mind, observation: Observation) -> Outcome:
     """Asks for something else in each step."""
-    wish = Directive("expect_regions", "There should be some.", {"count": seen.frame_index % 3})
+    wish = Directive(
+        "expect_regions", "There should be some.", {"count": observation.frame_index % 3}
+    )
     return Outcome(mind, directives=(wish,))
 
 
@@ -48,7 +50,7 @@ def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> 
 def told(step: Step | None) -> bytes:
     """All that a step came to, as bytes."""
     assert step is not None
-    return frozen((whole(step.mind), step.events, step.alerts, step.directives))
+    return dump_state((whole(step.mind), step.events, step.alerts, step.directives))
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from visup.tasks.grammar.conditions import Both, Condition, Denied, Either
+from visup.tasks.grammar.conditions import And, Condition, Not, Or
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -14,13 +14,13 @@ from visup.tasks.grammar.nodes import (
     Choice,
     Clause,
     Comparison,
+    Conditioned,
     Counted,
     Course,
     Deadline,
     Hold,
     Include,
     Invariant,
-    Judged,
     Name,
     Parameter,
     Reference,
@@ -33,12 +33,14 @@ from visup.tasks.grammar.nodes import (
     Together,
     ZoneDeclaration,
 )
-from visup.tasks.grammar.statement import WORDS
+from visup.tasks.grammar.statement import RESERVED_WORDS
 from visup.tasks.grammar.units import UNITS
 
-names = st.from_regex(r"[a-zA-Zä_][a-z0-9_é]{0,8}", fullmatch=True).filter(lambda n: n not in WORDS)
+names = st.from_regex(r"[a-zA-Zä_][a-z0-9_é]{0,8}", fullmatch=True).filter(
+    lambda n: n not in RESERVED_WORDS
+)
 models = st.from_regex(r"[a-z0-9][a-z0-9_.\-]{0,8}", fullmatch=True).filter(
-    lambda n: n not in WORDS
+    lambda n: n not in RESERVED_WORDS
 )
 amounts = st.one_of(
     st.integers(0, 10**6).map(float), st.floats(0.0, 1e9, allow_nan=False, allow_infinity=False)
@@ -58,7 +60,7 @@ facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
 
 def _joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]:
     several = st.lists(inner, min_size=2, max_size=3).map(tuple)
-    return st.one_of(st.builds(Both, several), st.builds(Either, several), st.builds(Denied, inner))
+    return st.one_of(st.builds(And, several), st.builds(Or, several), st.builds(Not, inner))
 
 
 conditions = st.recursive(facts, _joined, max_leaves=4)
@@ -76,7 +78,7 @@ def _larger(inner: st.SearchStrategy[Course]) -> st.SearchStrategy[Course]:
         st.builds(Sequence, _several(inner)),
         st.builds(Together, _several(inner)),
         st.builds(AnyOrder, _several(inner)),
-        st.builds(Judged, inner, st.lists(signs, min_size=1, max_size=2).map(tuple)),
+        st.builds(Conditioned, inner, st.lists(signs, min_size=1, max_size=2).map(tuple)),
         st.builds(Counted, inner, st.integers(0, 9), st.none() | st.integers(0, 9)),
         st.builds(Timed, inner, st.lists(clauses, min_size=1, max_size=2).map(tuple)),
         st.builds(Repeated, inner, st.sampled_from(["?", "*", "+"])),

@@ -13,7 +13,7 @@ from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.cli import app
 from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.runs.wiring import reasoning_agent
@@ -181,7 +181,7 @@ def test_the_toolbar_is_one_line() -> None:
 
 def test_a_recorded_run_is_stepped_from_a_pipe(tmp_path: Path) -> None:
     agent, journal = reasoning_agent(SETTINGS), Journal(tmp_path / JOURNAL)
-    journal.note(settings=plain(SETTINGS))
+    journal.note(settings=to_jsonable(SETTINGS))
     for seen in moving_ellipses(40):
         journal.record(agent.reason(seen))
     journal.close()

@@ -37,8 +37,8 @@ def plug(does: Does, **declared: Any) -> type:
         def __init__(self) -> None:
             self.kept: list[Any] = []
 
-        def perceive(self, frame: Any, seen: Any, directives: Any) -> Any:
-            return [self.contract.percept(frame, does(self, frame, seen))]
+        def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
+            return [self.contract.percept(frame, does(self, frame, observation))]
 
     return Plug
 
@@ -83,7 +83,7 @@ class Held:
     def __init__(self) -> None:
         self.held = (n for n in range(3))
 
-    def perceive(self, frame: Any, seen: Any, directives: Any) -> Any:
+    def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
         return ()
 
 

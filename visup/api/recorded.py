@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 
 from rich.console import RenderableType
 
+from visup.agent.model.display import enable_display
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.model.mind import UNKNOWN_OBJECT, Verdict
-from visup.agent.model.notebook import showing
 from visup.agent.model.records import Alert, Event, Severity
 from visup.agent.storage.journal_reader import Recording
 from visup.api.display import story
@@ -221,4 +221,4 @@ def _object(line: Mapping[str, Any]) -> RecordedObject:
     return RecordedObject(**told)
 
 
-showing(RecordedStep, RecordedObject)
+enable_display(RecordedStep, RecordedObject)

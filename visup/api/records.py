@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_h
 from rich.console import RenderableType
 
 from visup.agent.model.errors import ExtraMissingError
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.api.display import rows
 from visup.terminal.display import html_of
 
@@ -120,7 +120,7 @@ def _column(hint: Any) -> Column | None:
 
 
 def _cell(value: Any, column: Column) -> Any:
-    told = plain(value)
+    told = to_jsonable(value)
     if column == (Mapping,) and told is not None:
         return json.dumps(told, ensure_ascii=False, sort_keys=True)
     return value if column == (float,) else told

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from visup.agent import Contract
-    from visup.agent.plugins.loader import Offer
+    from visup.agent.plugins.factory import BehaviourFactory
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -56,17 +56,17 @@ def list_behaviours() -> None:
     from rich.table import Table
 
     from visup.agent.model.errors import BehaviourError
-    from visup.agent.plugins.registry import discover
+    from visup.agent.plugins.registry import discover_behaviours
 
-    registry, console = discover(), Console(highlight=False)
+    registry, console = discover_behaviours(), Console(highlight=False)
     table = Table(padding=(0, 0))
     for heading in ("name", "gives", "needs", "every", "budget", "found in"):
         table.add_column(heading, overflow="fold")
     broken = []
     for name in registry.names():
         try:
-            offer = registry.offer(name)
-            table.add_row(name, *_row(offer.contract), offer.where)
+            factory = registry.factory(name)
+            table.add_row(name, *_row(factory.contract), factory.where)
         except BehaviourError as fault:
             broken.append(str(fault))
     console.print(table)
@@ -93,7 +93,7 @@ def check(
     from visup.agent.plugins.settings import parse_settings
 
     console, values = Console(highlight=False), parse_settings(setting or ())
-    kept = [_check(console, offer, values) for offer in _offers(where)]
+    kept = [_check(console, factory, values) for factory in _factories(where)]
     raise typer.Exit(0 if all(kept) else 1)
 
 
@@ -124,22 +124,24 @@ def new(
     typer.echo(f"{path}: change it, then\n  visup behaviours check {path}")
 
 
-def _offers(where: str) -> list[Offer]:
-    from visup.agent.plugins.loader import offers
-    from visup.agent.plugins.registry import discover
+def _factories(where: str) -> list[BehaviourFactory]:
+    from visup.agent.plugins.factory import find_factories
+    from visup.agent.plugins.registry import discover_behaviours
 
-    registry = discover()
-    return [registry.offer(where)] if where in registry.names() else offers(where)
+    registry = discover_behaviours()
+    return [registry.factory(where)] if where in registry.names() else find_factories(where)
 
 
-def _check(console: Console, offer: Offer, values: dict[str, dict[str, object]]) -> bool:
+def _check(
+    console: Console, factory: BehaviourFactory, values: dict[str, dict[str, object]]
+) -> bool:
     from visup.testing import check_results
 
-    name = offer.contract.name if offer.contract else offer.where
+    name = factory.contract.name if factory.contract else factory.where
     given = values.get(name, {})
-    offer.make(given)  # what cannot be made at all is an error, not a finding
-    found = check_results(lambda: offer.make(given))
-    console.print(f"{name} ({offer.where})", markup=False, style="bold")
+    factory.make(given)  # what cannot be made at all is an error, not a finding
+    found = check_results(lambda: factory.make(given))
+    console.print(f"{name} ({factory.where})", markup=False, style="bold")
     for finding in found:
         mark = "[green]ok[/green]    " if finding.passed else "[red]failed[/red]"
         console.print(f"  {mark} ", end="")

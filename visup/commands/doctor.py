@@ -114,9 +114,9 @@ def _codecs() -> str:
 
 
 def _behaviours() -> str:
-    from visup.agent.plugins.registry import discover
+    from visup.agent.plugins.registry import discover_behaviours
 
-    registry = discover()
+    registry = discover_behaviours()
     for name in registry.names():
         registry.make(name)
     return ", ".join(registry.names())

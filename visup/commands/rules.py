@@ -26,14 +26,14 @@ EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
     """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
-    from visup.agent.model.errors import ManyErrors, VisupError
+    from visup.agent.model.errors import ErrorGroup, VisupError
     from visup.rules.language.parser import load_rules, raise_all
 
     faults: list[VisupError] = []
     for file in files:
         try:
             found = load_rules(file)
-        except ManyErrors as errors:
+        except ErrorGroup as errors:
             faults += errors.errors
         except VisupError as error:
             faults.append(error)
@@ -47,14 +47,14 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
 @app.command("list")
 def list_rules(files: Files = None, as_json: AsJson = False) -> None:
     """List rules: severity, memory bound and delay of each."""
-    from visup.rules.language.cost import bounds_of
+    from visup.rules.language.cost import cost_of
     from visup.rules.language.parser import load_rules, shipped_rules
 
     found = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
     if as_json:
         rows: list[dict[str, Any]] = []
         for rule in found:
-            cost = bounds_of(rule)
+            cost = cost_of(rule)
             rows.append(
                 {
                     "name": rule.name,
@@ -110,16 +110,20 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
     Raises:
         RuleError: There is no rule of that name.
     """
-    from visup.rules.safety.queries import choices, explain, rule_named, values_of
+    from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
 
-    values = values_of(mind)
+    values = evaluation_of(mind)
     wanted = [rule_named(values, only)] if only else list(values.prepared.rules)
-    return [str(explain(mind, rule.name, *ids)) for rule in wanted for ids in choices(values, rule)]
+    return [
+        str(explain(mind, rule.name, *ids))
+        for rule in wanted
+        for ids in object_choices(values, rule)
+    ]
 
 
 def _cost(rule: Rule) -> str:
-    from visup.rules.language.cost import bounds_of
+    from visup.rules.language.cost import cost_of
 
-    cost = bounds_of(rule)
+    cost = cost_of(rule)
     late = f"told {cost.delay_s:g} s late" if cost.delay_s else "told at once"
     return f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"

@@ -92,10 +92,10 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
         SettingsError: One is not as it should be.
     """
     if settings_file:
-        from visup.agent.plugins.settings import merged, read_settings
+        from visup.agent.plugins.settings import merge_settings, read_settings
 
         own = given.get("plugin_settings", {})
-        given = {**given, "plugin_settings": merged(read_settings(settings_file), own)}
+        given = {**given, "plugin_settings": merge_settings(read_settings(settings_file), own)}
     return WatchSettings(source, **given)
 
 

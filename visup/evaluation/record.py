@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.version import __version__
 
 RECORD_VERSION = 1
@@ -29,7 +29,7 @@ def write_record(path: Path, figures: Mapping[str, Any], settings: Mapping[str, 
         **figures,
     }
     try:
-        path.write_text(json.dumps(plain(record), indent=1) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(to_jsonable(record), indent=1) + "\n", encoding="utf-8")
     except OSError as fault:
         raise OutputError(f"cannot write: {fault.strerror}", where=str(path)) from fault
 

@@ -11,7 +11,7 @@ from typing import Any
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
-from visup.agent.storage.checkpoint import StateError, frozen, thawed
+from visup.agent.storage.checkpoint import StateError, dump_state, load_state
 from visup.version import __version__
 
 CHECKPOINT = "state.bin"
@@ -82,7 +82,7 @@ class CheckpointWriter:
         state = agent.save()
         if state["behaviours"] is None:
             raise StateError("a behaviour has no save and load")
-        return frozen(
+        return dump_state(
             {
                 "visup": __version__,
                 "frame_index": step.frame_index,
@@ -99,7 +99,7 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
         It, or None when there is none that can be used, and then why, when there is one.
     """
     try:
-        told = thawed((folder / CHECKPOINT).read_bytes())
+        told = load_state((folder / CHECKPOINT).read_bytes())
         if told["visup"] != __version__:
             return None, f"its state is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None

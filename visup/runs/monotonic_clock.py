@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
-from visup.agent import Concern, Frame, Severity
+from visup.agent import AlertCondition, Frame, Severity
 
 NAME = "clock"
 
@@ -41,8 +41,8 @@ class MonotonicFrames:
         self._last = time
         return frame if time == frame.time else Frame(frame.index, time, frame.image)
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """Once after a jump: that there was one."""
         said, self._said = self._said, None
         if said:
-            yield Concern("clock_jumped", (), Severity.WARNING, said, key=NAME, needs=())
+            yield AlertCondition("clock_jumped", (), Severity.WARNING, said, key=NAME, needs=())

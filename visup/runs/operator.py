@@ -15,7 +15,7 @@ from threading import Thread
 
 from visup.agent import Frame, Mind
 from visup.agent.cycle.agent import Agent
-from visup.agent.cycle.answers import model_named
+from visup.agent.cycle.answers import resolve_model
 from visup.agent.model.errors import SettingsError, VisupError
 from visup.agent.model.step import Observer, Step
 
@@ -110,7 +110,7 @@ class HumanOperator:
             SettingsError: An answer that was given beforehand names what nobody knows.
         """
         for name in self.answers.values():
-            model_named(agent.mind, name, agent.models)
+            resolve_model(agent.mind, name, agent.models)
         waiting = dict(self.answers)
 
         def hand() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from visup.agent import Behaviour
 from visup.agent.model.errors import SettingsError
-from visup.agent.plugins.loader import Offer, offers
-from visup.agent.plugins.registry import discover
+from visup.agent.plugins.factory import BehaviourFactory, find_factories
+from visup.agent.plugins.registry import discover_behaviours
 from visup.runs.settings import WatchSettings
 
 
@@ -16,9 +16,9 @@ def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
         BehaviourError: One cannot be found or made.
         SettingsError: A setting is not as it should be, or is for a behaviour that is not there.
     """
-    registry = discover() if settings.plugins else None
-    named = [registry.offer(name) for name in settings.plugins] if registry else []
-    own = [offer for where in settings.behaviours for offer in offers(str(where))]
+    registry = discover_behaviours() if settings.plugins else None
+    named = [registry.factory(name) for name in settings.plugins] if registry else []
+    own = [offer for where in settings.behaviours for offer in find_factories(str(where))]
     found = [*named, *own]
     known = [_name(offer) for offer in found]
     for name in settings.plugin_settings:
@@ -33,5 +33,5 @@ def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
     return [offer.make(settings.plugin_settings.get(_name(offer))) for offer in found]
 
 
-def _name(offer: Offer) -> str:
+def _name(offer: BehaviourFactory) -> str:
     return offer.contract.name if offer.contract else offer.where

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from visup.agent import Concern, Frame, Severity, TaskBelief
+from visup.agent import AlertCondition, Frame, Severity, TaskBelief
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.model.step import Step
-from visup.agent.storage.journal import Journal, Limits
+from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL, export_events
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.percepts.video import VideoSource
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.tasks import load_tasks
@@ -68,14 +68,14 @@ class Recorder:
 
         self.folder = folder
         keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
-        self.journal = Journal(folder / JOURNAL, Limits(keep_bytes=keep), resume=resume)
+        self.journal = Journal(folder / JOURNAL, JournalLimits(keep_bytes=keep), resume=resume)
         self.facts: dict[str, Any] = {
             "visup": __version__,
             "source": source.name,
             "fps": source.fps,
             "size": source.size,
             "live": source.live,
-            "settings": plain(settings),
+            "settings": to_jsonable(settings),
         }
         if not resume:
             self.journal.note(**self.facts)
@@ -106,11 +106,11 @@ class Recorder:
         """Take note of a step that the journal holds already."""
         self._derive(step, frame, ["report"])
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with recording now."""
         if self._fault:
             lost = f"{self._lost} steps are lost." if self._lost else "Nothing is lost so far."
-            yield Concern(
+            yield AlertCondition(
                 "not_recorded",
                 (),
                 Severity.WARNING,

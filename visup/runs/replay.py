@@ -18,7 +18,7 @@ from visup.agent import Severity, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording, event_text, export_events
-from visup.agent.storage.jsonable import event_line, plain
+from visup.agent.storage.jsonable import event_record, to_jsonable
 from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict, reasoning_agent
@@ -92,7 +92,7 @@ class _EventCollector:
     def __call__(self, step: Step) -> None:
         self.steps += 1
         for event in step.events:
-            self.events.append(event_line(event))
+            self.events.append(event_record(event))
             self.grave |= event.severity >= Severity.WARNING
 
 
@@ -198,5 +198,7 @@ def _journal(recording: Recording, settings: WatchSettings, out: Path, stack: Ex
     journal = Journal(out / JOURNAL)
     stack.callback(journal.close)
     kept = {k: v for k, v in recording.facts().items() if k in ("source", "fps", "size")}
-    journal.note(**kept, visup=__version__, settings=plain(settings), replayed=str(recording.path))
+    journal.note(
+        **kept, visup=__version__, settings=to_jsonable(settings), replayed=str(recording.path)
+    )
     return journal

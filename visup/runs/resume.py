@@ -18,7 +18,7 @@ from visup.agent import Frame, Observation, Severity
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError, SourceError
 from visup.agent.model.step import Step
-from visup.agent.storage.codec import packed
+from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal_reader import Recording
 from visup.percepts.video import VideoSource
 from visup.runs.checkpoints import Checkpoint, read_checkpoint
@@ -134,7 +134,9 @@ def catch_up(
     for seen in past.recording.observations(after):
         frame = _frame(frames, seen, source)
         again = agent.perceive(frame)
-        differing += packed(_without_troubles(again)) != packed(_without_troubles(seen))
+        differing += pack_observation(_without_troubles(again)) != pack_observation(
+            _without_troubles(seen)
+        )
         tell(agent.reason(seen, answers.get(seen.frame_index, {})), frame)
     notes = []
     if not whole and past.steps:
@@ -150,23 +152,26 @@ def catch_up(
     return (f for f in frames if f.index > begin), tuple(notes)
 
 
-def _frame(frames: Iterator[Frame], seen: Observation, source: VideoSource) -> Frame:
+def _frame(frames: Iterator[Frame], observation: Observation, source: VideoSource) -> Frame:
     for frame in frames:
-        if frame.index == seen.frame_index and frame.size == seen.frame_size:
-            return Frame(frame.index, seen.time, frame.image)
-        if frame.index >= seen.frame_index:
+        if frame.index == observation.frame_index and frame.size == observation.frame_size:
+            return Frame(frame.index, observation.time, frame.image)
+        if frame.index >= observation.frame_index:
             break
+    width, height = observation.frame_size
     raise SourceError(
         "the source is not what was recorded",
         where=source.name,
-        expected=f"a frame {seen.frame_index} of {seen.frame_size[0]}x{seen.frame_size[1]} pixels",
+        expected=f"a frame {observation.frame_index} of {width}x{height} pixels",
         hint="a run can only go on with its own video",
     )
 
 
-def _without_troubles(seen: Observation) -> Observation:
+def _without_troubles(observation: Observation) -> Observation:
     name = RuntimeFaults.contract.name
-    return replace(seen, reports=tuple(r for r in seen.reports if r.behaviour != name))
+    return replace(
+        observation, reports=tuple(r for r in observation.reports if r.behaviour != name)
+    )
 
 
 def _live(agent: Agent, source: VideoSource, past: InterruptedRun, after: int) -> Iterator[Frame]:

@@ -9,10 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from visup.agent import Concern, Contract, Directive, Frame, Mind, Observation, Outcome, Percept
+from visup.agent import (
+    AlertCondition,
+    Contract,
+    Directive,
+    Frame,
+    Mind,
+    Observation,
+    Outcome,
+    Percept,
+)
 
 RUNTIME_FAULT = "trouble"
-FaultSource = Callable[[], Iterable[Concern]]
+FaultSource = Callable[[], Iterable[AlertCondition]]
 
 
 class RuntimeFaults:
@@ -35,13 +44,13 @@ class RuntimeFaults:
         """Nothing is remembered."""
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """One percept of kind 'trouble' for each fault that holds now."""
         now = [concern for source in self._sources for concern in source()]
         return [Percept(RUNTIME_FAULT, c, frame.time, self.contract.name) for c in now]
 
 
-def runtime_fault_reasoner(mind: Mind, seen: Observation) -> Outcome:
+def runtime_fault_reasoner(mind: Mind, observation: Observation) -> Outcome:
     """Every runtime fault is a concern."""
-    return Outcome(mind, concerns=seen.of(RUNTIME_FAULT))
+    return Outcome(mind, conditions=observation.of(RUNTIME_FAULT))

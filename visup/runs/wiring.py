@@ -26,7 +26,7 @@ from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
 from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
-from visup.tasks.grammar.structure import sizes, task_actors, undrawn
+from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def build_agent(
     _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    behaviours = [*_behaviours(settings, database, sizes(tasks, settings.actors)), *also]
+    behaviours = [*_behaviours(settings, database, declared_sizes(tasks, settings.actors)), *also]
     contracts = [b.contract for b in behaviours]
     return Agent(
         behaviours=behaviours,
@@ -169,7 +169,7 @@ def _reasoners(
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
     """A zone that nobody has drawn could never be seen to be entered or left."""
     for task in tasks:
-        for zone in undrawn(task):
+        for zone in undrawn_zones(task):
             if zone in drawn:
                 continue
             raise SettingsError(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent import VisupError, Zone
-from visup.agent.model.errors import ManyErrors, SettingsError
+from visup.agent.model.errors import ErrorGroup, SettingsError
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _KEYS = ("name", "polygon", "depth")
@@ -42,7 +42,7 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
         except SettingsError as fault:
             faults.append(fault)
     if len(faults) > 1:
-        raise ManyErrors(faults)
+        raise ErrorGroup(faults)
     if faults:
         raise faults[0]
     return tuple(zones)

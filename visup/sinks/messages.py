@@ -7,7 +7,7 @@ from typing import Any
 
 from visup.agent import Alert, Frame, Verdict
 from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.sinks.outbox import Outbox
 
 VERSION = 1
@@ -16,7 +16,13 @@ VERSION = 1
 def alert_record(alert: Alert, source: str) -> dict[str, Any]:
     """An alert as it goes to other programs (docs/formats.md)."""
     state = "opened" if alert.closed is None else "closed"
-    return {"version": VERSION, "record": "alert", "state": state, "source": source, **plain(alert)}
+    return {
+        "version": VERSION,
+        "record": "alert",
+        "state": state,
+        "source": source,
+        **to_jsonable(alert),
+    }
 
 
 def verdict_record(verdict: Verdict | None, steps: int, source: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from queue import Empty, Full, Queue
 from typing import Any, Protocol
 
-from visup.agent import Concern, Severity
+from visup.agent import AlertCondition, Severity
 
 MOST_WAITING = 1000
 CLOSING_S = 5.0
@@ -76,10 +76,10 @@ class Outbox:
         why = f": {self.fault}" if self.fault else ""
         return f"sink {self.sink.name}: {self.failed} records failed, {self.dropped} dropped{why}"
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with the sink now."""
         if self.fault or self.dropped:
-            yield Concern(
+            yield AlertCondition(
                 "sink_failed",
                 (),
                 Severity.WARNING,

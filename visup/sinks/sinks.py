@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from visup.agent import Concern, Frame, Verdict
+from visup.agent import AlertCondition, Frame, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
 from visup.sinks.builtin import Webhook, to_file, to_stdout
@@ -66,7 +66,7 @@ class Sinks:
         """Send a sentence that cannot wait for a step."""
         self._alerts.notice(text)
 
-    def runtime_faults(self) -> Iterable[Concern]:
+    def runtime_faults(self) -> Iterable[AlertCondition]:
         """What is wrong with sinks now."""
         return [concern for outbox in self.outboxes for concern in outbox.runtime_faults()]
 

@@ -12,9 +12,9 @@ from typing import Protocol, runtime_checkable
 from visup.agent import Mind, ObjectBelief, Truth
 from visup.agent.contract.phases import Phase
 from visup.agent.model.step import Step
-from visup.rules.safety.expression import Expression, Judged
+from visup.rules.safety.expression import Expression, ExpressionResult
 from visup.rules.safety.queries import verdicts
-from visup.rules.safety.reasoner import kept
+from visup.rules.safety.reasoner import rule_memory
 
 Predicate = Callable[[Step], bool]
 
@@ -220,11 +220,11 @@ class ExpressionMonitor:
     """Judges an expression from mind to mind; begins anew at a mind that it did not see coming."""
 
     mind: Mind | None = None
-    judged: Judged | None = None
+    judged: ExpressionResult | None = None
 
     def __call__(
         self, wanted: Expression, before: Mind, after: Mind
-    ) -> tuple[Judged | None, Judged]:
+    ) -> tuple[ExpressionResult | None, ExpressionResult]:
         """What it came to before, and what it comes to after."""
         if before is not self.mind:
             self.judged = wanted.judge(before) if before.frame_index >= 0 else None
@@ -264,12 +264,12 @@ def stage_names(mind: Mind) -> tuple[str, ...]:
 
 def rule_names(mind: Mind) -> tuple[str, ...]:
     """The rules that judge a mind; none before its first step."""
-    return tuple(rule.name for rule in kept(mind).rules)
+    return tuple(rule.name for rule in rule_memory(mind).rules)
 
 
 def rule_verdicts(mind: Mind, name: str) -> Mapping[tuple[int, ...], Truth]:
     """What a rule says of every choice of objects; nothing before the first step."""
-    return verdicts(mind, name) if kept(mind).now is not None else {}
+    return verdicts(mind, name) if rule_memory(mind).now is not None else {}
 
 
 def _change_text(

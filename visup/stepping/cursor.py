@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from visup.agent import Observation, Outcome
 from visup.agent.contract.phases import Phase, Snapshot
-from visup.agent.model.notebook import showing
+from visup.agent.model.display import enable_display
 from visup.agent.model.step import Step
 from visup.stepping.history import StepHistory
 
@@ -65,4 +65,4 @@ class Bookmark:
     course: StepHistory = field(repr=False)
 
 
-showing(PausedStep, StepResult)
+enable_display(PausedStep, StepResult)

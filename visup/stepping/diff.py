@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.agent import Mind, ObjectBelief, Truth
-from visup.agent.model.notebook import showing
+from visup.agent.model.display import enable_display
 
 Key = tuple[str, str]
 
@@ -167,4 +167,4 @@ def _short(text: str, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-showing(MindChange, MindDiff)
+enable_display(MindChange, MindDiff)

@@ -61,14 +61,14 @@ class StepHistory:
         """What the agent is now."""
         return self.agent.snapshot()
 
-    def phases(self, seen: Observation) -> Iterator[tuple[Phase, Outcome]]:
+    def phases(self, observation: Observation) -> Iterator[tuple[Phase, Outcome]]:
         """The reasoning of the next step, phase by phase, up to what `conclude` wants."""
         self._note_answers()
-        return self.agent.phases(seen, self.answers.get(self.at, {}))
+        return self.agent.phases(observation, self.answers.get(self.at, {}))
 
-    def conclude(self, seen: Observation, thought: Outcome) -> Step:
+    def conclude(self, observation: Observation, thought: Outcome) -> Step:
         """The last phase of the next step."""
-        step = self.agent.act(seen, thought)
+        step = self.agent.act(observation, thought)
         self.at += 1
         was = self.agent.snapshot()
         if self.at > self.made:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pydantic_core import from_json, to_json
 
 from visup.agent import Observation
-from visup.agent.storage.codec import document, observation
+from visup.agent.storage.codec import from_document, to_document
 
 _LEVEL = 1  # of zlib; see the codec
 
@@ -25,16 +25,16 @@ class ObservationLog:
     def __len__(self) -> int:
         return len(self._seen)
 
-    def add(self, seen: Observation) -> None:
+    def add(self, observation: Observation) -> None:
         """Keep one more."""
-        told = document(seen)
+        told = to_document(observation)
         lost = any("lost" in report for report in told["reports"])
         packed = zlib.compress(to_json(told, inf_nan_mode="constants"), _LEVEL)
-        self._seen.append(seen if lost else packed)
+        self._seen.append(observation if lost else packed)
 
     def seen(self, number: int) -> Observation:
         """What was perceived after step `number`."""
         kept = self._seen[number]
         if isinstance(kept, Observation):
             return kept
-        return observation(from_json(zlib.decompress(kept)))
+        return from_document(from_json(zlib.decompress(kept)))

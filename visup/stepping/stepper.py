@@ -13,7 +13,7 @@ from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
-from visup.agent.storage.jsonable import event_line
+from visup.agent.storage.jsonable import event_record
 from visup.runs.replay import Transcript, TranscriptDiff, settings_for
 from visup.runs.replay import transcript_diff as told_difference
 from visup.runs.wiring import final_verdict, reasoning_agent
@@ -315,7 +315,7 @@ class Stepper(Timeline):
 
 def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Transcript:
     verdict = final_verdict(mind).value if mind.tasks else None
-    return Transcript(tuple(event_line(e) for _, e in events), verdict, mind.frame_index)
+    return Transcript(tuple(event_record(e) for _, e in events), verdict, mind.frame_index)
 
 
 def replace_agent(agent: Agent, reasoners: Reasoners) -> Agent:

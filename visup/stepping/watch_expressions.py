@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from visup.agent.model.mind import Mind
 from visup.agent.model.step import Step
-from visup.rules.safety.expression import Judged, Reading, expression
+from visup.rules.safety.expression import ExpressionResult, ExpressionValue, expression
 from visup.stepping.breakpoints import ExpressionMonitor, StopCondition, WhenStop
 
 
@@ -45,7 +45,7 @@ class WatchExpression:
     id: int
     stop: WhenStop
     breaks: bool = False
-    judged: Judged | None = None
+    judged: ExpressionResult | None = None
     _follow: ExpressionMonitor = field(default_factory=ExpressionMonitor, repr=False)
 
     @classmethod
@@ -63,9 +63,9 @@ class WatchExpression:
         return self.stop.expression.text
 
     @property
-    def readings(self) -> tuple[Reading, ...]:
+    def readings(self) -> tuple[ExpressionValue, ...]:
         """Its values, one for each choice of objects; what is the same both ways round once."""
-        found: dict[tuple[tuple[int, ...], str], Reading] = {}
+        found: dict[tuple[tuple[int, ...], str], ExpressionValue] = {}
         for reading in self.judged.readings if self.judged else ():
             found.setdefault((tuple(sorted(reading.objects)), str(reading)), reading)
         return tuple(found.values())

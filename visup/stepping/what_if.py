@@ -28,7 +28,7 @@ from visup.agent import (
 )
 from visup.agent.cycle.agent import Reasoners
 from visup.agent.model.mind import UNKNOWN_OBJECT
-from visup.agent.model.relation_columns import UNKNOWN_CODE, Cells, Columns
+from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.formula.nodes import Rule
 from visup.rules.safety.reasoner import RuleReasoner
 from visup.tasks.supervision.supervise import MEMORY, task_reasoner
@@ -190,7 +190,7 @@ def _others(relations: Iterable[Relation], told: Relation) -> tuple[Relation, ..
     return tuple(r for r in relations if r.name != told.name or frozenset(r.objects) != who)
 
 
-def _with_cell(cells: Cells, told: Relation, row: int, k: int) -> Cells:
+def _with_cell(cells: RelationBlock, told: Relation, row: int, k: int) -> RelationBlock:
     column, code = cells.columns.named[told.name]
     if told.truth is Truth.UNKNOWN:
         code = UNKNOWN_CODE
@@ -205,4 +205,4 @@ def _with_cell(cells: Cells, told: Relation, row: int, k: int) -> Cells:
     numbers[-1, k] = told.confidence
     own = replace(column, confidence=len(numbers) - 1)
     each = tuple(own if c is column else c for c in cells.columns.each)
-    return Cells(Columns(each), state, since, numbers)
+    return RelationBlock(ColumnLayout(each), state, since, numbers)

@@ -2,7 +2,7 @@
 
 `shown(record)` gives what rich prints; `html(record)` the same for Jupyter. The records of `visup.agent`
 know nothing of it: they are shown so when they are printed with rich or stand last in a notebook's
-cell, once `visup.terminal.display` can be imported (see `visup/agent/model/notebook.py`).
+cell, once `visup.terminal.display` can be imported (see `visup/agent/model/display.py`).
 """
 
 from __future__ import annotations

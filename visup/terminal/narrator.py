@@ -12,7 +12,7 @@ from rich.text import Text
 
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import event_line
+from visup.agent.storage.jsonable import event_record
 from visup.wording import worded_once
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
@@ -57,7 +57,7 @@ class Narrator:
     def print_event(self, event: Event) -> None:
         """Print one event."""
         if self.as_json:
-            print(json.dumps(event_line(event), ensure_ascii=False, sort_keys=True), flush=True)
+            print(json.dumps(event_record(event), ensure_ascii=False, sort_keys=True), flush=True)
         else:
             self.console.print(event_row(event))
 

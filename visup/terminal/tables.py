@@ -28,12 +28,12 @@ def table(*headings: str, title: str | None = None) -> Table:
     return Table(*headings, title=title, title_justify="left", pad_edge=False)
 
 
-def regions_table(seen: Observation | None) -> RenderableType:
+def regions_table(observation: Observation | None) -> RenderableType:
     """What motion segmentation saw in a frame."""
-    if seen is None:
+    if observation is None:
         return Text("no step was taken yet")
     rows = table("region", "box", "area", "velocity px/s", "cut", "confidence")
-    for r in seen.of("region"):
+    for r in observation.of("region"):
         box = ",".join(map(str, r.bbox))
         velocity = f"{r.velocity[0]:.1f}, {r.velocity[1]:.1f} ± {r.velocity_sigma:.1f}"
         cut = "yes" if r.cut else "no"

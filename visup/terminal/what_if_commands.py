@@ -8,7 +8,7 @@ from difflib import get_close_matches
 
 from visup.agent import Mind, Presence, Truth
 from visup.agent.cycle.agent import Reasoners
-from visup.agent.cycle.answers import understood
+from visup.agent.cycle.answers import resolve_answer
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.mind import UNKNOWN_OBJECT
 from visup.rules.language.parser import load_rules
@@ -79,7 +79,7 @@ def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: boo
     said = " ".join(words[1:])
     if said in _PRESENCES:
         return AssumedPresence(object_id, Presence(said))
-    return AssumedIdentity(object_id, understood(mind, object_id, said, models))
+    return AssumedIdentity(object_id, resolve_answer(mind, object_id, said, models))
 
 
 def _known(mind: Mind, object_id: int) -> None:

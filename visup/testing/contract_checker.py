@@ -17,11 +17,11 @@ from typing import cast
 
 from visup.agent import Behaviour, Contract, Frame, Percept, ReportState
 from visup.agent.contract.limits import Limits
-from visup.agent.execution.pipeline import in_order, perceive
-from visup.agent.execution.process_runner import parcel
-from visup.agent.execution.worker import packed_bytes
+from visup.agent.execution.pipeline import ordered_slots, perceive
+from visup.agent.execution.process_runner import pack_behaviour
+from visup.agent.execution.worker import pickled
 from visup.agent.model.errors import BehaviourError, VisupError
-from visup.agent.plugins.loader import checked
+from visup.agent.plugins.factory import as_behaviour
 from visup.rules.activation.activation import activation_rules
 from visup.testing.clips import CLIPS, LabelledFrame
 from visup.testing.scripted import Script, stub_behaviours
@@ -86,7 +86,7 @@ def check_results(
     """What every check found; see `check_behaviour`."""
     make = _maker(behaviour)
     try:
-        first = checked(make(), "the behaviour")
+        first = as_behaviour(make(), "the behaviour")
         shots = {name: clip() for name, clip in CLIPS.items()} | dict(clips or {})
         stub_behaviours(first.contract.needs, [], provide)
     except VisupError as fault:
@@ -149,7 +149,7 @@ def _wakes(contract: Contract) -> CheckResult:
 def _sendable(make: Make) -> CheckResult:
     behaviour = make()
     try:
-        parcel(behaviour, behaviour.contract)
+        pack_behaviour(behaviour, behaviour.contract)
     except BehaviourError as fault:
         return CheckResult("can be sent to a process of its own", False, str(fault))
     return CheckResult("can be sent to a process of its own", True)
@@ -163,7 +163,7 @@ def _run_clip(
     own = behaviour.contract.name
     others = stub_behaviours(behaviour.contract.needs, shots, provide)
     here = Limits(hang_s=None, here=True, wakeful=frozenset({own}))
-    slots = in_order([*others, behaviour], here)
+    slots = ordered_slots([*others, behaviour], here)
     for shot in shots:
         image = shot.frame.image.copy()
         frame = Frame(shot.frame.index, shot.frame.time, image)
@@ -185,7 +185,7 @@ def _packed(percepts: Sequence[Percept]) -> list[bytes]:
 
 def _bytes(percept: Percept) -> bytes:
     try:
-        return packed_bytes(percept)
+        return pickled(percept)
     except (pickle.PicklingError, TypeError, AttributeError):
         return repr(percept).encode()
 

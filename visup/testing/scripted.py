@@ -41,7 +41,7 @@ class Scripted:
         self.directives: list[tuple[Directive, ...]] = []
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report what the script says of one frame; directives are kept to be looked at."""
         self.directives.append(tuple(directives))

@@ -8,6 +8,8 @@ evidence stays between the labels.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -29,31 +31,74 @@ DOUBT_STEPS = 3  # how far it is felt: beyond, what is seen is background
 LEAST = 0.03  # no label is ever quite impossible before there is evidence
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PointEvidence:
+    """What the motion of points says of the labels.
+
+    Attributes:
+        points: N points.
+        likelihood: (N, K) float32, log likelihood of each label.
+        informative: (N,) bool, whether a point says what is seen there: a corner whose motion was
+            measured.
+    """
+
+    points: Points
+    likelihood: Floats
+    informative: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelPrior:
+    """What is expected of the labels before the evidence of a frame.
+
+    Attributes:
+        shares: (count, K) float32, by where the tracks are predicted.
+        by_appearance: (count, K) float32, the same after the tones of the superpixels.
+        stationary: (count,) bool, where an object rests: motion tells nothing there.
+    """
+
+    shares: Floats
+    by_appearance: Floats
+    stationary: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labelling:
+    """The labels of the superpixels: 0 is the background, k the k-th track, the last unknown motion.
+
+    Attributes:
+        posterior: (count, K) float32; rows sum to 1.
+        winner: (count,) int64, the likeliest label of each.
+    """
+
+    posterior: Floats
+    winner: NDArray[np.int64]
+
+
 def cell_evidence(
-    cells: Superpixels,
-    points: Points,
-    likelihood: Floats,
-    has: NDArray[np.bool_],
-    prior: Floats,
-    more: Floats,
+    cells: Superpixels, evidence: PointEvidence, dense: Floats, prior: Floats
 ) -> tuple[Floats, Floats]:
     """Bayes' rule in each superpixel: the prior times the likelihood of its constraints.
 
     Args:
         cells: The superpixels.
-        points: N points.
-        likelihood: (N, K) float32 log likelihood of each label.
-        has: (N,) bool, whether a point says what is seen there.
+        evidence: What points say.
+        dense: (count, K) float32, log likelihood by dense comparison.
         prior: (count, K) float32 label shares before.
-        more: (count, K) float32 dense log likelihood.
 
     Returns:
         (count, K) float32 label shares, and (count,) float32 the weight of the evidence, 0 to 1.
     """
+    points, has = evidence.points, evidence.informative
     totals, number = sum_point_evidence(
-        cells.labels, points.xy[has], points.normal[has], likelihood[has], REACH, cells.count
+        cells.labels,
+        points.xy[has],
+        points.normal[has],
+        evidence.likelihood[has],
+        REACH,
+        cells.count,
     )
-    return bayes_shares(totals, number, more, prior, LEAST, CLIP)
+    return bayes_shares(totals, number, dense, prior, LEAST, CLIP)
 
 
 def random_walk(
@@ -140,45 +185,38 @@ def _system(
 
 def appearance_prior(cells: Superpixels, prior: Floats) -> Floats:
     """Shares of the labels (count, K) that are expected, after the tones of the superpixels."""
-    look = prior * tone_likelihood(cells, prior)
-    return np.asarray(look / np.maximum(look.sum(axis=1, keepdims=True), 1e-6))
+    out = prior * tone_likelihood(cells, prior)
+    return np.asarray(out / np.maximum(out.sum(axis=1, keepdims=True), 1e-6))
 
 
 def label_cells(
     cells: Superpixels,
-    points: Points,
-    likelihood: Floats,
-    has: NDArray[np.bool_],
-    prior: Floats,
-    look: Floats,
-    more: Floats,
-    stay: NDArray[np.bool_],
+    evidence: PointEvidence,
+    dense: Floats,
+    prior: LabelPrior,
     settings: MotionSettings,
-) -> Floats:
-    """The posterior of each superpixel from motion, appearance and what was there before.
+) -> Labelling:
+    """The labels of the superpixels by motion, appearance and what was there before.
 
     Args:
         cells: The superpixels.
-        points: N points.
-        likelihood: (N, K) float32 log likelihood of labels at the points.
-        has: (N,) bool, whether a point says what is seen there.
-        prior: (count, K) float32 label shares expected.
-        look: (count, K) float32, the same by what cells look like; see `appearance_prior`.
-        more: (count, K) float32 dense log likelihood.
-        stay: (count,) bool, where an object rests: motion tells nothing there.
+        evidence: What points say.
+        dense: (count, K) float32, log likelihood by dense comparison.
+        prior: What is expected.
         settings: Weights.
-
-    Returns:
-        (count, K) float32.
     """
-    share, weight = cell_evidence(cells, points, likelihood, has, prior, more)
+    stay = prior.stationary
+    share, weight = cell_evidence(cells, evidence, dense, prior.shares)
     trust = np.full(cells.count, settings.persistence, dtype=np.float32)
     bias = np.full(cells.count, settings.background_bias, dtype=np.float32)
     bias[_border(cells.labels)] *= 10
-    bias *= np.where(prior[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
+    bias *= np.where(prior.shares[:, 1:-1].max(axis=1, initial=0) > 0.5, 0.25, 1.0)
     trust[stay], bias[stay] = STAY, 0.0
     weight[stay] *= 1 - STILL_TOLD
-    return random_walk(cells, share, settings.evidence * weight, look, trust, bias)
+    posterior = random_walk(
+        cells, share, settings.evidence * weight, prior.by_appearance, trust, bias
+    )
+    return Labelling(posterior, posterior.argmax(axis=1))
 
 
 def _border(labels: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Directive, Region
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.layers.dense_labelling import CLIP
+from visup.percepts.motion.layers.dense_labelling import CLIP, PointEvidence
 from visup.percepts.motion.outlines.outline_refinement import CONTEXT, refine_outline
 from visup.percepts.motion.outlines.region_outline import RegionOutline, region_outline
 from visup.percepts.motion.static_camera.track_fusion import MotionEvidence
@@ -21,24 +22,24 @@ from visup.percepts.motion.tracks.track import Indices, Track
 
 
 def apply_ignore(
-    directives: Sequence[Directive], scene: FrameMeasurements, likelihood: Floats
-) -> Floats:
+    directives: Sequence[Directive], scene: FrameMeasurements, evidence: PointEvidence
+) -> PointEvidence:
     """Forbid motion where cogitation asks to ignore it.
 
     Args:
         directives: Their boxes are in frame pixels.
         scene: The frame.
-        likelihood: (N, K) float32 log likelihood of labels at the points.
+        evidence: What points say of the labels.
 
     Returns:
-        (N, K) float32.
+        The evidence, all for the background in such boxes.
     """
-    out = likelihood
+    out = evidence.likelihood
     for box in _boxes(directives, "ignore"):
         inside = _inside(scene.points.xy / scene.image.scale, box)
         out = out.copy()
         out[inside, 1:] = out[inside].min(initial=0) - 10
-    return out
+    return replace(evidence, likelihood=out)
 
 
 def looked_at(
@@ -61,21 +62,20 @@ def looked_at(
 
 
 def motion_evidence(
-    scene: FrameMeasurements, winner: Indices, likelihood: Floats, has: NDArray[np.bool_]
+    scene: FrameMeasurements, winner: Indices, evidence: PointEvidence
 ) -> MotionEvidence:
     """Which points tell of the motion of a track, and how surely.
 
     Args:
         scene: The frame.
         winner: (count,) label of each superpixel; label k is track k - 1.
-        likelihood: (N, K) float32 log likelihood of labels at the points.
-        has: (N,) bool, which points say what is seen there.
+        evidence: What points say of the labels.
 
     Returns:
         Those in tracks, in frame pixels.
     """
-    at = winner[scene.at]
-    use = np.flatnonzero(has & (at > 0) & (at < likelihood.shape[1] - 1))
+    at, likelihood = winner[scene.at], evidence.likelihood
+    use = np.flatnonzero(evidence.informative & (at > 0) & (at < likelihood.shape[1] - 1))
     gain = likelihood[use, at[use]] - likelihood[use, 0]
     return MotionEvidence(scene.points.xy[use] / scene.image.scale, np.clip(gain, -CLIP, CLIP))
 

@@ -20,6 +20,7 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.static_camera.blob_track import (
     BlobTrack,
     BlobTracks,
+    Box,
     Foreground,
     Mask,
     at_border,
@@ -205,45 +206,63 @@ def _updated(
     *,
     pieces: bool,
 ) -> BlobTrack:
-    """An object after what is seen of it in a frame."""
+    """An object after what is seen of it in a frame.
+
+    Args:
+        s: As predicted.
+        before: As it was in the frame before.
+        mask: Its pixels; None when it is hidden.
+        alone: Whether it shares no blob.
+        view: The frame.
+        pieces: Whether it is seen in several large pieces.
+    """
     full = np.count_nonzero(s.shape)
     if mask is None or np.count_nonzero(mask) < VISIBLE * full:
         return replace(s, visible=None, merged=not alone)
     box, shape = crop_mask(mask)
-    elapsed = max(view.time - before.last_seen, view.seconds, 1e-3)
     if not alone and np.count_nonzero(mask) < GROWN * full:
-        # Of what is partly hidden only the shift of its template tells where it is.
-        _, dx, dy = best_template_shift(s, mask.astype(np.float32), view)
-        corner = (s.corner[0] + dx, s.corner[1] + dy)
-        gain = 0.3 * FOLLOW
-        velocity = (
-            s.velocity[0] + gain * dx / view.seconds,
-            s.velocity[1] + gain * dy / view.seconds,
-        )
-        moved = replace(s, corner=corner, velocity=velocity)
+        moved = _shifted(s, mask, view)
     else:
-        corner = (float(box[0]), float(box[1]))
-        old = before.centre
-        new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
-        gain = max(FOLLOW, 1 / (s.frames + 0.0))
-        velocity = (
-            s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
-            s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
-        )
-        tone = crop(view.image, box)
-        histogram = 0.8 * s.histogram + 0.2 * tone_histogram(tone[shape])
-        moved = replace(
-            s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram
-        )
-    step = float(np.abs(moved.sides - before.sides).mean())
+        moved = _measured_anew(s, before, box, shape, view)
+    gone = np.abs(moved.sides - before.sides)
     return replace(
         moved,
         last_seen=view.time,
         frames=s.frames + 1,
-        path_length=s.path_length + np.abs(moved.sides - before.sides),
+        path_length=s.path_length + gone,
         isolated_frames=s.isolated_frames + int(alone),
         visible=(box, shape),
         merged=not alone,
         cut=s.cut or at_border(box, view),
-        split_px=before.split_px + step if pieces else 0.0,
+        split_px=before.split_px + float(gone.mean()) if pieces else 0.0,
     )
+
+
+def _shifted(s: BlobTrack, mask: Mask, view: Foreground) -> BlobTrack:
+    """An object partly hidden: only the shift of its template tells where it is."""
+    _, dx, dy = best_template_shift(s, mask.astype(np.float32), view)
+    gain = 0.3 * FOLLOW
+    corner = (s.corner[0] + dx, s.corner[1] + dy)
+    velocity = (
+        s.velocity[0] + gain * dx / view.seconds,
+        s.velocity[1] + gain * dy / view.seconds,
+    )
+    return replace(s, corner=corner, velocity=velocity)
+
+
+def _measured_anew(
+    s: BlobTrack, before: BlobTrack, box: Box, shape: Mask, view: Foreground
+) -> BlobTrack:
+    """An object seen whole: its box, velocity, template and tones are what is seen."""
+    elapsed = max(view.time - before.last_seen, view.seconds, 1e-3)
+    old = before.centre
+    new = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+    gain = max(FOLLOW, 1 / (s.frames + 0.0))
+    velocity = (
+        s.velocity[0] + gain * ((new[0] - old[0]) / elapsed - s.velocity[0]),
+        s.velocity[1] + gain * ((new[1] - old[1]) / elapsed - s.velocity[1]),
+    )
+    tone = crop(view.image, box)
+    histogram = 0.8 * s.histogram + 0.2 * tone_histogram(tone[shape])
+    corner = (float(box[0]), float(box[1]))
+    return replace(s, corner=corner, velocity=velocity, shape=shape, tone=tone, histogram=histogram)

@@ -36,7 +36,12 @@ from visup.percepts.motion.static_camera.blob_track import (
 )
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
 from visup.percepts.motion.static_camera.camera_static import is_camera_static
-from visup.percepts.motion.static_camera.track_fusion import MotionEvidence, TrackFusion
+from visup.percepts.motion.static_camera.track_fusion import (
+    FusionFrame,
+    MotionEvidence,
+    TrackFusion,
+)
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
 REST_S = 1.0  # how long the camera must rest before the picture is believed, seconds
@@ -74,45 +79,55 @@ class StaticCameraSegmenter:
         frame: Frame,
         scene: FrameMeasurements,
         regions: Sequence[Region],
-        ids: int,
+        ids: IdAllocator,
         settings: MotionSettings,
         evidence: MotionEvidence,
-    ) -> tuple[tuple[Region, ...], int]:
+    ) -> tuple[Region, ...]:
         """What is to be reported of a frame.
 
         Args:
             frame: The frame.
             scene: As measured.
             regions: Those of the layers of motion.
-            ids: The last public id given.
+            ids: Gives public ids.
             settings: Gives how long objects are remembered.
             evidence: Which points are seen to move by themselves.
 
         Returns:
-            Regions by id: those of the layers unless the camera rests; the last public id given.
+            Regions by id: those of the layers unless the camera is static.
         """
         fresh = [r for r in regions if not self._fusion.knows(r.id)]
         self._fusion.note(regions, frame.time, settings.memory_s)
         many = MANY_CELLS * (settings.cell / scene.image.scale) ** 2
-        if not self._is_at_rest(is_camera_static(scene), scene.seconds):
-            return self._fusion.passthrough(regions, many), ids
+        foreground = self._foreground(frame, scene, regions, fresh, settings)
+        if foreground is None:
+            return self._fusion.passthrough(regions, ids, many)
+        self.active = min(frame.time - self._since, self._static_s) >= REST_S
+        if not self.active:
+            return self._fusion.passthrough(regions, ids, many)
+        fused = FusionFrame(frame.size, foreground, evidence, many)
+        out, self._tracks = self._fusion.fuse(fused, self._tracks, regions, ids)
+        return out
+
+    def _foreground(
+        self,
+        frame: Frame,
+        scene: FrameMeasurements,
+        regions: Sequence[Region],
+        fresh: Sequence[Region],
+        settings: MotionSettings,
+    ) -> Foreground | None:
+        """What differs from the background; None while the camera moves or none is known."""
+        if not self._is_static(is_camera_static(scene), scene.seconds):
+            return None
         image = _prepare(frame)
         if self._background is None:
             hidden = region_mask(regions, frame.size, image.shape[:2])
             self._background = with_unknown(initial_model(image), hidden)
             self._time = self._since = frame.time
-            return self._fusion.passthrough(regions, many), ids
+            return None
         self._reveal(image, frame, regions, fresh)
-        view = self._seen(image, frame.time, settings)
-        if view is None:
-            return self._fusion.passthrough(regions, many), ids
-        self.active = min(frame.time - self._since, self._static_s) >= REST_S
-        if not self.active:
-            return self._fusion.passthrough(regions, many), ids
-        told, self._tracks, ids = self._fusion.fuse(
-            frame.size, view, self._tracks, regions, ids, evidence, many
-        )
-        return told, ids
+        return self._track_blobs(image, frame.time, settings)
 
     def _reveal(
         self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
@@ -132,7 +147,7 @@ class StaticCameraSegmenter:
         told = region_mask(regions, frame.size, shape)
         self._background = with_revealed(picture, image, ~told)
 
-    def _is_at_rest(self, rests: bool | None, seconds: float) -> bool:
+    def _is_static(self, rests: bool | None, seconds: float) -> bool:
         """Whether the camera rests, as far as is known; else all is forgotten."""
         step = seconds if rests else -seconds
         self._static_s = min(max(self._static_s + step, 0.0), LONGEST_S)
@@ -140,7 +155,9 @@ class StaticCameraSegmenter:
             self._forget()
         return self._static_s > 0
 
-    def _seen(self, image: Floats, now: float, settings: MotionSettings) -> Foreground | None:
+    def _track_blobs(
+        self, image: Floats, now: float, settings: MotionSettings
+    ) -> Foreground | None:
         """Follow the silhouettes into a frame, and learn from it; None when it shows another view."""
         assert self._background is not None
         seconds = max(now - self._time, 1e-3)

@@ -1,11 +1,11 @@
-"""What is told where the camera rests: silhouettes and regions of the layers, each object once.
+"""What is reported while the camera is static: blobs and regions of the layers, each object once.
 
-An object that both have found is told as its silhouette, under the id under which it was told first.
+An object that both have found is reported as its blob, under the id under which it was reported first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +17,7 @@ from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.static_camera.blob_filters import is_salient_blob
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, Foreground
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 KNOWN = 0.4  # share of a region that differs from the picture when the picture knows it
 COMMON = 0.5  # share of the smaller that two outlines of one object have in common
@@ -30,7 +31,7 @@ LARGE = (
 )
 RECENT = 0.9  # weight of what was known of that before
 BESIDE = 5  # pixels: points lie on edges, half of them outside of the silhouette
-LEAST_TOLD = 0.0005  # share of the image that an object must fill when it is first told
+LEAST_AREA = 0.0005  # share of the image that an object must fill when it is first reported
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,17 +47,34 @@ class MotionEvidence:
     sure: Floats
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FusionFrame:
+    """What one frame gives besides blobs and regions.
+
+    Attributes:
+        size: (width, height) of the frame.
+        foreground: What differs from the background.
+        evidence: Which points are seen to move by themselves.
+        well_known_area: Area from which the layers know an outline well, frame pixels.
+    """
+
+    size: tuple[int, int]
+    foreground: Foreground
+    evidence: MotionEvidence
+    well_known_area: float
+
+
 class TrackFusion:
-    """Under which ids objects are told; one per video."""
+    """Under which ids objects are reported; one per video."""
 
     def __init__(self) -> None:
         self._last: dict[int, float] = {}  # when a region of the layers was last seen
-        self._shown: set[int] = set()  # their ids that were told without silhouettes
-        self._alias: dict[int, int] = {}  # under which other id a region is told
-        self._old: set[int] = set()  # those told before the picture, and well known
-        self._missed_evidence: dict[
-            int, tuple[float, float]
-        ] = {}  # what tells of a region: missed, all
+        self._shown: set[int] = set()  # their ids that were reported without blobs
+        self._alias: dict[int, int] = {}  # under which other id a region is reported
+        self._old: set[int] = (
+            set()
+        )  # those reported before the background was known, and well known
+        self._missed_evidence: dict[int, tuple[float, float]] = {}  # of a region: missed, all
 
     def knows(self, number: int) -> bool:
         """Whether a region of the layers was seen of late."""
@@ -68,7 +86,7 @@ class TrackFusion:
         Args:
             regions: Those of a frame, each with its own id.
             now: Seconds.
-            memory_s: How long the layers remember what is hidden, seconds.
+            memory_s: How long the layers remember what is occluded, seconds.
         """
         self._last |= {r.id: now for r in regions}
         gone = {i for i, last in self._last.items() if now - last > memory_s}
@@ -79,127 +97,139 @@ class TrackFusion:
         self._old -= gone
         self._shown -= gone - set(self._alias.values())
 
-    def passthrough(self, regions: Sequence[Region], many: float) -> tuple[Region, ...]:
-        """Regions of the layers, told without silhouettes.
+    def passthrough(
+        self, regions: Sequence[Region], ids: IdAllocator, well_known_area: float
+    ) -> tuple[Region, ...]:
+        """Regions of the layers, reported without blobs.
 
         Args:
             regions: Those of the layers, each with its own id.
-            many: Area from which the layers know an outline well, frame pixels.
+            ids: Gives new ids.
+            well_known_area: Area from which the layers know an outline well, frame pixels.
 
         Returns:
             The same by public id.
         """
         self._shown |= {r.id for r in regions}
-        self._old |= {r.id for r in regions if r.area >= many}
+        self._old |= {r.id for r in regions if r.area >= well_known_area}
         taken: set[int] = set()
         out = []
         for r in regions:
-            number = self._alias.get(r.id, r.id)
-            number = r.id if number in taken else number
+            number = self._public_id(r, taken, ids)
             taken.add(number)
             out.append(replace(r, id=number))
         return tuple(sorted(out, key=lambda r: r.id))
 
     def fuse(
-        self,
-        size: tuple[int, int],
-        view: Foreground,
-        silhouettes: BlobTracks,
-        regions: Sequence[Region],
-        ids: int,
-        evidence: MotionEvidence,
-        many: float,
-    ) -> tuple[tuple[Region, ...], BlobTracks, int]:
-        """Give ids to silhouettes that are salient, and settle with the regions of the layers.
+        self, frame: FusionFrame, blobs: BlobTracks, regions: Sequence[Region], ids: IdAllocator
+    ) -> tuple[tuple[Region, ...], BlobTracks]:
+        """Report each object once, as its blob or as its region of the layers.
 
         Args:
-            size: (width, height) of the frame.
-            view: What it shows.
-            silhouettes: Those that are followed.
+            frame: What it shows.
+            blobs: Those that are followed; salient ones are given ids.
             regions: Those of the layers, each with its own id.
-            ids: The last public id given.
-            evidence: Which points are seen to move by themselves.
-            many: Area from which the layers know an outline well, frame pixels.
+            ids: Gives new ids.
 
         Returns:
-            Regions by public id; the silhouettes with theirs; the last public id given.
+            Regions by public id; the blobs with theirs.
         """
-        scale = size[0] / view.labels.shape[1], size[1] / view.labels.shape[0]
-        seen = {
-            s.key: blob_region(s, scale, size, view.seconds)
-            for s in silhouettes
-            if s.visible is not None
-        }
-        numbered = {s.id: seen[s.key] for s in silhouettes if s.id and s.key in seen}
-        # Small ones are seen better before the picture: people who go together, with their shadows.
-        large_ones = [r for r in regions if r.area >= LARGE * many]
-        missed = self._missed(large_ones, tuple(numbered.values()), size, evidence)
+        seen = _visible_regions(blobs, frame)
+        numbered = {s.id: seen[s.key] for s in blobs if s.id and s.key in seen}
+        # Small ones are seen better by subtraction: people who go together, with their shadows.
+        large = [r for r in regions if r.area >= LARGE * frame.well_known_area]
+        missed = self._missed(large, tuple(numbered.values()), frame)
         older, heirs = self._older(regions, seen, missed)
-        whole_view = size[0] * size[1]
         out: list[Region] = []
         known: list[BlobTrack] = []
-        taken = {s.id for s in silhouettes} | {self._alias.get(r.id, r.id) for r in older}
-        for s in silhouettes:
+        taken = {s.id for s in blobs} | {self._known_id(r) for r in older}
+        for s in blobs:
             if s.key in heirs and heirs[s.key] not in taken:
                 s = replace(s, id=heirs[s.key])
-                taken.add(s.id)
             own = seen.get(s.key)
-            free = own is not None and not any(
-                common_pixels(own, r) > COMMON * own.area for r in older
-            )
-            large = own is not None and own.area >= LEAST_TOLD * whole_view
-            new = own is not None and large and free and not s.id
+            free = own is not None and not any(_is_mostly_in(own, r) for r in older)
             if (
                 own is not None
-                and new
-                and is_salient_blob(s)
-                and not self._is_part(own, large_ones, numbered)
+                and free
+                and not s.id
+                and self._is_new(s, own, frame, large, numbered)
             ):
-                ids, number = self._number(own, regions, ids, taken)
-                s = replace(s, id=number)
-                taken.add(number)
+                s = replace(s, id=self._blob_id(own, regions, ids, taken))
+            taken.add(s.id)
             known.append(s)
             if own is not None and free and s.id:
                 out.append(replace(own, id=s.id))
-        change = cv2.resize((view.labels > 0).view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        return self._with_regions(out, regions, older, frame, ids), tuple(known)
+
+    def _with_regions(
+        self,
+        blobs: list[Region],
+        regions: Sequence[Region],
+        older: Sequence[Region],
+        frame: FusionFrame,
+        ids: IdAllocator,
+    ) -> tuple[Region, ...]:
+        """What is reported of blobs, with the regions that subtraction does not show as well."""
+        out, labels = blobs, frame.foreground.labels
+        change = cv2.resize(
+            (labels > 0).view(np.uint8), frame.size, interpolation=cv2.INTER_NEAREST
+        )
         for r in regions:
             x, y, w, h = r.bbox
             if r not in older and change[y : y + h, x : x + w][r.mask].mean() >= KNOWN:
-                self._same(r, out)
-                # What is small and was told stays told until a silhouette of it is.
-                small = r.id in self._shown and r.area < many
+                self._note_alias(r, out)
+                # What is small and was reported stays so until a blob of it is.
+                small = r.id in self._shown and r.area < frame.well_known_area
                 if not small or any(common_pixels(s, r) for s in out):
                     continue
-            out = [s for s in out if common_pixels(s, r) < COMMON * s.area]
-            number = self._alias.get(r.id, r.id)
-            shown = {s.id for s in out}
-            out.append(replace(r, id=r.id if number in shown else number))
-        return tuple(sorted(out, key=lambda r: r.id)), tuple(known), ids
+            out = [s for s in out if not common_pixels(s, r) >= COMMON * s.area]
+            out.append(replace(r, id=self._public_id(r, {s.id for s in out}, ids)))
+        return tuple(sorted(out, key=lambda r: r.id))
+
+    def _known_id(self, r: Region) -> int:
+        """The id under which a region was reported, its own if never."""
+        return self._alias.get(r.id, r.id)
+
+    def _public_id(self, r: Region, taken: Collection[int], ids: IdAllocator) -> int:
+        """The id under which a region is reported: as before, else its own, else a new one for good."""
+        for number in (self._known_id(r), r.id):
+            if number not in taken:
+                return number
+        self._alias[r.id] = ids.new()
+        return self._alias[r.id]
+
+    def _is_new(
+        self,
+        s: BlobTrack,
+        own: Region,
+        frame: FusionFrame,
+        regions: Sequence[Region],
+        numbered: Mapping[int, Region],
+    ) -> bool:
+        """Whether a blob is an object to be reported: large enough, salient, and no part of another."""
+        large = own.area >= LEAST_AREA * (frame.size[0] * frame.size[1])
+        return large and is_salient_blob(s) and not self._is_part(own, regions, numbered)
 
     def _missed(
-        self,
-        regions: Sequence[Region],
-        seen: Sequence[Region],
-        size: tuple[int, int],
-        evidence: MotionEvidence,
+        self, regions: Sequence[Region], seen: Sequence[Region], frame: FusionFrame
     ) -> set[int]:
-        """Regions of which the picture misses parts: what is of one tone with the rest, or slow.
+        """Regions of which subtraction misses parts: what is of one tone with the rest, or slow.
 
         Points there move with the region, and not as the rest does.
         """
-        shown = np.zeros(size[::-1], dtype=np.uint8)
+        shown = np.zeros(frame.size[::-1], dtype=np.uint8)
         for s in seen:
             x, y, w, h = s.bbox
             shown[y : y + h, x : x + w] |= s.mask
         beside = cv2.dilate(shown, np.ones((BESIDE, BESIDE), np.uint8)) > 0
-        column, row = np.clip(evidence.xy.astype(np.int64), 0, np.array(size) - 1).T
+        column, row = np.clip(frame.evidence.xy.astype(np.int64), 0, np.array(frame.size) - 1).T
         out = set()
         for r in regions:
             x, y, w, h = r.bbox
             box = (column >= x) & (column < x + w) & (row >= y) & (row < y + h)
             mine = np.flatnonzero(box)
             mine = mine[r.mask[row[mine] - y, column[mine] - x]]
-            sure = np.maximum(evidence.sure[mine], 0)
+            sure = np.maximum(frame.evidence.sure[mine], 0)
             lost = float(sure[~beside[row[mine], column[mine]]].sum())
             before = self._missed_evidence.get(r.id, (0.0, 0.0))
             now = RECENT * before[0] + lost, RECENT * before[1] + float(sure.sum())
@@ -229,7 +259,7 @@ class TrackFusion:
                 out.append(r)
                 continue
             self._old.discard(r.id)
-            heirs[best] = self._alias.get(r.id, r.id)
+            heirs[best] = self._known_id(r)
         return out, heirs
 
     def _is_part(
@@ -237,7 +267,7 @@ class TrackFusion:
     ) -> bool:
         """Whether a silhouette that was never told touches another one of the same region."""
         for r in regions:
-            host = numbered.get(self._alias.get(r.id, r.id))
+            host = numbered.get(self._known_id(r))
             if (
                 host is not None
                 and common_pixels(own, r) > COMMON * own.area
@@ -246,22 +276,36 @@ class TrackFusion:
                 return True
         return False
 
-    def _number(
-        self, own: Region, regions: Sequence[Region], ids: int, taken: set[int]
-    ) -> tuple[int, int]:
-        """The last id given, and that of a new silhouette: the one under which it was told before."""
+    def _blob_id(
+        self, own: Region, regions: Sequence[Region], ids: IdAllocator, taken: Collection[int]
+    ) -> int:
+        """The id of a new blob: the one under which it was reported before, or a new one."""
         for r in regions:
-            number = self._alias.get(r.id, r.id)
-            much = MAIN * r.area
-            if number in self._shown and number not in taken and common_pixels(own, r) > much:
-                return ids, number
-        return ids + 1, ids + 1
+            number = self._known_id(r)
+            main = common_pixels(own, r) > MAIN * r.area
+            if number in self._shown and number not in taken and main:
+                return number
+        return ids.new()
 
-    def _same(self, r: Region, told: Sequence[Region]) -> None:
-        """Note under which id a region of the layers is told."""
-        best = max(told, key=lambda s: common_pixels(s, r), default=None)
+    def _note_alias(self, r: Region, reported: Sequence[Region]) -> None:
+        """Note under which id a region of the layers is reported."""
+        best = max(reported, key=lambda s: common_pixels(s, r), default=None)
         if best is not None and common_pixels(best, r) > COMMON * min(r.area, best.area):
             self._alias[r.id] = best.id
+
+
+def _visible_regions(blobs: BlobTracks, frame: FusionFrame) -> dict[int, Region]:
+    """What is visible of each blob as a region, by key."""
+    width, height = frame.size
+    rows, columns = frame.foreground.labels.shape
+    scale, seconds = (width / columns, height / rows), frame.foreground.seconds
+    return {
+        s.key: blob_region(s, scale, frame.size, seconds) for s in blobs if s.visible is not None
+    }
+
+
+def _is_mostly_in(own: Region, other: Region) -> bool:
+    return common_pixels(own, other) > COMMON * own.area
 
 
 def common_pixels(a: Region, b: Region) -> int:

@@ -12,17 +12,19 @@ from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.layers.affine import distances
-from visup.percepts.motion.layers.dense_labelling import CLIP
+from visup.percepts.motion.layers.dense_labelling import CLIP, Labelling
 from visup.percepts.motion.layers.layer_discovery import affine_rate, discover_layers, layer_slack
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
     min_region_area,
-    moves_like,
 )
 from visup.percepts.motion.tracks.merge_split import NEAR_STEPS, merged
 from visup.percepts.motion.tracks.salience import has_absorbed_background, is_salient
-from visup.percepts.motion.tracks.track import Indices, PartMotion, Track, Tracks, update_track
+from visup.percepts.motion.tracks.track import PartMotion, Track, Tracks, new_track
+from visup.percepts.motion.tracks.track_fitting import moves_like
+from visup.percepts.motion.tracks.track_update import update_track
 
 LIKELY = 60.0  # log likelihood ratio after which a track that has lasted is confirmed
 SURE = 200.0  # the same for one that has only just appeared
@@ -31,7 +33,7 @@ SLIVER = 3.5  # length over width of a strip that is no object
 
 
 def initiate(
-    tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings, born: int
+    tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings, last_key: int
 ) -> Tracks:
     """Add tracks for groups of constraints that no layer explains.
 
@@ -39,7 +41,7 @@ def initiate(
         tracks: Those known.
         scene: The frame.
         settings: Gives the most tracks.
-        born: How many were born before.
+        last_key: The greatest key given so far.
 
     Returns:
         The known tracks, then the new ones.
@@ -55,20 +57,10 @@ def initiate(
             share = np.zeros(scene.cells.count, dtype=np.float32)
             share[scene.cell_of(c)[index]] = 1
             share = scene.cells.dilated(share[:, None] > 0, 1)[:, 0] * 0.7 * ~owned
-            born += 1
-            middle = c.xy[index].mean(axis=0)
-            motion = PartMotion().with_rate(
-                c.lag, affine_rate(model, c, scene.time), float(len(index))
-            )
-            t = Track(
-                born,
-                0,
-                scene.time,
-                scene.time,
-                share.astype(np.float32),
-                motions=(motion,),
-                centre=(float(middle[0]), float(middle[1])),
-            )
+            last_key += 1
+            rate = affine_rate(model, c, scene.time)
+            motion = PartMotion().with_rate(c.lag, rate, float(len(index)))
+            t = new_track(last_key, scene.time, share, motion, c.xy[index].mean(axis=0))
             host = _former_owner(out, share > 0, motion, scene)
             if host is None:
                 out.append(t)
@@ -155,19 +147,26 @@ def _unexplained(
 def update(
     tracks: Tracks,
     scene: FrameMeasurements,
-    posterior: Floats,
-    winner: Indices,
+    labelling: Labelling,
     likelihood: Floats,
     settings: MotionSettings,
 ) -> Tracks:
-    """Bring each track's shape and evidence up to date with the posterior."""
+    """Bring each track's shape and evidence up to date with the posterior.
+
+    Args:
+        tracks: K tracks, predicted.
+        scene: The frame.
+        labelling: Labels of its superpixels.
+        likelihood: (N, K + 2) float32, log likelihood of the labels at the points.
+        settings: Gives the least area of a region.
+    """
     least = 0.3 * min_region_area(scene, settings)
-    at = winner[scene.at]
+    at = labelling.winner[scene.at]
     out = []
     for k, t in enumerate(tracks, 1):
         gain = np.clip(likelihood[:, k] - likelihood[:, 0], -CLIP, CLIP)[at == k]
         t = replace(t, evidence=min(0.98 * t.evidence + float(gain.sum()), 2000.0))
-        out.append(update_track(t, posterior, winner, k, scene.cells, scene.time, least))
+        out.append(update_track(t, k, labelling, scene.cells, scene.time, least))
     return tuple(out)
 
 
@@ -222,30 +221,26 @@ def _is_sliver(t: Track, scene: FrameMeasurements) -> bool:
 def confirm(
     tracks: Tracks,
     scene: FrameMeasurements,
-    ids: int,
+    ids: IdAllocator,
     settings: MotionSettings,
     sought: Sequence[bool],
-) -> tuple[Tracks, int]:
+) -> Tracks:
     """Give public ids to tracks that have lasted and surely move.
 
     Args:
         tracks: All tracks.
         scene: The frame.
-        ids: The last public id given.
+        ids: Gives them.
         settings: Says how long is lasting.
         sought: Which tracks lie where cogitation asked to look: half as much will do for those.
-
-    Returns:
-        The tracks and the last public id given.
     """
     out = []
     for t, wanted in zip(tracks, sought, strict=True):
         need = 0.5 if wanted else 1.0
         if not t.id and t.last_seen == scene.time and _is_confirmed(t, scene, settings, need):
-            ids += 1
-            t = replace(t, id=ids)
+            t = replace(t, id=ids.new())
         out.append(t)
-    return tuple(out), ids
+    return tuple(out)
 
 
 def _is_confirmed(

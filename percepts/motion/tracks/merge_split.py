@@ -23,10 +23,10 @@ from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
     min_region_area,
-    moves_like,
 )
 from visup.percepts.motion.tracks.salience import LITTLE_BORDER, border_share
-from visup.percepts.motion.tracks.track import Indices, PartMotion, Track, Tracks
+from visup.percepts.motion.tracks.track import Indices, PartMotion, Track, Tracks, new_track
+from visup.percepts.motion.tracks.track_fitting import moves_like
 
 NEAR_STEPS = 4  # cells between tracks that touch
 APART_S = 1.5
@@ -38,7 +38,11 @@ CONTACT = 5.0  # affinity of two cells that are flat and of one tone
 
 
 def assign_unknown(
-    tracks: Tracks, scene: FrameMeasurements, winner: Indices, settings: MotionSettings, born: int
+    tracks: Tracks,
+    scene: FrameMeasurements,
+    winner: Indices,
+    settings: MotionSettings,
+    last_key: int,
 ) -> Tracks:
     """Give parts that move as no layer does to the track that they touch, or make them tracks.
 
@@ -61,9 +65,9 @@ def assign_unknown(
             share = np.where(part, 1, out[k].share).astype(np.float32)
             out[k] = replace(out[k], share=share)
         elif size > min_region_area(scene, settings):
-            t = _new_track(part, scene, born + 1)
+            t = _unknown_track(part, scene, last_key + 1)
             if t is not None and len(out) < settings.max_regions:
-                born += 1
+                last_key += 1
                 out.append(t)
     return tuple(out)
 
@@ -86,7 +90,7 @@ def _majority(labels: Indices, count: int, share: float) -> int | None:
     return k if numbers[k] > share * len(labels) else None
 
 
-def _new_track(part: NDArray[np.bool_], scene: FrameMeasurements, key: int) -> Track | None:
+def _unknown_track(part: NDArray[np.bool_], scene: FrameMeasurements, key: int) -> Track | None:
     """A new track for cells that move as no layer does; None when there is too little to go by."""
     c = scene.measured[0].constraints
     inside = np.flatnonzero(part[scene.cell_of(c)])
@@ -98,16 +102,7 @@ def _new_track(part: NDArray[np.bool_], scene: FrameMeasurements, key: int) -> T
     fit = fit_affine(c, weight, start, slack=layer_slack(start))
     motion = PartMotion().with_rate(c.lag, affine_rate(fit, c, scene.time), float(len(inside)))
     centre = scene.cells.centre[part].mean(axis=0)
-    return Track(
-        key,
-        0,
-        scene.time,
-        scene.time,
-        part.astype(np.float32),
-        motions=(motion,),
-        centre=(float(centre[0]), float(centre[1])),
-        evidence=10.0,
-    )
+    return new_track(key, scene.time, part, motion, centre, evidence=10.0)
 
 
 def split_occluded(tracks: Tracks, scene: FrameMeasurements, winner: Indices) -> Tracks:

@@ -82,6 +82,15 @@ def is_stationary(t: Track, scene: FrameMeasurements) -> bool:
     return bool(t.id) and min(seen) > RESTS
 
 
+def stationary_cells(tracks: Sequence[Track], scene: FrameMeasurements) -> NDArray[np.bool_]:
+    """(count,) bool: superpixels of objects that do not move against the background."""
+    out = np.zeros(scene.cells.count, dtype=bool)
+    for t in tracks:
+        if is_stationary(t, scene):
+            out |= t.share > 0.5
+    return out
+
+
 def has_absorbed_background(t: Track, scene: FrameMeasurements) -> bool:
     """Whether an object has grown over the background until that explains all of it.
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError, ExtraMissingError
-from visup.agent.model.orientation import picture_axes
+from visup.agent.model.orientation import image_axes
 
 PICTURE = 200
 """Pixels along the longer side of a rendered silhouette."""
@@ -188,7 +188,7 @@ def _render(
     size: float,
 ) -> RenderedView:
     """One silhouette of a mesh of unit radius; `size` turns pixels back into mesh units."""
-    right, up = picture_axes(direction)
+    right, up = image_axes(direction)
     u, v = points @ right, points @ up
     pixel = max(np.ptp(u), np.ptp(v), 1e-6) / picture
     columns = np.arange(u.min() - 1.5 * pixel, u.max() + 2 * pixel, pixel)

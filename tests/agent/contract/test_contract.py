@@ -7,7 +7,7 @@ import pytest
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Contract
 from visup.agent.contract.contract import CONTRACT_VERSION, MOST_HISTORY
-from visup.agent.execution.pipeline import in_order
+from visup.agent.execution.pipeline import ordered_slots
 from visup.agent.model.errors import BehaviourError
 
 
@@ -55,4 +55,4 @@ def test_a_contract_makes_percepts_of_its_own() -> None:
 
 def test_what_needs_only_what_it_gives_itself_is_refused() -> None:
     with pytest.raises(BehaviourError, match="which no behaviour but itself gives"):
-        in_order([Scripted("eye", ("x",), needs=("x",))])
+        ordered_slots([Scripted("eye", ("x",), needs=("x",))])

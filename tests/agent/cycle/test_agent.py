@@ -6,11 +6,11 @@ from tests.agent.scripted import Scripted, counting, exploding_at, frames, worri
 from visup.agent import Directive, Mind, Observation, Outcome, Severity
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 
 
 def told(steps: list[Step]) -> list[object]:
-    return [plain(replace(s, observation=Observation(0, 0, (0, 0)))) for s in steps]
+    return [to_jsonable(replace(s, observation=Observation(0, 0, (0, 0)))) for s in steps]
 
 
 def make() -> Agent:
@@ -67,8 +67,10 @@ def test_an_open_alert_is_not_closed_by_a_step_that_could_not_think() -> None:
 
 
 def test_directives_reach_behaviours_in_the_next_step() -> None:
-    def asks(mind: Mind, seen: Observation) -> Outcome:
-        wish = Directive("expect_regions", "There should be two.", {"count": seen.frame_index})
+    def asks(mind: Mind, observation: Observation) -> Outcome:
+        wish = Directive(
+            "expect_regions", "There should be two.", {"count": observation.frame_index}
+        )
         return Outcome(mind, directives=(wish,))
 
     eye = Scripted("eye", ("x",))

@@ -3,14 +3,14 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.agent import Alert, Concern, Severity
+from visup.agent import Alert, AlertCondition, Severity
 from visup.agent.cycle.alerts import GRACE_S, SETTLE_S, update_alerts
 
 STEP_S = 0.25
 
 
-def concern(kind: str) -> Concern:
-    return Concern(kind, (1, 2), Severity.WARNING, f"{kind}.")
+def concern(kind: str) -> AlertCondition:
+    return AlertCondition(kind, (1, 2), Severity.WARNING, f"{kind}.")
 
 
 @given(st.lists(st.sets(st.sampled_from(["a", "b", "c"])), max_size=40))
@@ -35,8 +35,8 @@ def test_the_life_of_alerts(history: list[set[str]]) -> None:
 
 
 def test_two_concerns_alike_make_one_alert_of_the_graver_severity() -> None:
-    grave = Concern("a", (1,), Severity.CRITICAL, "Grave.")
-    mild = Concern("a", (1,), Severity.WARNING, "Mild.")
+    grave = AlertCondition("a", (1,), Severity.CRITICAL, "Grave.")
+    mild = AlertCondition("a", (1,), Severity.WARNING, "Mild.")
     alerts, opened, _ = update_alerts((), [mild, grave, mild], 0.0, 1)
     assert [a.severity for a in alerts] == [Severity.CRITICAL]
     assert alerts == opened

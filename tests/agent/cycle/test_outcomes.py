@@ -38,8 +38,8 @@ def exits(mind: Mind) -> Any:
 def test_nonsense_of_a_reasoner_leaves_the_mind_as_it_was(what: str) -> None:
     says = NONSENSE.get(what, exits)
 
-    def think(mind: Mind, seen: Observation) -> Any:
-        return says(mind) if seen.frame_index == 3 else Outcome(mind)
+    def think(mind: Mind, observation: Observation) -> Any:
+        return says(mind) if observation.frame_index == 3 else Outcome(mind)
 
     always = worried_while(lambda _: True)
     agent = Agent([Scripted("eye", ("x",))], Reasoners((counting,), (always, think)))

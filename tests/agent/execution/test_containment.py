@@ -15,7 +15,7 @@ from visup.agent import Contract, Directive, Frame, Observation, Report, ReportS
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent
 from visup.agent.execution.behaviour_slot import PATIENCE
-from visup.agent.execution.pipeline import in_order, perceive
+from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.model.step import Step
 
 
@@ -26,8 +26,10 @@ class Plug:
         self.contract = Contract("plug", gives=("x",), **declared)
         self.does = does
 
-    def perceive(self, frame: Frame, seen: Observation, directives: Sequence[Directive]) -> Any:
-        said = self.does(frame, seen)
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Any:
+        said = self.does(frame, observation)
         return [] if said is None else [self.contract.percept(frame, said)]
 
 
@@ -120,7 +122,7 @@ def test_without_budgets_no_decision_hangs_on_time() -> None:
 def test_over_budget_is_late_and_too_often_late_is_suspended() -> None:
     now = [0.0]
 
-    def slow(frame: Frame, seen: Observation) -> int:
+    def slow(frame: Frame, observation: Observation) -> int:
         now[0] += 0.05
         return frame.index
 
@@ -133,12 +135,12 @@ def test_over_budget_is_late_and_too_often_late_is_suspended() -> None:
 
 
 def test_what_rests_after_a_failure_stays_unknown_until_it_has_run_again() -> None:
-    def fails(frame: Frame, seen: Observation) -> int:
+    def fails(frame: Frame, observation: Observation) -> int:
         if frame.index == 5:
             raise ValueError("no light")
         return frame.index
 
-    slots = in_order([Plug(fails, every_s=0.5)])
+    slots = ordered_slots([Plug(fails, every_s=0.5)])
     seen = [perceive(slots, frame, ()) for frame in frames(12)]
     assert ["x" in s.unknown for s in seen] == [5 <= i < 10 for i in range(12)]
     assert [s.reports[0].state for s in seen[:2]] == [ReportState.RAN, ReportState.RESTED]
@@ -149,7 +151,9 @@ def test_who_is_blind_because_another_failed_leaves_its_kinds_unknown() -> None:
         raise ValueError("no light")
 
     chain = [Scripted("a", ("A",), fails), Scripted("b", ("B",), needs=("A",))]
-    seen = perceive(in_order([*chain, Scripted("c", ("C",), needs=("B",))]), next(frames(1)), ())
+    seen = perceive(
+        ordered_slots([*chain, Scripted("c", ("C",), needs=("B",))]), next(frames(1)), ()
+    )
     assert seen.unknown == {"A", "B", "C"}
     assert [r.state.value for r in seen.reports] == ["failed", "blind", "blind"]
 
@@ -159,7 +163,7 @@ def test_one_of_two_who_look_for_a_kind_is_not_enough() -> None:
         raise ValueError("no light")
 
     both = [Scripted("a", ("x",)), Scripted("b", ("x",), fails)]
-    seen = perceive(in_order(both), next(frames(1)), ())
+    seen = perceive(ordered_slots(both), next(frames(1)), ())
     assert seen.of("x") == (0,)
     assert not seen.observed("x")
 
@@ -167,7 +171,7 @@ def test_one_of_two_who_look_for_a_kind_is_not_enough() -> None:
 def test_memory_that_is_kept_is_noticed() -> None:
     kept: list[Any] = []
 
-    def hoard(frame: Frame, seen: Observation) -> int:
+    def hoard(frame: Frame, observation: Observation) -> int:
         kept.append(np.ones(8 * 2**20, np.uint8))
         return frame.index
 
@@ -180,7 +184,7 @@ def test_memory_that_is_kept_is_noticed() -> None:
 
 
 def test_a_frame_cannot_be_written_to() -> None:
-    def scribble(frame: Frame, seen: Observation) -> None:
+    def scribble(frame: Frame, observation: Observation) -> None:
         frame.image[:] = 0
 
     given = list(frames(3))
@@ -191,9 +195,9 @@ def test_a_frame_cannot_be_written_to() -> None:
 
 
 def test_the_past_is_as_long_as_asked_for_and_nobody_else_sees_it() -> None:
-    def past(frame: Frame, seen: Observation) -> list[int]:
-        assert all(p.seen.frame_index == p.frame.index for p in seen.past)
-        return [p.frame.index for p in seen.past]
+    def past(frame: Frame, observation: Observation) -> list[int]:
+        assert all(p.observation.frame_index == p.frame.index for p in observation.past)
+        return [p.frame.index for p in observation.past]
 
     steps = list(Agent([Plug(past, history=2)]).steps(frames(4)))
     assert [s.observation.of("x")[0] for s in steps] == [[], [0], [0, 1], [1, 2]]
@@ -202,7 +206,7 @@ def test_the_past_is_as_long_as_asked_for_and_nobody_else_sees_it() -> None:
 
 def test_a_clock_that_is_set_back_keeps_nobody_waiting() -> None:
     image = np.zeros((4, 6, 3), np.uint8)
-    slots = in_order([Plug(lambda f, s: f.index, every_s=10.0)])
+    slots = ordered_slots([Plug(lambda f, s: f.index, every_s=10.0)])
     times = [100.0, 101.0, 3.0]
     states = [perceive(slots, Frame(i, t, image), ()).reports[0].state for i, t in enumerate(times)]
     assert states == [ReportState.RAN, ReportState.RESTED, ReportState.RAN]

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Percept, Region, ReportState
 from visup.agent.execution.behaviour_slot import FIRST_SUSPENSION_S, PATIENCE
-from visup.agent.execution.pipeline import in_order, perceive
+from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.model.errors import BehaviourError
 
 
 @given(st.permutations(["a", "b", "c", "d"]))
 def test_whatever_the_given_order_needs_come_before_those_who_need_them(order: list[str]) -> None:
     needs = {"a": (), "b": ("A",), "c": ("B",), "d": ("A", "C")}
-    slots = in_order([Scripted(n, (n.upper(),), needs=needs[n]) for n in order])
+    slots = ordered_slots([Scripted(n, (n.upper(),), needs=needs[n]) for n in order])
     placed = [s.behaviour.contract.name for s in slots]
     for name, kinds in needs.items():
         assert all(placed.index(k.lower()) < placed.index(name) for k in kinds)
@@ -38,14 +38,14 @@ def test_what_cannot_be_ordered_is_refused_in_words(
     behaviours: list[Scripted], message: str
 ) -> None:
     with pytest.raises(BehaviourError, match=message):
-        in_order(behaviours)
+        ordered_slots(behaviours)
 
 
 def test_a_behaviour_that_raises_is_reported_and_its_kind_counts_as_unobserved() -> None:
     def says(_: int) -> object:
         raise ValueError("no light")
 
-    slots = in_order([Scripted("good", ("x",)), Scripted("bad", ("y",), says)])
+    slots = ordered_slots([Scripted("good", ("x",)), Scripted("bad", ("y",), says)])
     seen = perceive(slots, next(frames(1)), ())
     states = {r.behaviour: (r.state, r.error) for r in seen.reports}
     assert states["good"][0] is ReportState.RAN
@@ -58,7 +58,7 @@ def test_who_needs_what_was_not_observed_rests_instead_of_seeing_nothing() -> No
     def says(_: int) -> object:
         raise ValueError("no light")
 
-    slots = in_order([Scripted("eye", ("x",), says), Scripted("namer", ("y",), needs=("x",))])
+    slots = ordered_slots([Scripted("eye", ("x",), says), Scripted("namer", ("y",), needs=("x",))])
     seen = perceive(slots, next(frames(1)), ())
     assert [r.state for r in seen.reports] == [ReportState.FAILED, ReportState.BLIND]
     assert not seen.observed("y")
@@ -74,7 +74,7 @@ def test_who_needs_what_was_not_observed_rests_instead_of_seeing_nothing() -> No
 def test_a_report_outside_the_contract_is_a_failure(report: Any, message: str) -> None:
     liar = Scripted("liar", ("x",))
     liar.perceive = lambda *_: [report]  # type: ignore[method-assign]
-    seen = perceive(in_order([liar]), next(frames(1)), ())
+    seen = perceive(ordered_slots([liar]), next(frames(1)), ())
     assert seen.reports[0].state is ReportState.FAILED
     assert message in seen.reports[0].error
     assert not seen.reports[0].percepts
@@ -86,7 +86,7 @@ def test_repeated_failures_suspend_and_a_success_forgives() -> None:
             raise ValueError("not yet")
         return i
 
-    slots = in_order([Scripted("slow", ("x",), says)])
+    slots = ordered_slots([Scripted("slow", ("x",), says)])
     states = [perceive(slots, f, ()).reports[0].state for f in frames(60)]
     assert states[:PATIENCE] == [ReportState.FAILED] * PATIENCE
     rest = round(FIRST_SUSPENSION_S * 10)
@@ -96,7 +96,7 @@ def test_repeated_failures_suspend_and_a_success_forgives() -> None:
 
 
 def test_a_behaviour_runs_no_more_often_than_it_asks_for() -> None:
-    slots = in_order([Scripted("lazy", ("x",), every_s=0.5)])
+    slots = ordered_slots([Scripted("lazy", ("x",), every_s=0.5)])
     ran = [
         f.index for f in frames(20) if perceive(slots, f, ()).reports[0].state is ReportState.RAN
     ]
@@ -108,6 +108,8 @@ def test_a_behaviour_runs_no_more_often_than_it_asks_for() -> None:
 )
 def test_a_region_that_is_not_in_the_image_is_a_failure(bbox: tuple[int, int, int, int]) -> None:
     region = Region(1, bbox, np.ones((2, 2), bool), np.zeros((0, 2), np.float32), (0, 0), 4)
-    seen = perceive(in_order([Scripted("eye", ("region",), lambda _: region)]), next(frames(1)), ())
+    seen = perceive(
+        ordered_slots([Scripted("eye", ("region",), lambda _: region)]), next(frames(1)), ()
+    )
     assert seen.reports[0].state is ReportState.FAILED
     assert "region 1" in seen.reports[0].error

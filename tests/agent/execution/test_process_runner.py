@@ -24,7 +24,7 @@ from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.step import Step
-from visup.agent.plugins.loader import load
+from visup.agent.plugins.factory import load_behaviours
 
 LIMITS = Limits(hang_s=0.5)
 
@@ -39,13 +39,13 @@ class Alone:
         self.count = 0
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterator[Percept]:
         self.count += 1
         if frame.index == 2 and self.does:
             DOES[self.does](frame)
         yield self.contract.percept(frame, os.getpid())
-        value = [self.count, int(frame.image.sum()), [p.frame.index for p in seen.past]]
+        value = [self.count, int(frame.image.sum()), [p.frame.index for p in observation.past]]
         yield self.contract.percept(
             frame, [*value, [d.data["n"] for d in directives]], kind="count"
         )
@@ -81,8 +81,8 @@ DOES: dict[str, Callable[[Frame], Any]] = {
 }
 
 
-def numbered(mind: Any, seen: Observation) -> Outcome:
-    wish = Directive("look_at", "Look.", MappingProxyType({"n": seen.frame_index}))
+def numbered(mind: Any, observation: Observation) -> Outcome:
+    wish = Directive("look_at", "Look.", MappingProxyType({"n": observation.frame_index}))
     return Outcome(mind, directives=(wish,))
 
 
@@ -232,10 +232,10 @@ def test_a_behaviour_of_a_file_can_be_isolated_by_name(tmp_path: Path) -> None:
         "    pid: int\n"
         "class Lamp:\n"
         "    contract = Contract('lamp', gives=('lamp',))\n"
-        "    def perceive(self, frame, seen, directives):\n"
+        "    def perceive(self, frame, observation, directives):\n"
         "        yield self.contract.percept(frame, Light(os.getpid()))\n"
     )
-    (lamp,) = load(str(path))
+    (lamp,) = load_behaviours(str(path))
     steps = watch(lamp, 2, Limits(isolate=frozenset({"lamp"})))
     assert steps[-1].reports[0].error == ""
     assert steps[-1].observation.of("lamp")[0].pid != os.getpid()

@@ -22,7 +22,7 @@ from visup.agent import (
     Report,
     ReportState,
 )
-from visup.agent.execution.validation import check, collect
+from visup.agent.execution.validation import check_percepts, collect_percepts
 from visup.agent.model.errors import BehaviourError
 from visup.testing import crossing
 
@@ -34,7 +34,7 @@ NAN, INF = float("nan"), float("inf")
 
 def judge(value: object, kind: str = "own", **changes: Any) -> None:
     percept = replace(EYE.percept(FRAME, value, kind=kind), **changes)
-    check(EYE, collect(EYE, [percept]), FRAME)
+    check_percepts(EYE, collect_percepts(EYE, [percept]), FRAME)
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def judge(value: object, kind: str = "own", **changes: Any) -> None:
 )
 def test_what_is_no_percepts_is_refused(said: object, message: str) -> None:
     with pytest.raises(BehaviourError, match=message):
-        collect(EYE, said)
+        collect_percepts(EYE, said)
 
 
 @pytest.mark.parametrize(
@@ -133,14 +133,14 @@ def test_a_value_that_is_not_what_its_kind_says_is_refused(kind: str, value: obj
 def test_one_id_for_two_regions_is_refused() -> None:
     twice = [EYE.percept(FRAME, REGION) for _ in range(2)]
     with pytest.raises(BehaviourError, match="comes twice"):
-        check(EYE, twice, FRAME)
+        check_percepts(EYE, twice, FRAME)
 
 
 def test_one_id_for_regions_of_two_behaviours_is_refused() -> None:
     report = Report("motion", ReportState.RAN, ("region",), (EYE.percept(FRAME, REGION),))
     before = Observation(0, 0.0, FRAME.size, (report,))
     with pytest.raises(BehaviourError, match="among all behaviours"):
-        check(EYE, [EYE.percept(FRAME, REGION)], FRAME, before)
+        check_percepts(EYE, [EYE.percept(FRAME, REGION)], FRAME, before)
 
 
 @dataclass
@@ -208,4 +208,4 @@ def test_messages_are_short_whatever_is_reported() -> None:
 def test_a_frame_of_another_size_changes_what_is_inside() -> None:
     small = Frame(0, 0.0, np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(BehaviourError, match="a box within"):
-        check(EYE, [Percept("region", REGION, 0.0, "eye")], small)
+        check_percepts(EYE, [Percept("region", REGION, 0.0, "eye")], small)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from visup.agent.model.orientation import orientations, picture_axes, swing_and_roll, views
+from visup.agent.model.orientation import image_axes, orientations, swing_and_roll, views
 
 seeds = st.integers(0, 10_000)
 angles = st.floats(-3.1, 3.1)
@@ -46,7 +46,7 @@ def test_orientations_are_proper_and_the_viewer_is_before_the_object(
 
 @pytest.mark.parametrize("pole", [(0, 0, 1), (0, 0, -1)])
 def test_along_the_pole_y_is_up(pole: tuple[int, int, int]) -> None:
-    right, up = picture_axes(pole)
+    right, up = image_axes(pole)
     assert np.allclose(up, [0, 1, 0])
     assert np.allclose(np.cross(right, up), pole)
 
@@ -54,7 +54,7 @@ def test_along_the_pole_y_is_up(pole: tuple[int, int, int]) -> None:
 @given(seeds)
 def test_the_picture_from_behind_has_right_and_left_exchanged(seed: int) -> None:
     direction = any_rotation(seed)[2]
-    (right, up), (right_behind, up_behind) = picture_axes(direction), picture_axes(-direction)
+    (right, up), (right_behind, up_behind) = image_axes(direction), image_axes(-direction)
     assert np.allclose(right, -right_behind)
     assert np.allclose(up, up_behind)
 

@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Column, Mind, Relation, RelationTable, Truth
-from visup.agent.model.relation_columns import Cells, Columns
-from visup.agent.storage.jsonable import plain
+from visup.agent.model.relation_columns import ColumnLayout, RelationBlock
+from visup.agent.storage.jsonable import to_jsonable
 
 IDS = (2, 5, 9)
 PAIRS = ((2, 5), (2, 9), (5, 9))
 
 
 NAMES = (("closing", "steady"), ("left_of", "right_of"), ("", "seldom"))
-COLUMNS = Columns(
+COLUMNS = ColumnLayout(
     (
         Column(NAMES[0], (0, 0), 0, 1),
         Column(NAMES[1], (1, 2), 0, listed="one"),
@@ -24,7 +24,7 @@ COLUMNS = Columns(
     )
 )
 STATE = np.array([[0, 1, -1], [0, 1, 0], [1, 0, 1], [1, 0, 1]], dtype=np.int8)
-CELLS = Cells(COLUMNS, STATE, np.full((4, 3), 3.0), np.array([[0.5] * 3, [7.0] * 3]))
+CELLS = RelationBlock(COLUMNS, STATE, np.full((4, 3), 3.0), np.array([[0.5] * 3, [7.0] * 3]))
 TABLE = RelationTable(IDS, (CELLS,), (Relation("coupled", (2, 9), Truth.TRUE, 1.0),))
 
 
@@ -39,7 +39,7 @@ def test_a_table_lists_what_its_columns_list_and_what_was_given() -> None:
     assert len(TABLE) == len(told)
     assert TABLE[-1].name == "coupled"
     assert [r.name for r in TABLE[:2]] == ["closing", "steady"]
-    assert len(plain(TABLE)) == len(told)
+    assert len(to_jsonable(TABLE)) == len(told)
 
 
 @given(st.permutations(IDS), st.sampled_from(("closing", "steady", "seldom")))
@@ -86,7 +86,7 @@ def test_a_mind_finds_relations_in_a_table_and_in_a_tuple() -> None:
     ]
     assert mind.relation("near", 2, 5) is mind.relation("near", 5, 2)
     given = Mind(relations=tuple(TABLE))
-    assert given.holding("closing") == TABLE.true("closing")
+    assert given.holding("closing") == TABLE.holding("closing")
     assert tuple(TABLE) == TABLE
     assert {r.name for r in TABLE.all()} >= {"seldom", "left_of", "closing"}
 

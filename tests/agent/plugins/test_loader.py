@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.agent.model.errors import BehaviourError, ManyErrors, SettingsError, VisupError
-from visup.agent.plugins.loader import load, offers
-from visup.agent.plugins.settings import merged, parse_settings, read_settings
+from visup.agent.model.errors import BehaviourError, ErrorGroup, SettingsError, VisupError
+from visup.agent.plugins.factory import find_factories, load_behaviours
+from visup.agent.plugins.settings import merge_settings, parse_settings, read_settings
 
 LAMP = """
 from pydantic import BaseModel, Field, field_validator
@@ -32,7 +32,7 @@ class Lamp:
     def __init__(self, settings=None):
         self.settings = settings or self.Settings()
 
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         yield self.contract.percept(frame, self.settings.contrast)
 """
 
@@ -45,7 +45,7 @@ def lamp(tmp_path: Path) -> Path:
 
 
 def contrast(path: Path | str, **values: object) -> float:
-    (made,) = load(str(path), {"lamp": values})
+    (made,) = load_behaviours(str(path), {"lamp": values})
     return float(made.settings.contrast)  # type: ignore[attr-defined]
 
 
@@ -76,7 +76,7 @@ def test_a_setting_that_will_not_do_is_told_with_its_place(
 
 
 def test_all_that_is_wrong_with_settings_is_told_at_once(lamp: Path) -> None:
-    with pytest.raises(ManyErrors) as caught:
+    with pytest.raises(ErrorGroup) as caught:
         contrast(lamp, contrast=-1, colours=3)
     assert len(caught.value.errors) == 2
 
@@ -85,10 +85,10 @@ def test_a_behaviour_without_settings_takes_none(tmp_path: Path) -> None:
     path = tmp_path / "plain.py"
     path.write_text(
         "from visup.agent import Contract\nclass A:\n    contract = Contract('a', ('x',))\n"
-        "    def perceive(self, frame, seen, directives): return ()\n"
+        "    def perceive(self, frame, observation, directives): return ()\n"
     )
     with pytest.raises(SettingsError, match="behaviour 'a' has no settings"):
-        load(str(path), {"a": {"n": 1}})
+        load_behaviours(str(path), {"a": {"n": 1}})
 
 
 def test_a_module_path_will_do(lamp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,17 +99,20 @@ def test_a_module_path_will_do(lamp: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.syspath_prepend(lamp.parent)
     assert contrast("my_lamps.bright:Lamp", contrast=9) == 9
     with pytest.raises(BehaviourError, match="has no 'Lantern'") as caught:
-        load("my_lamps.bright:Lantern")
+        load_behaviours("my_lamps.bright:Lantern")
     assert caught.value.expected == "one of: Lamp"
     with pytest.raises(BehaviourError, match=r"No module named 'my_lamps\.dark'"):
-        load("my_lamps.dark:Lamp")
+        load_behaviours("my_lamps.dark:Lamp")
 
 
 @pytest.mark.parametrize(
     ("body", "message"),
     [
         ("    def perceive(self, frame): return ()", "cannot be called: too many positional"),
-        ("    async def perceive(self, frame, seen, directives): return ()", "is asynchronous"),
+        (
+            "    async def perceive(self, frame, observation, directives): return ()",
+            "is asynchronous",
+        ),
         ("    perceive = 3", "has no method `perceive`"),
     ],
 )
@@ -121,8 +124,8 @@ def test_a_perceive_that_cannot_be_called_is_refused(
         f"from visup.agent import Contract\nclass A:\n    contract = Contract('a', ('x',))\n{body}\n"
     )
     with pytest.raises(BehaviourError, match=message) as caught:
-        load(str(path))
-    assert "perceive(self, frame, seen, directives)" in str(caught.value)
+        load_behaviours(str(path))
+    assert "perceive(self, frame, observation, directives)" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +137,7 @@ def test_a_file_that_does_not_run_is_told_with_its_line(
     path = tmp_path / "broken.py"
     path.write_text(text)
     with pytest.raises(BehaviourError, match="it does not run") as caught:
-        load(str(path))
+        load_behaviours(str(path))
     assert caught.value.where == f"{path}:{line}"
 
 
@@ -142,21 +145,21 @@ def test_a_faulty_contract_in_a_file_is_told_as_such(tmp_path: Path) -> None:
     path = tmp_path / "lamp.py"
     path.write_text("from visup.agent import Contract\nContract('lamp', gives=('lamp'))\n")
     with pytest.raises(BehaviourError, match="a tuple of one has a comma"):
-        load(str(path))
+        load_behaviours(str(path))
 
 
 def test_two_files_of_one_name_stay_apart(lamp: Path, tmp_path: Path) -> None:
     other = tmp_path / "other" / "lamp.py"
     other.parent.mkdir()
     other.write_text(LAMP.replace("100", "5"))
-    first, second = load(str(lamp))[0], load(str(other))[0]
+    first, second = load_behaviours(str(lamp))[0], load_behaviours(str(other))[0]
     assert type(first).__module__ != type(second).__module__
     assert sys.modules[type(first).__module__].__file__ == str(lamp)
 
 
 def test_a_class_of_another_module_is_none_of_the_file(lamp: Path) -> None:
     lamp.write_text(lamp.read_text() + "\nfrom visup.percepts.health import HealthBehaviour\n")
-    assert [o.contract.name for o in offers(str(lamp)) if o.contract] == ["lamp"]
+    assert [o.contract.name for o in find_factories(str(lamp)) if o.contract] == ["lamp"]
 
 
 @pytest.mark.parametrize(
@@ -220,5 +223,5 @@ def test_a_settings_file_that_will_not_do_is_refused(
 def test_the_command_line_goes_over_the_file(tmp_path: Path) -> None:
     path = tmp_path / "settings.toml"
     path.write_text("[behaviours.lamp]\ncontrast = 3\ncolours = ['red']\n")
-    values = merged(read_settings(path), parse_settings(["lamp.contrast=4"]))
+    values = merge_settings(read_settings(path), parse_settings(["lamp.contrast=4"]))
     assert values == {"lamp": {"contrast": 4, "colours": ["red"]}}

@@ -8,8 +8,8 @@ from tests.agent.scripted import Scripted, frames
 from visup.agent import ReportState
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import BehaviourError
-from visup.agent.plugins.loader import load
-from visup.agent.plugins.registry import Registry, discover
+from visup.agent.plugins.factory import load_behaviours
+from visup.agent.plugins.registry import Registry, discover_behaviours
 
 PLUGIN = """
 from visup.agent import Contract, Percept
@@ -17,7 +17,7 @@ from visup.agent import Contract, Percept
 class Brightness:
     contract = Contract("brightness", gives=("brightness",))
 
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         yield Percept("brightness", float(frame.image.mean()), frame.time, "brightness")
 """
 
@@ -25,7 +25,7 @@ class Brightness:
 def test_a_behaviour_in_a_file_runs(tmp_path: Path) -> None:
     path = tmp_path / "brightness.py"
     path.write_text(PLUGIN)
-    last = Agent(load(str(path))).run(frames(4))
+    last = Agent(load_behaviours(str(path))).run(frames(4))
     assert last is not None
     assert last.reports[0].state is ReportState.RAN
     assert last.observation.of("brightness") == (3.0,)
@@ -57,11 +57,11 @@ def test_a_file_that_is_no_plug_in_is_refused_in_words(
     if text is not None:
         path.write_text(text)
     with pytest.raises(BehaviourError, match=message):
-        load(str(path))
+        load_behaviours(str(path))
 
 
 def test_installed_behaviours_are_found_by_entry_point() -> None:
-    assert {"motion", "shape", "depth", "health"} <= set(discover().names())
+    assert {"motion", "shape", "depth", "health"} <= set(discover_behaviours().names())
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:

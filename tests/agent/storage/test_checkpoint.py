@@ -20,26 +20,26 @@ from tests.agent.storage.test_codec import plugin_values, regions, same
 from visup.agent import Health, HealthStatus, Region
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.checkpoint import MAGIC, StateError, frozen, thawed
-from visup.agent.storage.codec import packed
+from visup.agent.storage.checkpoint import MAGIC, StateError, dump_state, load_state
+from visup.agent.storage.codec import pack_observation
 
 
 @settings(max_examples=40)
 @given(st.lists(regions(), max_size=2), plugin_values)
 def test_what_is_thawed_is_what_was_frozen(given_regions: list[Region], value: Any) -> None:
-    assert same(thawed(frozen([given_regions, value])), [given_regions, value])
+    assert same(load_state(dump_state([given_regions, value])), [given_regions, value])
 
 
 def test_one_object_stays_one() -> None:
     shared = [1, 2]
-    a, b, c = thawed(frozen((shared, shared, [1, 2])))
+    a, b, c = load_state(dump_state((shared, shared, [1, 2])))
     assert a is b
     assert a is not c
 
 
 def test_containers_keep_their_kind_and_order_in_memory() -> None:
     columns = np.asfortranarray(np.arange(6.0).reshape(2, 3))
-    told = thawed(frozen((deque([1, 2], 5), MappingProxyType({(1, 2): {3}}), columns)))
+    told = load_state(dump_state((deque([1, 2], 5), MappingProxyType({(1, 2): {3}}), columns)))
     assert (told[0], told[0].maxlen) == (deque([1, 2]), 5)
     assert isinstance(told[1], MappingProxyType)
     assert told[1][1, 2] == {3}
@@ -55,14 +55,14 @@ class Elsewhere:
 @pytest.mark.parametrize("value", [print, Elsewhere(), lambda: 1, int, object(), np.array([{}])])
 def test_what_is_not_state_is_refused(value: object) -> None:
     with pytest.raises(StateError):
-        frozen({"x": [value]})
+        dump_state({"x": [value]})
 
 
 def test_what_holds_itself_is_refused() -> None:
     loop: list[Any] = []
     loop.append(loop)
     with pytest.raises(StateError, match="holds itself"):
-        frozen(loop)
+        dump_state(loop)
 
 
 def forged(table: Any, root: Any = (0,)) -> bytes:
@@ -92,18 +92,18 @@ def forged(table: Any, root: Any = (0,)) -> bytes:
 )
 def test_a_forged_state_is_refused(table: Any) -> None:
     with pytest.raises(OutputError, match="cannot be read"):
-        thawed(forged(table))
+        load_state(forged(table))
 
 
 @settings(max_examples=100)
 @given(st.data())
 def test_damaged_bytes_are_refused(data: st.DataObject) -> None:
-    good = frozen({"health": Health(HealthStatus.OK), "n": np.arange(5)})
+    good = dump_state({"health": Health(HealthStatus.OK), "n": np.arange(5)})
     at = data.draw(st.integers(0, len(good) - 1))
     cut = data.draw(st.booleans())
     bad = good[:at] if cut else good[:at] + bytes([good[at] ^ 1 << (at % 8)]) + good[at + 1 :]
     with pytest.raises(OutputError):
-        thawed(bad)
+        load_state(bad)
 
 
 class Summing:
@@ -120,8 +120,8 @@ class Summing:
         self.total += index
         return self.total
 
-    def perceive(self, frame: Any, seen: Any, directives: Any) -> Any:
-        return self.inner.perceive(frame, seen, directives)
+    def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
+        return self.inner.perceive(frame, observation, directives)
 
     def save(self) -> dict[str, int]:
         return {"total": self.total}
@@ -142,10 +142,10 @@ def test_an_agent_that_takes_up_a_state_goes_on_like_the_one_that_gave_it(at: in
     first = made()
     first.run(sequence[:at])
     second = made()
-    assert second.load(thawed(frozen(first.save())))
+    assert second.load(load_state(dump_state(first.save())))
     for frame in sequence[at:]:
         a, b = first.step(frame), second.step(frame)
-        assert packed(a.observation) == packed(b.observation)
+        assert pack_observation(a.observation) == pack_observation(b.observation)
         assert (a.events, a.alerts) == (b.events, b.alerts)
 
 
@@ -153,5 +153,5 @@ def test_without_all_behaviours_only_the_mind_is_kept() -> None:
     first = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))
     first.run(frames(5))
     second = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))
-    assert not second.load(thawed(frozen(first.save())))
+    assert not second.load(load_state(dump_state(first.save())))
     assert second.mind.memory["counting"] == 5

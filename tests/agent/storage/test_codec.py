@@ -18,7 +18,7 @@ from hypothesis.extra.numpy import arrays
 
 from tests.paths import ROOT
 from visup.agent import (
-    Concern,
+    AlertCondition,
     Depth,
     Health,
     HealthStatus,
@@ -31,7 +31,14 @@ from visup.agent import (
     Severity,
 )
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.codec import decoded, encoded, packed, runs, unpacked, unrun
+from visup.agent.storage.codec import (
+    decode,
+    encode,
+    mask_to_runs,
+    pack_observation,
+    runs_to_mask,
+    unpack_observation,
+)
 
 numbers = st.floats(allow_nan=False)
 masks = st.tuples(st.integers(1, 12), st.integers(1, 12)).flatmap(lambda s: arrays(bool, s))
@@ -116,14 +123,14 @@ def test_regions_and_hypotheses_come_back_as_they_were(
 ) -> None:
     values = [("region", r) for r in given_regions] + [("hypothesis", h) for h in given_hypotheses]
     seen = seen_of(*values)
-    assert same(unpacked(packed(seen)), seen)
+    assert same(unpack_observation(pack_observation(seen)), seen)
 
 
 @settings(max_examples=80)
 @given(plugin_values)
 def test_plain_values_of_plug_ins_come_back_as_they_were(value: Any) -> None:
     seen = seen_of(("own", value))
-    assert same(unpacked(packed(seen)), seen)
+    assert same(unpack_observation(pack_observation(seen)), seen)
 
 
 @pytest.mark.parametrize(
@@ -131,7 +138,7 @@ def test_plain_values_of_plug_ins_come_back_as_they_were(value: Any) -> None:
     [
         Depth(1, "a", 2.0, math.inf),
         Health(HealthStatus.FROZEN, "It does not change."),
-        Concern("x", (1, 2), Severity.CRITICAL, "Why.", ("a", "b"), "k"),
+        AlertCondition("x", (1, 2), Severity.CRITICAL, "Why.", ("a", "b"), "k"),
         np.float32(0.1),
         np.array([[1, 2], [3, 4]], np.uint16),
         np.array(3.5),
@@ -142,11 +149,11 @@ def test_plain_values_of_plug_ins_come_back_as_they_were(value: Any) -> None:
     ],
 )
 def test_records_and_arrays_come_back_as_they_were(value: Any) -> None:
-    assert same(decoded(json.loads(json.dumps(encoded(value)))), value)
+    assert same(decode(json.loads(json.dumps(encode(value)))), value)
 
 
 def test_a_mapping_that_cannot_be_written_to_stays_so() -> None:
-    back = decoded(encoded(MappingProxyType({"a": 1})))
+    back = decode(encode(MappingProxyType({"a": 1})))
     assert isinstance(back, MappingProxyType)
     assert dict(back) == {"a": 1}
 
@@ -160,14 +167,14 @@ def test_runs_say_what_a_mask_is(mask: np.ndarray[Any, np.dtype[np.bool_]]) -> N
             lengths.append(0)
             value = bool(pixel)
         lengths[-1] += 1
-    assert runs(mask) == lengths
-    assert (unrun(lengths, mask.shape) == mask).all()
+    assert mask_to_runs(mask) == lengths
+    assert (runs_to_mask(lengths, mask.shape) == mask).all()
 
 
 @pytest.mark.parametrize("lengths", [[3], [5, -1], [[2, 2]], [2**62, 2**62], ["a"], [1.5, 2.5]])
 def test_runs_that_do_not_fill_the_box_are_refused(lengths: Any) -> None:
     with pytest.raises((ValueError, TypeError)):
-        unrun(lengths, (2, 2))
+        runs_to_mask(lengths, (2, 2))
 
 
 class Strange:
@@ -175,7 +182,7 @@ class Strange:
 
 
 def test_a_value_that_is_not_plain_leaves_what_its_behaviour_gives_unobserved() -> None:
-    back = unpacked(packed(seen_of(("own", Strange()), ("other", 1))))
+    back = unpack_observation(pack_observation(seen_of(("own", Strange()), ("other", 1))))
     assert back.reports[0].state is ReportState.RESTED
     assert "Strange" in back.reports[0].error
     assert not back.observed("own")
@@ -195,11 +202,11 @@ REGION = Region(
 @settings(max_examples=150)
 @given(st.data())
 def test_damaged_bytes_are_refused_or_read_never_more(data: st.DataObject) -> None:
-    good = packed(seen_of(("region", REGION), ("own", {"a": (1, b"x")})))
+    good = pack_observation(seen_of(("region", REGION), ("own", {"a": (1, b"x")})))
     at = data.draw(st.integers(0, len(good) - 1))
     bad = good[:at] + data.draw(st.binary(max_size=3)) + good[at + 1 :]
     with suppress(OutputError):
-        assert same(unpacked(bad), unpacked(good))
+        assert same(unpack_observation(bad), unpack_observation(good))
 
 
 json_values = st.recursive(
@@ -222,13 +229,13 @@ def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, pl
     else:
         told[place] = value
     with suppress(OutputError):
-        assert isinstance(unpacked(zlib.compress(json.dumps(told).encode())), Observation)
+        assert isinstance(unpack_observation(zlib.compress(json.dumps(told).encode())), Observation)
 
 
 def test_a_bomb_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("visup.agent.storage.codec.LARGEST", 10**5)
     with pytest.raises(OutputError, match="too large"):
-        unpacked(zlib.compress(b" " * 10**7))
+        unpack_observation(zlib.compress(b" " * 10**7))
 
 
 def test_the_schema_in_the_docs_is_that_of_the_code() -> None:
@@ -241,9 +248,9 @@ def test_the_schema_in_the_docs_is_that_of_the_code() -> None:
 @settings(max_examples=30)
 @given(st.lists(regions(), max_size=2), hypotheses, plugin_values)
 def test_every_document_keeps_the_schema(found: list[Region], one: Hypothesis, own: Any) -> None:
-    from visup.agent.storage.codec import document
+    from visup.agent.storage.codec import to_document
     from visup.schema import StepDocument
 
     values = [("region", r) for r in found] + [("hypothesis", one), ("own", own)]
-    text = json.dumps(document(seen_of(*values)))
+    text = json.dumps(to_document(seen_of(*values)))
     StepDocument.model_validate_json(text)

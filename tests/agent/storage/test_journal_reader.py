@@ -12,11 +12,11 @@ import pytest
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.codec import packed
-from visup.agent.storage.journal import Journal, Limits, segments
+from visup.agent.storage.codec import pack_observation
+from visup.agent.storage.journal import Journal, JournalLimits, segments
 from visup.agent.storage.journal_reader import Recording, export_events
 
-SMALL = Limits(segment_bytes=4000)
+SMALL = JournalLimits(segment_bytes=4000)
 
 
 def agent(*observers: object) -> Agent:
@@ -25,10 +25,10 @@ def agent(*observers: object) -> Agent:
     return Agent([Scripted("eye", ("x",))], reasoners, observers=observers)  # type: ignore[arg-type]
 
 
-def write(path: Path, count: int, limits: Limits | None = None) -> list[bytes]:
+def write(path: Path, count: int, limits: JournalLimits | None = None) -> list[bytes]:
     seen: list[bytes] = []
     journal = Journal(path, limits)
-    agent(journal.record, lambda step, frame: seen.append(packed(step.observation))).run(
+    agent(journal.record, lambda step, frame: seen.append(pack_observation(step.observation))).run(
         frames(count)
     )
     journal.note(verdict="succeeded", settings={})
@@ -48,20 +48,20 @@ def test_segments_read_as_one_journal(tmp_path: Path) -> None:
     assert list(one.summaries()) == list(many.summaries())
     assert one.alerts() == many.alerts()
     assert one.facts()["verdict"] == many.facts()["verdict"] == "succeeded"
-    assert [packed(o) for o in many.observations()] == seen
+    assert [pack_observation(o) for o in many.observations()] == seen
     assert [o.frame_index for o in many.observations(after=70)] == list(range(71, 80))
     assert (many.count(), many.first_and_last()) == (80, (0, 79))
 
 
 def test_segments_are_cut_by_time_too(tmp_path: Path) -> None:
-    write(tmp_path / "journal.sqlite", 50, Limits(segment_s=1.0))
+    write(tmp_path / "journal.sqlite", 50, JournalLimits(segment_s=1.0))
     assert len(segments(tmp_path / "journal.sqlite")) == 5
 
 
 def test_the_oldest_steps_go_when_more_is_kept_than_wanted_but_no_event(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     noise = np.random.default_rng(0)
-    journal = Journal(path, Limits(segment_bytes=200_000, keep_bytes=600_000))
+    journal = Journal(path, JournalLimits(segment_bytes=200_000, keep_bytes=600_000))
     eye = Scripted("eye", ("x",), lambda index: noise.bytes(4000))
     Agent([eye], Reasoners(update=(counting,)), observers=(journal.record,)).run(frames(300))
     journal.close()
@@ -175,7 +175,7 @@ def test_damaged_journals_give_one_message_and_what_came_before(tmp_path: Path) 
             recording.alerts()
             recording.facts()
             export_events(bad, tmp_path / "out.jsonl")
-            read.extend(packed(o) for o in recording.observations())
+            read.extend(pack_observation(o) for o in recording.observations())
         except OutputError:
             refused += 1
         assert all(r in seen for r in read)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.agent import Mind, Region, Severity, Truth
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 
 values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -21,18 +21,18 @@ values = st.recursive(
 
 @given(values)
 def test_whatever_goes_in_strict_json_comes_out(value: object) -> None:
-    json.dumps(plain(value), allow_nan=False)
+    json.dumps(to_jsonable(value), allow_nan=False)
 
 
 def test_numbers_are_rounded_and_the_odd_ones_told_in_words() -> None:
-    assert plain((0.1 + 0.2, math.inf, np.float32(2.0), np.int8(3))) == [0.3, "inf", 2.0, 3]
+    assert to_jsonable((0.1 + 0.2, math.inf, np.float32(2.0), np.int8(3))) == [0.3, "inf", 2.0, 3]
 
 
 def test_enums_are_told_by_word() -> None:
-    assert plain((Severity.WARNING, Truth.UNKNOWN)) == ["warning", "unknown"]
+    assert to_jsonable((Severity.WARNING, Truth.UNKNOWN)) == ["warning", "unknown"]
 
 
 def test_masks_and_memories_are_left_out() -> None:
     region = Region(1, (0, 0, 2, 2), np.ones((2, 2), bool), np.zeros((4, 2), np.float32), (1, 1), 4)
-    assert "mask" not in plain(region)
-    assert "memory" not in plain(Mind())
+    assert "mask" not in to_jsonable(region)
+    assert "memory" not in to_jsonable(Mind())

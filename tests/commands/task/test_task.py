@@ -5,7 +5,7 @@ import json
 from typer.testing import CliRunner
 
 from tests.paths import ROOT
-from visup.agent.model.errors import ManyErrors, TaskError
+from visup.agent.model.errors import ErrorGroup, TaskError
 from visup.commands.task.task import app
 from visup.tasks import shipped_tasks
 
@@ -22,7 +22,7 @@ def test_checking_good_files_says_so() -> None:
 def test_checking_raises_every_mistake_of_every_file() -> None:
     files = [str(BAD / "three_mistakes.task"), "dock", str(BAD / "tabs.task")]
     result = runner.invoke(app, ["check", *files])
-    assert isinstance(result.exception, ManyErrors)
+    assert isinstance(result.exception, ErrorGroup)
     assert len(result.exception.errors) == 4
     assert result.output.strip() == "dock: ok"
     one = runner.invoke(app, ["check", str(BAD / "tabs.task")])

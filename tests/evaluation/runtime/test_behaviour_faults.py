@@ -20,7 +20,7 @@ from visup.evaluation.runtime.behaviour_faults import (
 )
 from visup.evaluation.runtime.fault_injection import DEADLY, FAULTS, WAITING
 from visup.rules.language.parser import shipped_rules
-from visup.rules.predicates.inputs_missing import blind, inputs
+from visup.rules.predicates.inputs_missing import inputs_missing, percepts_read
 
 QUICK = sorted(FAULTS.keys() - WAITING - DEADLY)
 
@@ -51,7 +51,7 @@ def test_the_campaign_sees_what_is_taken_for_known(
 
     class Careless(Agent):
         def __post_init__(self) -> None:
-            def forget(mind: Mind, seen: Observation) -> object:
+            def forget(mind: Mind, observation: Observation) -> object:
                 from visup.agent import Outcome
 
                 return Outcome(replace(mind, unknown=frozenset()))
@@ -75,10 +75,10 @@ def test_the_campaign_sees_rules_that_read_what_is_unknown(monkeypatch: pytest.M
 
 def test_every_shipped_rule_reads_words_whose_inputs_are_known() -> None:
     assert shipped_rules()
-    assert inputs("healthy") == {"health"}
-    assert inputs("gap") == {"region"}
-    assert blind(Mind(unknown=frozenset({"region"})), "gap")
-    assert not blind(Mind(unknown=frozenset({"lamp"})), "gap")
+    assert percepts_read("healthy") == {"health"}
+    assert percepts_read("gap") == {"region"}
+    assert inputs_missing(Mind(unknown=frozenset({"region"})), "gap")
+    assert not inputs_missing(Mind(unknown=frozenset({"lamp"})), "gap")
 
 
 def test_what_is_drawn_depends_on_the_seed_alone() -> None:

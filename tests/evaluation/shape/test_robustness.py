@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from tests.percepts.shape.shapes import ZOO
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.commands.eval.app import app
+from visup.commands.eval.catalogue import eval_app
 from visup.evaluation.shape.corrupt import CORRUPTIONS, MASKS, corrupt_file, odd_mask
 from visup.evaluation.shape.robustness import (
     evaluate_robustness,
@@ -93,7 +93,7 @@ def test_whole_numbers_are_taken_as_yes_and_no(dtype: str) -> None:
 
 
 def test_the_command_tells_a_table() -> None:
-    result = CliRunner().invoke(app, ["robustness", "--files", "12", "--masks", "12"])
+    result = CliRunner().invoke(eval_app(), ["robustness", "--files", "12", "--masks", "12"])
     assert result.exit_code == 0, result.output
     assert "flipped" in result.output
     assert "refused" in result.output

@@ -165,7 +165,7 @@ import time
 from visup.agent import Contract
 class Slow:
     contract = Contract("slow", gives=("slow",))
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         time.sleep(0.2)
         return []
 """

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.render.scenes import box_file
-from visup.agent.model.errors import ManyErrors, Place, SettingsError, VisupError
+from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.render.imaging.renderer import Renderer
 from visup.render.scenario.library import find_scenario, shipped_names, shipped_scenario
 from visup.render.scenario.scenario import load_scenario, parse_scenario
@@ -129,7 +129,7 @@ def test_two_objects_must_differ_in_name_and_label() -> None:
 
 def test_several_faults_are_told_at_once() -> None:
     bad = GOOD.replace("fps = 5", "fps = -1").replace("label = 3", "label = -3")
-    with pytest.raises(ManyErrors) as caught:
+    with pytest.raises(ErrorGroup) as caught:
         parse_scenario(bad, "small.toml")
     assert len(caught.value.errors) == 2
 
@@ -138,7 +138,7 @@ def test_a_fault_points_to_its_line_when_the_line_is_clear() -> None:
     with pytest.raises(SettingsError) as caught:
         parse_scenario(GOOD.replace("fps = 5", "fps = -1"), "small.toml")
     place = caught.value.where
-    assert isinstance(place, Place)
+    assert isinstance(place, SourceLocation)
     assert place.text == "fps = -1"
 
 

@@ -34,7 +34,7 @@ class Eye:
         self.shots = shots
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         return [self.contract.percept(frame, r) for r in self.shots[frame.index].regions]
 
@@ -47,7 +47,7 @@ class Lens:
         self.fails_from = fails_from
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         if frame.index >= self.fails_from:
             raise RuntimeError("the lens broke")

@@ -62,7 +62,10 @@ def test_who_is_known_rests_with_a_reason() -> None:
         replace(KNOWN, candidates=(Candidate("arm", 1.0, 0.6, 0.9),)),
         replace(KNOWN, confirmed=False),
         replace(KNOWN, presence=Presence.LEFT),
-        replace(KNOWN, pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=Spin(9.0, 1.0, (0, 0, 1)))),
+        replace(
+            KNOWN,
+            pose=Pose("arm", 1, (0, 0, 1), 0.0, 0.0, spin=Spin(9.0, 1.0, (0, 0, 1))),
+        ),
     ],
 )
 def test_who_is_not_settled_or_turns_is_looked_at(belief: ObjectBelief) -> None:

@@ -8,44 +8,44 @@ from hypothesis import strategies as st
 
 from tests.oracles.rule_formulas import random_formula
 from visup.agent import Severity
-from visup.agent.model.errors import ManyErrors, Place, RuleError
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation
 from visup.rules.formula.nodes import (
     ZERO,
     And,
     Comparison,
     Formula,
-    Future,
+    FutureOperator,
     Last,
+    MOfN,
     Not,
-    Often,
     Or,
-    Past,
+    PastOperator,
     Predicate,
     Quantified,
     Rule,
     Since,
+    TimeWindow,
     Until,
-    Window,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, OverTime, Term
-from visup.rules.formula.units import DIMENSION, Number, Unit
+from visup.rules.formula.terms import Arithmetic, Measure, PointwiseFunction, Term, WindowFunction
+from visup.rules.formula.units import UNITS, Number, Unit
 from visup.rules.language import build
 from visup.rules.language.build import always, exists, fact, number, percent, px, px_s, quantity
 from visup.rules.language.build import s as seconds
-from visup.rules.language.cost import bounds_of
+from visup.rules.language.cost import cost_of
 from visup.rules.language.parser import load_rules, parse_formula, parse_rules, shipped_rules
 from visup.rules.predicates.snapshot import RELATION_NAMES
-from visup.rules.predicates.vocabulary import QUANTITIES, WORDS, signals
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES, signals
 
 durations = st.builds(
     Number,
     st.integers(1, 500).map(lambda n: n / 10),
     st.sampled_from([Unit.S, Unit.MS]),
 )
-windows = st.builds(lambda d: Window(ZERO, d), durations) | st.builds(
-    lambda n: Window(Number(n / 4, Unit.S), Number(n / 2, Unit.S)), st.integers(1, 20)
+windows = st.builds(lambda d: TimeWindow(ZERO, d), durations) | st.builds(
+    lambda n: TimeWindow(Number(n / 4, Unit.S), Number(n / 2, Unit.S)), st.integers(1, 20)
 )
-spans = st.builds(lambda d: Window(ZERO, d), durations)
+spans = st.builds(lambda d: TimeWindow(ZERO, d), durations)
 
 
 def arguments(takes: tuple[str, ...]) -> tuple[str, ...]:
@@ -54,8 +54,8 @@ def arguments(takes: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(next(objects) if t == "object" else other[t] for t in takes)
 
 
-predicates = st.sampled_from(sorted(WORDS)).map(
-    lambda name: Predicate(name, arguments(WORDS[name].takes))
+predicates = st.sampled_from(sorted(PREDICATES)).map(
+    lambda name: Predicate(name, arguments(PREDICATES[name].takes))
 )
 
 
@@ -63,7 +63,7 @@ predicates = st.sampled_from(sorted(WORDS)).map(
 def comparisons(draw: st.DrawFn) -> Comparison:
     name = draw(st.sampled_from(sorted(QUANTITIES)))
     dimension = QUANTITIES[name].dimension
-    unit = draw(st.sampled_from([u for u, (d, _) in DIMENSION.items() if d == dimension]))
+    unit = draw(st.sampled_from([u for u, (d, _) in UNITS.items() if d == dimension]))
     bound = Number(draw(st.integers(-300, 300)) / 4, unit)
     operator = draw(st.sampled_from(["<", "<=", ">", ">="]))
     slack = draw(st.integers(0, 20)) / 2 * (-1 if ">" in operator else 1)
@@ -74,9 +74,9 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         Arithmetic(left, "-", Number(2.0, unit)),
         Arithmetic(Number(3.0), "*", Arithmetic(left, "+", left)),
         Arithmetic(Arithmetic(left, "/", Number(2.0)), "-", Arithmetic(left, "-", left)),
-        Combined("max", (left, Number(1.0, unit))),
-        Combined("abs", (left,)),
-        OverTime("lowest", left, Number(2.0, Unit.S)),
+        PointwiseFunction("max", (left, Number(1.0, unit))),
+        PointwiseFunction("abs", (left,)),
+        WindowFunction("lowest", left, Number(2.0, Unit.S)),
     ]
     return Comparison(draw(st.sampled_from(terms)), operator, bound, leave)
 
@@ -90,12 +90,12 @@ def joined(inner: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:
         st.builds(Not, inner),
         st.builds(And, several),
         st.builds(Or, several),
-        st.builds(Past, kinds, inner, st.none() | windows),
-        st.builds(Future, ahead, inner, windows),
+        st.builds(PastOperator, kinds, inner, st.none() | windows),
+        st.builds(FutureOperator, ahead, inner, windows),
         st.builds(Since, inner, inner, st.none() | spans),
         st.builds(Until, inner, inner, spans),
-        st.builds(Often, inner, st.just(Number(60.0, Unit.PERCENT)), durations),
-        st.builds(Often, inner, st.just(Number(3.0)), st.just(Number(5.0))),
+        st.builds(MOfN, inner, st.just(Number(60.0, Unit.PERCENT)), durations),
+        st.builds(MOfN, inner, st.just(Number(3.0)), st.just(Number(5.0))),
         st.builds(Last, inner, durations),
         st.builds(
             lambda kind, f, again: Quantified(kind, "c", And((near, f)), again),
@@ -157,7 +157,7 @@ def _sound(formula: Formula) -> bool:
     """Whether its units fit: rates do not compare with plain numbers."""
     try:
         parse_formula(str(formula), signals("x", "y"))
-    except (RuleError, ManyErrors):
+    except (RuleError, ErrorGroup):
         return False
     return True
 
@@ -222,7 +222,7 @@ def test_a_mistake_is_told_with_its_place(
     message = str(caught.value)
     assert what in message
     assert more in message
-    assert isinstance(caught.value.where, Place)
+    assert isinstance(caught.value.where, SourceLocation)
     assert (caught.value.where.line, caught.value.where.column) == (line, column)
     assert "^" in message
 
@@ -230,9 +230,9 @@ def test_a_mistake_is_told_with_its_place(
 def test_all_mistakes_of_a_file_are_told_at_once_in_the_order_of_the_text() -> None:
     text = wrap("convergin(a, b)") + wrap("touching(a, b") + wrap("gap(a, b) < 1 s")
     text = text.replace("rule r(", "rule q(", 1)
-    with pytest.raises(ManyErrors) as caught:
+    with pytest.raises(ErrorGroup) as caught:
         parse_rules(text, "my.rules")
-    lines = [e.where.line for e in caught.value.errors if isinstance(e.where, Place)]
+    lines = [e.where.line for e in caught.value.errors if isinstance(e.where, SourceLocation)]
     assert lines == [2, 6, 8]
 
 
@@ -257,11 +257,11 @@ def test_an_empty_file_has_no_rules() -> None:
 
 def test_what_a_rule_costs_is_known_when_it_is_loaded() -> None:
     (rule,) = parse_rules(wrap("eventually[2 s] (gap(a, b) < 3 px until[1 s] touching(a, b))"))
-    assert bounds_of(rule).delay_s == 3.0
+    assert cost_of(rule).delay_s == 3.0
     (facts,) = parse_rules(wrap("touching(a, b) for 20 min"))
-    assert bounds_of(facts).kept < 10
+    assert cost_of(facts).kept < 10
     (short,), (long,) = (parse_rules(wrap(f"gap(a, b) < 3 px for {n} s")) for n in (1, 10))
-    assert 8 < bounds_of(long).kept / bounds_of(short).kept < 11
+    assert 8 < cost_of(long).kept / cost_of(short).kept < 11
 
 
 def test_python_and_text_give_the_same_tree() -> None:
@@ -298,4 +298,4 @@ def test_a_rule_in_python_is_checked_as_one_of_a_file_is() -> None:
 
 
 def test_every_relation_is_a_word() -> None:
-    assert set(RELATION_NAMES) <= set(WORDS)
+    assert set(RELATION_NAMES) <= set(PREDICATES)

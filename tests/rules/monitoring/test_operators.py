@@ -20,14 +20,14 @@ from visup.rules.formula.nodes import Formula, Predicate
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula
 from visup.rules.monitoring.compiler import Compiler
-from visup.rules.monitoring.intervals import Interval
-from visup.rules.monitoring.linker import Layout
-from visup.rules.monitoring.monitor import Monitor, verdict
-from visup.rules.monitoring.operators import most_samples
+from visup.rules.monitoring.intervals import Interval, verdict
+from visup.rules.monitoring.linker import LinkedProgram
+from visup.rules.monitoring.monitor import Monitor
+from visup.rules.monitoring.operators import max_samples
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.vocabulary import signals
-from visup.rules.safety.compiled_rules import Ruled
-from visup.rules.safety.verdicts import rerowed
+from visup.rules.safety.compiled_rules import CompiledRules
+from visup.rules.safety.verdicts import remapped
 
 History = list[tuple[float, dict[str, Interval]]]
 
@@ -62,7 +62,7 @@ def cast(rng: Random, count: int) -> Iterator[tuple[int, ...]]:
 
 
 def sampled(
-    layout: Layout, states: States, now: int, objects: dict[int, dict[str, Interval]]
+    layout: LinkedProgram, states: States, now: int, objects: dict[int, dict[str, Interval]]
 ) -> tuple[States, Any]:
     """One sample of the signals of some objects: the states after it, and all intervals."""
     arena = np.full(layout.size, np.nan)
@@ -79,14 +79,14 @@ def by_arrays(
     """The formula of `a` for all objects at once, as rules are judged."""
     compiler = Compiler()
     place = compiler.formula(formula, (("a", False),))
-    prepared = Ruled((), compiler, ())
+    prepared = CompiledRules((), compiler, ())
     ids = tuple(sorted(seen[0]))
     states = prepared.fresh(len(ids))
     told: list[dict[int, Interval]] = []
     for time, objects in zip(times, seen, strict=True):
         now = tuple(sorted(objects))
         if now != ids:
-            states = rerowed(prepared, states, ticks(time), ids, now)
+            states = remapped(prepared, states, ticks(time), ids, now)
         ids, layout = now, prepared.layout(len(now))
         states, arena = sampled(layout, states, ticks(time), objects)
         told.append({i: layout.interval(place.step, (k,), arena) for k, i in enumerate(ids)})
@@ -139,7 +139,7 @@ def test_facts_keep_one_moment_and_are_judged_as_the_oracle_judges_numbers_witho
         )
         compiler = Compiler()
         place = compiler.formula(fact_for(formula), (("a", False),))
-        layout = Ruled((), compiler, ()).layout(1)
+        layout = CompiledRules((), compiler, ()).layout(1)
         states = layout.fresh
         for time, code, expected in zip(times, codes, truth, strict=True):
             arena = np.full(layout.size, np.nan)
@@ -152,11 +152,11 @@ def fact_for(formula: Formula) -> Formula:
     """The same formula of the fact `seen(a)` instead of the comparison."""
     from dataclasses import replace
 
-    from visup.rules.formula.nodes import Comparison, Not, Past
+    from visup.rules.formula.nodes import Comparison, Not, PastOperator
 
     if isinstance(formula, Comparison):
         return Predicate("seen", ("a",))
-    assert isinstance(formula, Not | Past)
+    assert isinstance(formula, Not | PastOperator)
     return replace(formula, part=fact_for(formula.part))
 
 
@@ -206,7 +206,7 @@ def test_what_a_window_holds_is_bounded_by_its_length() -> None:
         monitor.step(k * 0.01, {"x": float(k % 7)})
         sizes.append(size_of(monitor.state, set()))
     # A cell and a value for each sample, and one value more for those that were folded anew.
-    assert max(sizes) <= 3 * most_samples(ticks(1.0)) + 5
+    assert max(sizes) <= 3 * max_samples(ticks(1.0)) + 5
 
 
 @pytest.mark.parametrize(

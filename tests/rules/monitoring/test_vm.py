@@ -16,18 +16,25 @@ from visup.rules.formula.nodes import (
     Formula,
     Not,
     Or,
-    Past,
+    PastOperator,
     Predicate,
     Quantified,
     Since,
-    Window,
+    TimeWindow,
 )
-from visup.rules.formula.terms import Arithmetic, Combined, Measure, Negative, OverTime, Term
+from visup.rules.formula.terms import (
+    Arithmetic,
+    Measure,
+    Negative,
+    PointwiseFunction,
+    Term,
+    WindowFunction,
+)
 from visup.rules.formula.units import Number, Unit, ticks
 from visup.rules.monitoring.compiler import Compiler
 from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval
 from visup.rules.monitoring.monitor import Monitor
-from visup.rules.safety.compiled_rules import Ruled
+from visup.rules.safety.compiled_rules import CompiledRules
 
 FACTS = {"healthy": 0, "seen": 1, "moving": 1, "touching": 2, "north_of": 2}
 QUANTITIES = {"speed": 1, "in_view": 1, "gap": 2, "closing_speed": 2}
@@ -51,11 +58,15 @@ def term(rng: Random, scope: tuple[str, ...], depth: int) -> Term:
         case 2:
             return Negative(part)
         case 3:
-            return Combined(rng.choice(("min", "max")), (part, term(rng, scope, depth - 1)))
+            return PointwiseFunction(
+                rng.choice(("min", "max")), (part, term(rng, scope, depth - 1))
+            )
         case 4:
-            return Combined("abs", (part,))
+            return PointwiseFunction("abs", (part,))
         case 5:
-            return OverTime(rng.choice(("rate", "before", "lowest", "last")), part, seconds(rng))
+            return WindowFunction(
+                rng.choice(("rate", "before", "lowest", "last")), part, seconds(rng)
+            )
     return Arithmetic(part, rng.choice("+-*/"), term(rng, scope, depth - 1))
 
 
@@ -81,12 +92,12 @@ def formula(rng: Random, scope: tuple[str, ...], depth: int) -> Formula:
         kind = rng.choice(("exists", "forall"))
         return Quantified(kind, f"v{len(scope)}", inner, rng.random() < 0.4)
     part = formula(rng, scope, depth - 1)
-    window = Window(Number(0.0, Unit.S), seconds(rng)) if rng.random() < 0.7 else None
+    window = TimeWindow(Number(0.0, Unit.S), seconds(rng)) if rng.random() < 0.7 else None
     match pick:
         case 3:
             return Not(part)
         case 4 | 5:
-            return Past(rng.choice(("always", "once")), part, window)
+            return PastOperator(rng.choice(("always", "once")), part, window)
         case 6:
             return Since(part, formula(rng, scope, depth - 1), window)
     join = rng.choice((And, Or))
@@ -123,8 +134,8 @@ def written_out(f: Any, where: Objects, repeats: frozenset[str], ids: tuple[int,
             return f
         case And(parts=parts) | Or(parts=parts):
             return type(f)(tuple(map(inner, parts)))
-        case Combined(name=name, parts=parts):
-            return Combined(name, tuple(map(inner, parts)))
+        case PointwiseFunction(name=name, parts=parts):
+            return PointwiseFunction(name, tuple(map(inner, parts)))
         case Since(left=left, right=right) | Arithmetic(left=left, right=right):
             return replace(f, left=inner(left), right=inner(right))
         case Comparison(left=left, right=right):
@@ -148,7 +159,7 @@ def drawn(rng: Random, ids: tuple[int, ...]) -> Sample:
     return sample
 
 
-def laid(prepared: Ruled, ids: tuple[int, ...], sample: Sample) -> tuple[Any, Any]:
+def laid(prepared: CompiledRules, ids: tuple[int, ...], sample: Sample) -> tuple[Any, Any]:
     """Codes and intervals as a step looks them up."""
     layout, n = prepared.layout(len(ids)), len(ids)
     codes, arena = np.zeros(layout.codes, np.int8), np.full(layout.size, np.nan)
@@ -178,7 +189,7 @@ def test_each_choice_of_objects_is_what_it_is_by_itself(block: int) -> None:
         f = formula(rng, variables, rng.randint(1, 3))
         compiler = Compiler()
         place = compiler.formula(f, tuple((v, v in repeats) for v in variables))
-        prepared = Ruled((), compiler, ())
+        prepared = CompiledRules((), compiler, ())
         layout = prepared.layout(len(ids))
         choices = list(product(ids, repeat=len(variables)))
         alone = {

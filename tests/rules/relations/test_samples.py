@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.agent.storage.checkpoint import frozen, thawed
+from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.rules.geometry.regions import FAN
 from visup.rules.relations.samples import ROOM, SampleWindow, extended, without_oldest
 
@@ -59,7 +59,7 @@ def test_histories_that_branch_and_forget_stay_as_plain_lists(
         elif what == "drop":
             made.append((without_oldest(history, min(2, len(known))), known[2:]))
         else:
-            made.append((thawed(frozen(history)), known))
+            made.append((load_state(dump_state(history)), known))
     assert all(holds(history, known) for history, known in made)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Truth, Zone
-from visup.agent.model.errors import ManyErrors, SettingsError
+from visup.agent.model.errors import ErrorGroup, SettingsError
 from visup.rules.reasoners import default_reasoners
 from visup.rules.relations.zones import (
     contains,
@@ -157,7 +157,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
     path.write_text(
         GOOD + '[[zone]]\nname = "dock"\npolygon = [[0,0],[9,0],[9,9]]\n[[zone]]\nname = "x"\n'
     )
-    with pytest.raises(ManyErrors) as told:
+    with pytest.raises(ErrorGroup) as told:
         load_zones(path)
     assert "two zones are called 'dock'" in str(told.value)
     with pytest.raises(SettingsError, match="cannot be read"):

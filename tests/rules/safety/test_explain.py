@@ -18,11 +18,11 @@ from visup.agent.model.mind import Pose, Spin, Zone
 from visup.cli import app
 from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.predicates.snapshot import Facts
+from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
 from visup.rules.relations.zones import ZoneReasoner
-from visup.rules.safety.explain import Explanation
-from visup.rules.safety.queries import choices, explain, values_of
+from visup.rules.safety.explain import RuleExplanation
+from visup.rules.safety.queries import evaluation_of, explain, object_choices
 from visup.rules.safety.reasoner import SAFETY, RuleReasoner
 
 NOTHING = Observation(0, 0.0, (640, 480))
@@ -59,7 +59,7 @@ def test_a_verdict_is_explained_down_to_its_facts() -> None:
     assert explain(mind, "collision_course", 1, 2).verdict is not told.verdict
 
 
-def nodes(one: Explanation) -> Iterator[Explanation]:
+def nodes(one: RuleExplanation) -> Iterator[RuleExplanation]:
     yield one
     for part in one.parts:
         yield from nodes(part)
@@ -71,10 +71,10 @@ def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
         mind = mind if memory is None else mind.remember(SAFETY, memory)
         outcome = reasoner(mind, NOTHING)
         memory = outcome.mind.memory[SAFETY]
-    values = values_of(outcome.mind)
+    values = evaluation_of(outcome.mind)
     raised = {(rule.name, ids) for rule, ids in values.true()}
     for rule in values.prepared.rules:
-        for ids in choices(values, rule):
+        for ids in object_choices(values, rule):
             told = explain(outcome.mind, rule.name, *ids)
             assert (told.verdict == "true") == ((rule.name, ids) in raised)
             assert all(low <= high for low, high in (n.interval for n in nodes(told)))
@@ -91,7 +91,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
                 new = new.remember(SAFETY, mind.memory[SAFETY])
             outcome = reasoner(new, NOTHING)
             mind = outcome.mind
-            told.append(outcome.concerns)
+            told.append(outcome.conditions)
         return told
 
     kept: list[Mind] = []
@@ -121,7 +121,7 @@ def test_what_was_never_judged_cannot_be_explained() -> None:
 
 def concerns(text: str, mind: Mind) -> set[tuple[str, tuple[int, ...]]]:
     outcome = RuleReasoner(parse_rules(text))(mind, NOTHING)
-    return {(c.kind, c.objects) for c in outcome.concerns}
+    return {(c.kind, c.objects) for c in outcome.conditions}
 
 
 MIND = Mind(time=1.0, frame_size=(640, 480)).with_objects(
@@ -140,7 +140,7 @@ def test_objects_are_distinct_unless_they_may_repeat() -> None:
 def values_for(text: str) -> set[tuple[int, ...]]:
     rules = parse_rules(text)
     outcome = RuleReasoner(rules)(MIND, NOTHING)
-    return {ids for _, ids in values_of(outcome.mind).true()}
+    return {ids for _, ids in evaluation_of(outcome.mind).true()}
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_cooldown_keeps_a_rule_quiet_after_its_concern_was_over() -> None:
         mind = replace(mind, time=k * 0.1).with_objects(believed(1, name))
         outcome = reasoner(mind, NOTHING)
         mind = outcome.mind
-        told += [k] if outcome.concerns else []
+        told += [k] if outcome.conditions else []
     assert told == [2, 15]
 
 
@@ -210,12 +210,19 @@ def test_a_zone_that_is_not_drawn_is_unknown() -> None:
 def spinning(rate: float, sigma: float, expectations: tuple[Expectation, ...] = ()) -> set[str]:
     reasoner, told, mind = RuleReasoner(shipped_rules()), set[str](), MIND
     for k in range(60):
-        spin = Pose("probe", 0, (0.0, 0.0, 1.0), None, 0.0, spin=Spin(rate, sigma, (0.0, 1.0, 0.0)))
+        spin = Pose(
+            "probe",
+            0,
+            (0.0, 0.0, 1.0),
+            None,
+            0.0,
+            spin=Spin(rate, sigma, (0.0, 1.0, 0.0)),
+        )
         task = TaskBelief("t", Verdict.IN_PROGRESS, expected=expectations)
         mind = replace(mind, time=1.0 + k / 25, tasks=(task,))
         mind = mind.with_objects(replace(mind.objects[1], pose=spin))
         outcome: Outcome = reasoner(mind, NOTHING)
-        mind, told = outcome.mind, told | {c.kind for c in outcome.concerns}
+        mind, told = outcome.mind, told | {c.kind for c in outcome.conditions}
     return told
 
 
@@ -242,8 +249,14 @@ def touching_at(depths: dict[int, tuple[str, float]], expected: bool) -> set[str
         ]
         return seen(i, boxes, names=NAMES, depths=depths)
 
+<<<<<<< HEAD
     thoughts = reason((approach(i) for i in range(110)), task)
     return {c.kind for t in thoughts for c in t.concerns}
+=======
+    rules = default_reasoners()
+    thoughts = think((*rules.update, *rules.cogitate, task), (approach(i) for i in range(110)))
+    return {c.kind for t in thoughts for c in t.conditions}
+>>>>>>> evaluation
 
 
 def test_contact_is_told_where_depths_agree_and_no_task_brought_the_two_together() -> None:
@@ -256,7 +269,7 @@ def test_contact_is_told_where_depths_agree_and_no_task_brought_the_two_together
 
 def test_facts_of_pairs_stand_in_the_order_of_their_objects() -> None:
     mind = watched()[-1].mind
-    facts = Facts(mind)
+    facts = Snapshot(mind)
     assert facts.ids == (1, 2)
     assert facts.related("converging").tolist() == [[-1, 1], [1, -1]]
     soonest, latest = RULES.quantities["time_to_contact"].look(facts)

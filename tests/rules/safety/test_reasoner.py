@@ -54,7 +54,7 @@ def task(expected: tuple[Expectation, ...] = (), unexplained: tuple[int, ...] = 
 
 
 def raised(thoughts: list[Thought]) -> set[tuple[str, frozenset[int]]]:
-    return {(c.kind, frozenset(c.objects)) for t in thoughts for c in t.concerns}
+    return {(c.kind, frozenset(c.objects)) for t in thoughts for c in t.conditions}
 
 
 def closing(seconds: float = 5.0, speed: float = 20.0) -> Iterator[Observation]:
@@ -74,14 +74,19 @@ def test_rules_that_serve_two_agents_by_turns_tell_each_what_they_tell_it_alone(
     together = [think(shared, s) for s in scripts]
     by_turns = list(zip(*together, strict=True))
     for k, script in enumerate(scripts):
+<<<<<<< HEAD
         alone = reason(script)
         assert [t[k].concerns for t in by_turns] == [t.concerns for t in alone]
+=======
+        alone = run(script)
+        assert [t[k].conditions for t in by_turns] == [t.conditions for t in alone]
+>>>>>>> evaluation
 
 
 def test_closing_in_is_a_collision_course_where_no_task_wants_it() -> None:
     thoughts = reason(closing())
     assert raised(thoughts) == {("collision_course", frozenset({1, 2}))}
-    concern = thoughts[-1].concerns[0]
+    concern = thoughts[-1].conditions[0]
     assert concern.objects == (2, 1)
     assert concern.severity is Severity.WARNING
     assert concern.cause == (
@@ -149,8 +154,13 @@ def test_a_concern_ends_with_its_cause_after_the_hold() -> None:
     stops = (o for o in closing(3.0))
     last = list(closing(3.0))[-1].of("region")
     still = (seen(i, last, names=NAMES) for i in range(75, 250))
+<<<<<<< HEAD
     thoughts = reason([*stops, *still])
     until = max(t.mind.time for t in thoughts if t.concerns)
+=======
+    thoughts = run([*stops, *still])
+    until = max(t.mind.time for t in thoughts if t.conditions)
+>>>>>>> evaluation
     assert 4.0 < until < 8.0
 
 
@@ -179,7 +189,7 @@ def test_for_is_what_history_says(values: list[Truth]) -> None:
         mind = replace(mind, time=i * 0.1).with_objects(believed(1, NAMED[value]))
         outcome = reasoner(mind, Observation(i, i * 0.1, (640, 480)))
         mind = outcome.mind
-        kinds = {c.kind for c in outcome.concerns}
+        kinds = {c.kind for c in outcome.conditions}
         told = {Truth.TRUE: {"held"}, Truth.FALSE: {"not_held"}, Truth.UNKNOWN: set()}
         assert kinds == told[by_history(values[: i + 1])]
 
@@ -193,7 +203,7 @@ def test_unknown_raises_no_concern_and_suspends_none() -> None:
     base = default_reasoners(rules=rules)
     observations = list(closing(1.0, 0.0))
     thoughts = list(think((*base.update, *base.cogitate), observations))
-    assert {c.kind for c in thoughts[-1].concerns} == {"there"}
+    assert {c.kind for c in thoughts[-1].conditions} == {"there"}
 
 
 def believed(id_: int, name: str | None) -> ObjectBelief:

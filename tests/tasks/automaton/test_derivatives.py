@@ -104,7 +104,7 @@ def walked(task: Task) -> set[Word]:
 def test_moving_through_a_course_sees_exactly_what_it_means(course: Course) -> None:
     task = Task((Stage("t", course),))
     if any(
-        isinstance(c, Repeated) and c.mark != "?" and Grammar(task).may_be_left_out(c.item)
+        isinstance(c, Repeated) and c.mark != "?" and Grammar(task).nullable(c.item)
         for c in _all(course)
     ):
         return  # the check refuses these
@@ -121,7 +121,7 @@ def _all(course: Course) -> list[Course]:
 @given(small)
 def test_a_course_may_be_left_out_when_the_empty_word_is_in_it(course: Course) -> None:
     grammar = Grammar(Task((Stage("t", course),)))
-    assert grammar.may_be_left_out(course) == (() in words(course))
+    assert grammar.nullable(course) == (() in words(course))
 
 
 names = st.sampled_from(["t", "u", "v"])
@@ -168,7 +168,7 @@ def shortest(task: Task) -> dict[str, int | None]:
 def test_a_stage_never_ends_when_no_expansion_of_it_does(task: Task) -> None:
     grammar = Grammar(task)
     endless = {n for n, length in shortest(task).items() if length is None}
-    told = {s.name for s in grammar.never_end()}
+    told = {s.name for s in grammar.non_terminating()}
     assert told <= endless
     assert bool(told) == bool(endless)
 
@@ -176,7 +176,7 @@ def test_a_stage_never_ends_when_no_expansion_of_it_does(task: Task) -> None:
 @LAW
 @given(grammars)
 def test_without_left_recursion_entering_ends(task: Task) -> None:
-    if Grammar(task).begin_with_themselves():
+    if Grammar(task).left_recursive():
         return
     states = list(enter(task, begin(task), None, 0.0))
     assert all(s is None or leaves(s) for s in states)
@@ -184,7 +184,7 @@ def test_without_left_recursion_entering_ends(task: Task) -> None:
 
 def test_left_recursion_is_found_through_what_may_be_left_out() -> None:
     task = read("<t> ::= <u> a(x)\n<u> ::= b(x)? <t>\n<v> ::= c(x) <v>")
-    assert [s.name for s in Grammar(task).begin_with_themselves()] == ["t"]
+    assert [s.name for s in Grammar(task).left_recursive()] == ["t"]
 
 
 def test_stages_and_times_of_steps_are_those_around_them() -> None:

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.paths import ROOT
-from visup.agent.model.errors import ManyErrors, Place, TaskError
+from visup.agent.model.errors import ErrorGroup, SourceLocation, TaskError
 from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
 from visup.tasks import load_task, parse_task, shipped_tasks
-from visup.tasks.actions.actions import Meaning
-from visup.tasks.checks.examine import examine
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.load import read_text
-from visup.tasks.diagnostics.diagnostic import CODES, TaskFault, closest
+from visup.tasks.diagnostics.diagnostic import CODES, Diagnostic, closest
 from visup.tasks.grammar.structure import stage_names, task_actors
 
 HERE = ROOT / "tests/tasks"
@@ -46,7 +46,7 @@ def test_bad_files_are_told_as_written_beside_them(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(path.parent)  # where they look for what they include
-    _, faults = examine(text_of(path), path.name)
+    _, faults = diagnose(text_of(path), path.name)
     assert "".join(f"{f}\n" for f in faults) == path.with_suffix(".txt").read_text("utf-8")
 
 
@@ -54,34 +54,36 @@ def test_bad_files_with_one_mistake_give_one_message(monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(HERE / "bad")
     several = {"three_mistakes": 3, "everything": 6, "typographic": 2}
     for path in BAD:
-        _, faults = examine(text_of(path), path.name)
+        _, faults = diagnose(text_of(path), path.name)
         assert len(faults) == several.get(path.stem, 1), path.stem
 
 
 def test_every_code_is_shown_by_a_bad_file(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(HERE / "bad")
-    shown = {f.code for p in BAD for f in examine(text_of(p), p.name)[1]}
+    shown = {f.code for p in BAD for f in diagnose(text_of(p), p.name)[1]}
     assert shown | {"E231"} == set(CODES)
 
 
 def test_an_action_that_needs_percepts_which_nothing_gives_is_told() -> None:
     text = "<dock> ::= depth_difference(arm, satellite) < 10 % coupled(arm, satellite)"
-    assert examine(text)[1] == []
-    _, faults = examine(text, percepts=frozenset({"region", "health"}))
+    assert diagnose(text)[1] == []
+    _, faults = diagnose(text, percepts=frozenset({"region", "health"}))
     assert [f.code for f in faults] == ["E231"]
     assert "`depth` and `hypothesis`" in faults[0].message
-    mine = {"gripped": Meaning("gripped", ("gripped",), arity=1, needs=frozenset({"gripper"}))}
-    _, faults = examine("<t> ::= gripped(part)", actions=mine)
+    mine = {
+        "gripped": ActionDefinition("gripped", ("gripped",), arity=1, needs=frozenset({"gripper"}))
+    }
+    _, faults = diagnose("<t> ::= gripped(part)", actions=mine)
     assert [f.code for f in faults] == ["E231"]
 
 
 def test_three_mistakes_are_raised_together() -> None:
-    with pytest.raises(ManyErrors) as caught:
+    with pytest.raises(ErrorGroup) as caught:
         load_task(HERE / "bad" / "three_mistakes.task")
-    codes = [e.code for e in caught.value.errors if isinstance(e, TaskFault)]
+    codes = [e.code for e in caught.value.errors if isinstance(e, Diagnostic)]
     assert codes == ["E102", "E201", "E117"]
     for error in caught.value.errors:
-        assert isinstance(error.where, Place)
+        assert isinstance(error.where, SourceLocation)
         assert error.where.caret() in str(caught.value)
 
 
@@ -114,7 +116,7 @@ def test_a_bad_rule_hides_neither_the_others_nor_what_it_defines() -> None:
         "<b> ::= cupled(arm, satellite)\n"
         "<c> ::= coupled(arm)\n"
     )
-    _, faults = examine(text)
+    _, faults = diagnose(text)
     assert [(f.code, f.place.line) for f in faults] == [("E117", 2), ("E201", 3), ("E205", 4)]
 
 
@@ -133,14 +135,14 @@ def test_whatever_stands_in_a_file_is_read_or_told_with_its_place() -> None:
 @settings(max_examples=200, deadline=None)
 @given(st.text(max_size=60))
 def test_any_text_at_all_is_read_or_told(text: str) -> None:
-    _, faults = examine(text)
-    assert all(isinstance(f, TaskFault) for f in faults)
+    _, faults = diagnose(text)
+    assert all(isinstance(f, Diagnostic) for f in faults)
 
 
 @pytest.mark.parametrize(("name", "text"), list(long_files(2000)))
 def test_long_files_are_read_in_good_time(name: str, text: str) -> None:
     start = time.perf_counter()
-    _, faults = examine(text)
+    _, faults = diagnose(text)
     assert time.perf_counter() - start < 5.0  # the bar is 2.5 s for 10,000; others may work beside
     assert len(faults) == (1999 if name == "mistaken" else 0)
 
@@ -152,7 +154,7 @@ def test_a_usual_file_is_read_at_once() -> None:
 def test_many_stages_that_double_each_other_are_no_trap() -> None:
     doubled = [f"<s{i}> ::= (<s{i + 1}> | gone(x)) <s{i + 1}>" for i in range(60)]
     start = time.perf_counter()
-    assert examine("\n".join([*doubled, "<s60> ::= seen(a)"]))[1] == []
+    assert diagnose("\n".join([*doubled, "<s60> ::= seen(a)"]))[1] == []
     assert time.perf_counter() - start < 1.0
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from visup.agent.model.errors import TaskError
-from visup.tasks.checks.examine import examine
+from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.diagnostics.diagnostic import CODES
 from visup.tasks.diagnostics.explain import explain
 
@@ -16,8 +16,8 @@ def test_the_wrong_example_of_a_code_has_its_mistake_alone_and_the_right_one_non
     assert said.title == CODES[code]
     assert said.why.endswith(".")
     if said.wrong:
-        assert [f.code for f in examine(said.wrong)[1]] == [code]
-        assert examine(said.right)[1] == []
+        assert [f.code for f in diagnose(said.wrong)[1]] == [code]
+        assert diagnose(said.right)[1] == []
 
 
 def test_codes_are_found_as_they_are_shown_and_others_are_told() -> None:

@@ -14,7 +14,7 @@ from visup.agent import Mind, Observation, Outcome, Status, TaskBelief, Verdict,
 from visup.agent.model.errors import TaskError
 from visup.rules.relations.zones import ZoneReasoner
 from visup.tasks import load_task, load_tasks, parse_task
-from visup.tasks.actions.actions import Meaning, known_actions, with_actions
+from visup.tasks.actions.actions import ActionDefinition, known_actions, with_actions
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 NEARS = Spell("converging", 0.5, 6.0)
@@ -266,7 +266,7 @@ def test_a_parameter_stands_for_its_amount() -> None:
 
 
 def test_plug_ins_add_actions() -> None:
-    gripped = Meaning("gripped", holds=("gripped",), arity=2, hold_s=0.5, text="gripped")
+    gripped = ActionDefinition("gripped", holds=("gripped",), arity=2, hold_s=0.5, text="gripped")
     actions = with_actions(known_actions(), [gripped])
     task = parse_task("<t> ::= gripped(arm, satellite)", actions=actions)
     script = Script((Spell("gripped", 2.0, 30.0),), known=["gripped"])

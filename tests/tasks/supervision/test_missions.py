@@ -9,7 +9,7 @@ from types import MappingProxyType
 import pytest
 
 from tests.rules.percepts_from_truth import MISSIONS, Noise, actors_of, observations, truth_of
-from visup.agent import Alert, Concern, Event, Mind, Severity, Status, TaskBelief, Verdict
+from visup.agent import Alert, AlertCondition, Event, Mind, Severity, Status, TaskBelief, Verdict
 from visup.rules.reasoners import default_reasoners
 from visup.tasks import load_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(
 class Run:
     beliefs: tuple[tuple[float, TaskBelief], ...]
     events: tuple[Event, ...]
-    alerts: tuple[Concern, ...]
+    alerts: tuple[AlertCondition, ...]
 
 
 @cache
@@ -42,17 +42,17 @@ def run(name: str) -> Run:
     mind = Mind(actors=MappingProxyType(actors_of(name)))
     beliefs: list[tuple[float, TaskBelief]] = []
     events: list[Event] = []
-    alerts: list[Concern] = []
+    alerts: list[AlertCondition] = []
     for seen, _ in observations(name, Noise(every=3)):
         mind = replace(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
         )
-        concerns: list[Concern] = []
+        concerns: list[AlertCondition] = []
         for reasoner in chain:
             outcome = reasoner(mind, seen)
             mind = outcome.mind
             events += outcome.events
-            concerns += outcome.concerns
+            concerns += outcome.conditions
         open_now = {(a.kind, a.objects, a.key) for a in mind.alerts}
         alerts += [c for c in concerns if (c.kind, c.objects, c.key) not in open_now]
         mind = replace(mind, alerts=tuple(_alert(c, seen.time) for c in concerns))
@@ -60,7 +60,7 @@ def run(name: str) -> Run:
     return Run(tuple(beliefs), tuple(events), tuple(alerts))
 
 
-def _alert(concern: Concern, now: float) -> Alert:
+def _alert(concern: AlertCondition, now: float) -> Alert:
     c = concern
     return Alert(1, c.kind, c.severity, now, now, c.objects, c.cause, key=c.key)
 

@@ -87,7 +87,7 @@ def test_a_task_that_is_not_going_on_is_not_told_to_fail() -> None:
         played = watch(spells)
         failing = [e.text for e in played.events if e.kind in ("stage_failing", "stage_failed")]
         assert failing == []
-        assert not any(o.concerns for o in played.outcomes)
+        assert not any(o.conditions for o in played.outcomes)
 
 
 def test_what_was_told_to_fail_stays_told_though_another_task_begins() -> None:

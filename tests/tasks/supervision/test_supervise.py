@@ -68,7 +68,7 @@ def test_capture_succeeds() -> None:
     played = watch(Script(SUCCEEDS), 26.0)
     assert task_of(played).verdict is Verdict.SUCCEEDED
     assert [s.status for s in task_of(played).stages] == [Status.DONE, Status.DONE]
-    assert not [c for o in played.outcomes for c in o.concerns]
+    assert not [c for o in played.outcomes for c in o.conditions]
     assert task_of(played, 10.0).verdict is Verdict.IN_PROGRESS
 
 
@@ -79,7 +79,7 @@ def test_an_aborted_approach_fails_and_never_comes_to_capture() -> None:
     assert task_of(played, 14.0).verdict is Verdict.IN_PROGRESS
     assert finish(task_of(played)) is Verdict.FAILED
     assert status(played, "approach", 22.0) in (Status.FAILING, Status.FAILED)
-    concern = played.outcomes[150].concerns[0]
+    concern = played.outcomes[150].conditions[0]
     assert (concern.kind, concern.severity, concern.key) == (
         "stage_failing",
         Severity.WARNING,
@@ -341,8 +341,8 @@ def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
     event = next(e for e in played.events if e.kind == "invariant_broken")
     assert event.severity is Severity.CRITICAL
     assert "`never touching(arm, satellite)` has not held since 5.0 s" in event.text
-    assert [c.kind for c in played.outcomes[60].concerns] == ["invariant_broken"]
-    assert not played.outcomes[80].concerns
+    assert [c.kind for c in played.outcomes[60].conditions] == ["invariant_broken"]
+    assert not played.outcomes[80].conditions
 
 
 def test_an_actor_does_not_change_hands_in_a_moment() -> None:

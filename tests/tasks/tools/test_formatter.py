@@ -10,14 +10,14 @@ from tests.tasks.checks.test_diagnostics import GOOD, text_of
 from tests.tasks.trees import tasks
 from visup.tasks.checks.files import read_text, shipped_tasks
 from visup.tasks.diagnostics.diagnostic import Source
-from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import read as read_clean
 from visup.tasks.tools.formatter import WIDTH, formatted
 
 
 def read(text: str) -> Task:
-    return read_clean(clean(text, Source(text, ""))[0])
+    return read_clean(normalise(text, Source(text, ""))[0])
 
 
 LAW = settings(max_examples=60, deadline=None)

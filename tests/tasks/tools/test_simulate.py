@@ -14,17 +14,17 @@ from visup.commands.task.task import app
 from visup.tasks import load_task, parse_task, shipped_tasks
 from visup.tasks.grammar.nodes import Course, Stage, Task
 from visup.tasks.tools.diagram import dot, flow_of, mermaid
-from visup.tasks.tools.simulate import beginnings, courses, followings, sample
+from visup.tasks.tools.simulate import initial_positions, sample, successors, traces
 
 runner = CliRunner()
 
 
 def text(task: str, count: int) -> list[tuple[tuple[str, ...], ...]]:
-    return list(islice(courses(parse_task(task)), count))
+    return list(islice(traces(parse_task(task)), count))
 
 
 def test_courses_are_listed_short_ones_first() -> None:
-    found = list(islice(courses(load_task("dock_with_retry")), 3))
+    found = list(islice(traces(load_task("dock_with_retry")), 3))
     assert [len(c) for c in found] == [2, 4, 6]
     assert found[0] == (
         ("<approach> converging(arm, satellite)",),
@@ -59,17 +59,17 @@ def test_a_course_drawn_at_random_is_among_those_listed(course: Course, seed: in
     drawn, ended = sample(task, Random(seed))
     assert ended
     if len(drawn) <= 4:
-        assert drawn in takewhile(lambda c: len(c) <= len(drawn), courses(task))
+        assert drawn in takewhile(lambda c: len(c) <= len(drawn), traces(task))
 
 
 def test_walking_offers_what_may_come_next_and_the_end() -> None:
     task = load_task("dock")
-    (first,) = beginnings(task)
-    (second,) = followings(task, first)
-    (end,) = followings(task, second)
+    (first,) = initial_positions(task)
+    (second,) = successors(task, first)
+    (end,) = successors(task, second)
     assert second.moment == ("<captured> coupled(arm, satellite)",)
     assert end.state is None
-    assert followings(task, end) == ()
+    assert successors(task, end) == ()
 
 
 def test_the_command_walks_lists_and_draws() -> None:

@@ -9,14 +9,14 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
-from visup.agent.model.errors import Place, VisupError
+from visup.agent.model.errors import SourceLocation, VisupError
 from visup.commands.task.task import laid_out
-from visup.tasks.checks.examine import examine
+from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
-from visup.tasks.diagnostics.diagnostic import TaskFault
+from visup.tasks.diagnostics.diagnostic import Diagnostic
 from visup.tasks.diagnostics.explain import explain
 from visup.tasks.grammar.nodes import Span
-from visup.tasks.tools.editing import Word, definition, meaning, proposals, same_names, word_at
+from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at, references
 from visup.version import __version__
 
 KINDS = {
@@ -57,13 +57,13 @@ def make_server() -> LanguageServer:
     def complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
         document = ls.workspace.get_text_document(params.text_document.uri)
         line, column = _from(document, params.position)
-        found = proposals(document.source, _file(document), line, column)
+        found = completions(document.source, _file(document), line, column)
         return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
 
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
-    def hover(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
+    def show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
         document, word = _word(ls, params)
-        said = meaning(document.source, _file(document), word) if word else None
+        said = hover(document.source, _file(document), word) if word else None
         if word is None or said is None:
             return None
         content = lsp.MarkupContent(lsp.MarkupKind.Markdown, said)
@@ -92,7 +92,7 @@ def make_server() -> LanguageServer:
         new = params.new_name.strip("<> ")
         if word is None or not new.isidentifier():
             return None
-        places = same_names(document.source, word)
+        places = references(document.source, word)
         edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
         return lsp.WorkspaceEdit({document.uri: edits}) if edits else None
 
@@ -101,7 +101,7 @@ def make_server() -> LanguageServer:
 
 def _publish(server: LanguageServer, uri: str) -> None:
     document = server.workspace.get_text_document(uri)
-    _, faults = examine(document.source, _file(document), read=_Reader(server).read)
+    _, faults = diagnose(document.source, _file(document), read=_Reader(server).read)
     shown = [_diagnostic(document, f) for f in faults]
     server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, shown))
 
@@ -119,14 +119,14 @@ class _Reader:
         return read_beside(path, including)
 
 
-def _diagnostic(document: TextDocument, fault: TaskFault) -> lsp.Diagnostic:
+def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
     said = [fault.message]
     said += [f"expected: {fault.expected}"] if fault.expected else []
     said += [f"hint: {fault.hint}"] if fault.hint else []
     place = fault.place
     if place.file != _file(document):
         said.insert(0, f"in {place}")
-        place = Place(_file(document), 1, 1)
+        place = SourceLocation(_file(document), 1, 1)
     span = Span(place.line, place.column, place.line, place.column + place.length)
     return lsp.Diagnostic(
         _range(document, span),
@@ -139,12 +139,12 @@ def _diagnostic(document: TextDocument, fault: TaskFault) -> lsp.Diagnostic:
 
 def _word(
     server: LanguageServer, params: lsp.HoverParams | lsp.DefinitionParams | lsp.RenameParams
-) -> tuple[TextDocument, Word | None]:
+) -> tuple[TextDocument, NameUse | None]:
     document = server.workspace.get_text_document(params.text_document.uri)
-    return document, word_at(document.source, *_from(document, params.position))
+    return document, name_at(document.source, *_from(document, params.position))
 
 
-def _location(server: LanguageServer, document: TextDocument, word: Word) -> lsp.Location | None:
+def _location(server: LanguageServer, document: TextDocument, word: NameUse) -> lsp.Location | None:
     if word.kind == "include":
         try:
             path, _ = _Reader(server).read(word.name, _file(document))

@@ -8,7 +8,7 @@ import typer
 
 if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
-    from visup.tasks.tools.simulate import Course, Moment, Place
+    from visup.tasks.tools.simulate import Moment, Position, Trace
 
 
 def simulate(
@@ -36,9 +36,9 @@ def simulate(
 def _list(task: Task, count: int) -> None:
     from itertools import islice
 
-    from visup.tasks.tools.simulate import courses
+    from visup.tasks.tools.simulate import traces
 
-    found = courses(task)
+    found = traces(task)
     for number, course in enumerate(islice(found, count), 1):
         typer.echo(f"{number}. {_line(course)}")
     if next(found, None) is not None:
@@ -58,10 +58,10 @@ def _sample(task: Task, count: int, seed: int) -> None:
 
 def _walk(task: Task) -> None:
     """Ask at every step which way to go on, until the task ends or the user does."""
-    from visup.tasks.tools.simulate import beginnings, followings
+    from visup.tasks.tools.simulate import initial_positions, successors
 
     typer.echo(f"task {task.name}: choose how it goes on by number; q ends the walk")
-    places = beginnings(task)
+    places = initial_positions(task)
     while True:
         for number, place in enumerate(places, 1):
             typer.echo(f"  {number}) {_way(place)}")
@@ -72,10 +72,10 @@ def _walk(task: Task) -> None:
             typer.echo("the task is done")
             return
         typer.echo(f"now: {_said(chosen.moment)}")
-        places = followings(task, chosen)
+        places = successors(task, chosen)
 
 
-def _ask(places: tuple[Place, ...]) -> Place | None:
+def _ask(places: tuple[Position, ...]) -> Position | None:
     while True:
         try:
             answer = input("> ").strip().lower()
@@ -91,11 +91,11 @@ def _ask(places: tuple[Place, ...]) -> Place | None:
         typer.echo(f"  a number from 1 to {len(places)}, or q")
 
 
-def _way(place: Place) -> str:
+def _way(place: Position) -> str:
     return _said(place.moment) if place.state is not None else "(the task is done)"
 
 
-def _line(course: Course) -> str:
+def _line(course: Trace) -> str:
     return ", then ".join(map(_said, course)) or "(nothing)"
 
 

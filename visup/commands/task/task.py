@@ -29,9 +29,9 @@ Without = Annotated[
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
     """Tell every mistake of some task files; exit code 2 when there is any."""
-    from visup.agent.model.errors import ManyErrors, SettingsError, VisupError
+    from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
     from visup.tasks.actions.actions import ALL_PERCEPTS
-    from visup.tasks.checks.examine import examine
+    from visup.tasks.checks.diagnose import diagnose
     from visup.tasks.checks.files import read_text
 
     odd = set(without or ()) - ALL_PERCEPTS
@@ -41,7 +41,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     found: dict[str, list[VisupError]] = {}
     for file in files:
         try:
-            faults = examine(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
+            faults = diagnose(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
             found[file] = [*faults]
         except VisupError as e:
             found[file] = [e]
@@ -55,7 +55,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     if len(told) == 1:
         raise told[0]
     if told:
-        raise ManyErrors(told)
+        raise ErrorGroup(told)
 
 
 @app.command("format")
@@ -183,24 +183,24 @@ def laid_out(text: str, file: str) -> str:
         TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
         ManyErrors: The same, for several reasons.
     """
-    from visup.tasks.checks.examine import raise_all
+    from visup.tasks.checks.diagnose import raise_all
     from visup.tasks.diagnostics.diagnostic import Source
-    from visup.tasks.diagnostics.normalise import clean
+    from visup.tasks.diagnostics.normalise import normalise
     from visup.tasks.diagnostics.recovery import parse
     from visup.tasks.tools.formatter import formatted
 
     source = Source(text, file)
-    code, odd = clean(text, source)
+    code, odd = normalise(text, source)
     raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
     return formatted(text)
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:
-    from visup.agent.model.errors import Place
+    from visup.agent.model.errors import SourceLocation
 
     where = error.where
     place: dict[str, Any] = {"file": str(where) if where else None}
-    if isinstance(where, Place):
+    if isinstance(where, SourceLocation):
         place = {
             "file": where.file,
             "line": where.line,

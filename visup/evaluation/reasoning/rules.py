@@ -195,7 +195,7 @@ def _timed(rules: tuple[Rule, ...], seen: list[Mind]) -> tuple[list[float], list
         begin = time.perf_counter()
         outcome = reasoner(mind, nothing)
         taken.append(time.perf_counter() - begin)
-        concerns.append(len(outcome.concerns))
+        concerns.append(len(outcome.conditions))
         memory = outcome.mind.memory[SAFETY]
     return taken, concerns
 

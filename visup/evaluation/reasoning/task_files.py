@@ -12,11 +12,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from visup.tasks.checks.examine import examine
+from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_text, shipped_tasks
-from visup.tasks.diagnostics.diagnostic import CODES, Source, TaskFault
+from visup.tasks.diagnostics.diagnostic import CODES, Diagnostic, Source
 from visup.tasks.diagnostics.explain import explain
-from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.tools.formatter import formatted
 
 LINES = 10_000
@@ -74,7 +74,7 @@ def fuzz(count: int, seed: int) -> Fuzz:
         seed: Of the first; file i is made from `seed + i` alone.
     """
     result, texts = Fuzz(), seeds_of_language()
-    examine(texts[0])  # what is read once for all is read before the clock runs
+    diagnose(texts[0])  # what is read once for all is read before the clock runs
     for number in range(seed, seed + count):
         rng = random.Random(number)
         text = mutated(rng.choice(texts), rng)
@@ -92,20 +92,20 @@ def fuzz(count: int, seed: int) -> Fuzz:
 
 
 def _look(text: str, number: int, result: Fuzz) -> None:
-    task, faults = examine(text, "fuzz.task")
+    task, faults = diagnose(text, "fuzz.task")
     lines = text.split("\n")
     result.codes.update(f.code for f in faults)
     if not all(_placed(f, lines) for f in faults):
         result.placeless.append(number)
     if not faults:
         result.good += 1
-        code, _ = clean(text, Source(text, ""))
+        code, _ = normalise(text, Source(text, ""))
         new = formatted(code)
-        if formatted(new) != new or examine(new, "fuzz.task")[0] != task:
+        if formatted(new) != new or diagnose(new, "fuzz.task")[0] != task:
             result.unstable.append(number)
 
 
-def _placed(fault: TaskFault, lines: list[str]) -> bool:
+def _placed(fault: Diagnostic, lines: list[str]) -> bool:
     place = fault.place
     if fault.code not in CODES or not fault.message:
         return False
@@ -173,6 +173,6 @@ def seconds(text: str, times: int = 3) -> float:
     taken = []
     for _ in range(times):
         begin = time.perf_counter()
-        examine(text)
+        diagnose(text)
         taken.append(time.perf_counter() - begin)
     return min(taken)

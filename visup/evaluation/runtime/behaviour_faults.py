@@ -26,14 +26,14 @@ import numpy as np
 from visup.agent import Contract, Depth, Health, HealthStatus, Hypothesis
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.model.records import BROKEN, ReportState
+from visup.agent.model.records import FAULT_STATES, ReportState
 from visup.agent.model.step import Step
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.predicates.inputs_missing import inputs
-from visup.rules.predicates.vocabulary import QUANTITIES, WORDS
+from visup.rules.predicates.inputs_missing import percepts_read
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.reasoners import default_reasoners
 from visup.testing import LabelledFrame, Scripted, crossing
 
@@ -163,7 +163,7 @@ def _watch(trial: BehaviourFaultTrial, agent: Agent) -> None:
 
 def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
     """Look for what is taken for known in one step although it is unknown."""
-    broken = _report(step).state in BROKEN
+    broken = _report(step).state in FAULT_STATES
     if broken and (trial.kind not in step.mind.unknown or step.observation.observed(trial.kind)):
         trial.problems.append(f"unknown: '{trial.kind}' counts as observed")
     if broken and not _told(step):
@@ -175,7 +175,7 @@ def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
             return  # no rule was read in this step
         word = alert.kind.removeprefix(PROBE).rpartition("_")[0]
         fresh = alert.updated == step.time
-        if alert.kind.startswith(PROBE) and fresh and unknown & inputs(word):
+        if alert.kind.startswith(PROBE) and fresh and unknown & percepts_read(word):
             trial.problems.append(f"fine: {alert.kind} holds while {sorted(unknown)} is unknown")
     for alert in step.alerts:
         if alert.closed is not None and unknown.intersection(alert.needs):
@@ -184,7 +184,7 @@ def _judge(trial: BehaviourFaultTrial, step: Step) -> None:
 
 def _told(step: Step) -> bool:
     open_now = any(a.kind == "behaviour_failed" and a.key == "culprit" for a in step.mind.alerts)
-    return open_now and _report(step).state in BROKEN
+    return open_now and _report(step).state in FAULT_STATES
 
 
 def _report(step: Step) -> Any:
@@ -195,7 +195,7 @@ def _report(step: Step) -> Any:
 def probes() -> tuple[Rule, ...]:
     """Two rules for each word: one is true when the word is, the other when its negation is."""
     lines = []
-    for name, word in WORDS.items():
+    for name, word in PREDICATES.items():
         lines += _pair(name, word.takes, "{call}", "not {call}")
     for name, quantity in QUANTITIES.items():
         one = f"1 {quantity.unit}"

@@ -54,7 +54,9 @@ class FaultyBehaviour:
         self.pause_s = pause_s
         self.kept: list[Any] = []
 
-    def perceive(self, frame: Frame, seen: Observation, directives: Sequence[Directive]) -> Any:
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Any:
         """What is true of the frame, or what comes of the fault."""
         honest = [self.contract.percept(frame, v) for v in self.truth[frame.index]]
         return FAULTS[self.fault](self, frame, honest) if frame.index in self.span else honest

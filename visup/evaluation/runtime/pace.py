@@ -22,7 +22,7 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
-from visup.agent.storage.jsonable import plain
+from visup.agent.storage.jsonable import to_jsonable
 from visup.evaluation.figures import Progress, resident_mb, silent
 from visup.evaluation.runtime.scripted_observations import SIZE, drifting_boxes
 from visup.runs.replay import replay, settings_for
@@ -131,7 +131,7 @@ def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> 
     """Cost of steps and of writing them down; the journal is left in the folder."""
     folder.mkdir()
     journal = Journal(folder / JOURNAL)
-    journal.note(settings=plain(settings))
+    journal.note(settings=to_jsonable(settings))
     agent = reasoning_agent(settings)
     thought, whole, alerts = [], [], []
     for one in seen:

@@ -23,7 +23,7 @@ from visup.agent import (
 )
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.agent.storage.journal import Journal, Limits, segments
+from visup.agent.storage.journal import Journal, JournalLimits, segments
 from visup.agent.storage.journal_reader import JOURNAL, Recording, export_events
 from visup.evaluation.figures import Progress, resident_mb, silent
 from visup.evaluation.runtime.scripted_observations import SIZE, moving_ellipses
@@ -33,7 +33,7 @@ from visup.runs.wiring import reasoning_agent
 from visup.sinks import Sinks
 
 LEAST_FRAMES = 2000
-LIMITS = Limits(segment_bytes=32 * 2**20, keep_bytes=128 * 2**20)
+LIMITS = JournalLimits(segment_bytes=32 * 2**20, keep_bytes=128 * 2**20)
 PAIRS = 12  # blocks with and without sinks, in turn
 
 
@@ -89,11 +89,11 @@ def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict
     return {"items": items, "total": total}
 
 
-def _journal(folder: Path, limits: Limits | None = None) -> Journal:
-    from visup.agent.storage.jsonable import plain
+def _journal(folder: Path, limits: JournalLimits | None = None) -> Journal:
+    from visup.agent.storage.jsonable import to_jsonable
 
     journal = Journal(folder / JOURNAL, limits)
-    journal.note(settings=plain(WatchSettings("scripted", tasks=("dock",))))
+    journal.note(settings=to_jsonable(WatchSettings("scripted", tasks=("dock",))))
     return journal
 
 
@@ -124,7 +124,7 @@ def _long(
 class _JournaledAgent:
     """An agent with its journal, and what its steps cost, in milliseconds of processor time."""
 
-    def __init__(self, folder: Path, limits: Limits) -> None:
+    def __init__(self, folder: Path, limits: JournalLimits) -> None:
         folder.mkdir(exist_ok=True)
         self.agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
         self.journal = _journal(folder, limits)
@@ -134,9 +134,9 @@ class _JournaledAgent:
     def costs(self) -> NDArray[np.float64]:
         return np.asarray(self._costs, np.float64)
 
-    def step(self, seen: Observation) -> None:
+    def step(self, observation: Observation) -> None:
         begin = time.process_time()
-        self.journal.record(self.agent.reason(seen))
+        self.journal.record(self.agent.reason(observation))
         self._costs.append((time.process_time() - begin) * 1e3)
 
 
@@ -160,9 +160,9 @@ def _replay_fps(folder: Path) -> float:
 
 
 def _bytes_each(frames: int) -> float:
-    from visup.agent.storage.codec import packed
+    from visup.agent.storage.codec import pack_observation
 
-    sizes = [len(packed(seen)) for seen in moving_ellipses(frames // 20)]
+    sizes = [len(pack_observation(seen)) for seen in moving_ellipses(frames // 20)]
     return float(np.mean(sizes))
 
 

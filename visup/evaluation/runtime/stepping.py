@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from visup.agent import Mind, Observation, Region
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.agent.storage.checkpoint import frozen
+from visup.agent.storage.checkpoint import dump_state
 from visup.evaluation.figures import Progress, resident_mb, silent
 from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.rules.relations.reasoner import RELATIONS
@@ -133,7 +133,7 @@ def _agent() -> Any:
     return reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
 
 
-def _own(seen: Observation) -> Observation:
+def _own(observation: Observation) -> Observation:
     """The same with masks and outlines that no other frame shares."""
 
     def owned(value: object) -> object:
@@ -143,9 +143,9 @@ def _own(seen: Observation) -> Observation:
 
     reports = tuple(
         replace(r, percepts=tuple(replace(p, value=owned(p.value)) for p in r.percepts))
-        for r in seen.reports
+        for r in observation.reports
     )
-    return replace(seen, reports=reports)
+    return replace(observation, reports=reports)
 
 
 def _slower() -> float:
@@ -187,7 +187,7 @@ def whole(mind: Mind) -> Mind:
 
 def _digest(step: Step) -> bytes:
     return hashlib.sha256(
-        frozen((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
+        dump_state((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
     ).digest()
 
 

@@ -28,7 +28,7 @@ from visup.agent import (
     Region,
 )
 from visup.agent.contract.behaviour import Behaviour, Contract
-from visup.agent.execution.pipeline import in_order, perceive
+from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.evaluation.simulation.hypotheses import HypothesisSource, NamingNoise
 from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, shaken
 from visup.testing import region_of
@@ -166,7 +166,7 @@ class SimulatedSegmenter:
         )
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report one frame; see `Behaviour`."""
         yield Percept("health", Health(HealthStatus.OK), frame.time, "truth")
@@ -244,10 +244,10 @@ class SimulatedRecogniser:
             self._sources[name] = HypothesisSource(mission, name, naming, rng)
 
     def perceive(
-        self, frame: Frame, seen: Observation, directives: Sequence[Directive]
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report one frame; see `Behaviour`."""
-        for region in seen.of("region"):
+        for region in observation.of("region"):
             for value in self._said(region, frame.index):
                 kind = "hypothesis" if isinstance(value, Hypothesis) else "depth"
                 yield Percept(kind, value, frame.time, "truth_names")
@@ -285,7 +285,7 @@ def observations_of(
 ) -> Iterator[tuple[Observation, dict[int, tuple[str, ...]]]]:
     """What an agent would observe, each with the truth: region id -> names of true objects."""
     behaviours, who = behaviours_of(mission, noise)
-    slots = in_order(behaviours)
+    slots = ordered_slots(behaviours)
     for frame in frames_of(mission, every=every):
         seen = perceive(slots, frame, ())
         yield seen, {r.id: who[r.id] for r in seen.of("region")}

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
-from visup.agent.model.errors import ManyErrors, Place, SettingsError, VisupError
+from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
 from visup.render.scenario.optics import (
     Camera,
     Direction,
@@ -243,7 +243,7 @@ def parse_scenario(text: str, name: str = "scenario") -> Scenario:
         return Scenario.model_validate(data)
     except ValidationError as error:
         faults: list[VisupError] = [_fault(e, name, text) for e in _root_faults(error)]
-        raise (faults[0] if len(faults) == 1 else ManyErrors(faults)) from error
+        raise (faults[0] if len(faults) == 1 else ErrorGroup(faults)) from error
 
 
 def _beside(scenario: Scenario, folder: Path) -> Scenario:
@@ -284,7 +284,7 @@ def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
     )
 
 
-def _place(name: str, text: str, steps: list[Any]) -> Place | None:
+def _place(name: str, text: str, steps: list[Any]) -> SourceLocation | None:
     """The line where a key stands, when its word occurs only once in the file."""
     keys = [s for s in steps if isinstance(s, str)]
     if not keys:
@@ -298,4 +298,4 @@ def _place(name: str, text: str, steps: list[Any]) -> Place | None:
     if len(found) != 1:
         return None
     number, line = found[0]
-    return Place(name, number, line.index(key) + 1, line, len(key))
+    return SourceLocation(name, number, line.index(key) + 1, line, len(key))

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from visup.agent import Depth, Hypothesis, Observation, Percept, Region
-from visup.agent.model.notebook import showing
-from visup.rules.safety.explain import Explanation
+from visup.agent.model.display import enable_display
+from visup.rules.safety.explain import RuleExplanation
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,23 +55,25 @@ class Why:
         return "\n".join(self.lines())
 
 
-def explanation_tree(explained: Explanation) -> Why:
+def explanation_tree(explained: RuleExplanation) -> Why:
     """What the rule language explains, as a tree of reasons."""
     return Why(explained.line(), tuple(explanation_tree(p) for p in explained.parts))
 
 
-def region_percepts(seen: Observation, region_id: int, *, names: bool = False) -> tuple[Why, ...]:
+def region_percepts(
+    observation: Observation, region_id: int, *, names: bool = False
+) -> tuple[Why, ...]:
     """The percepts of a frame about one region.
 
     Args:
-        seen: What was perceived.
+        observation: What was perceived.
         region_id: The region.
         names: Whether those that say what it is count too.
     """
     kinds = (Region, Hypothesis, Depth) if names else (Region,)
     return tuple(
-        percept_reason(percept, seen)
-        for report in seen.reports
+        percept_reason(percept, observation)
+        for report in observation.reports
         for percept in report.percepts
         if isinstance(percept.value, kinds) and _about(percept.value) == region_id
     )
@@ -81,10 +83,10 @@ def _about(value: Region | Hypothesis | Depth) -> int:
     return value.id if isinstance(value, Region) else value.region_id
 
 
-def percept_reason(percept: Percept, seen: Observation) -> Why:
+def percept_reason(percept: Percept, observation: Observation) -> Why:
     """A percept as the last of reasons."""
     text = f"{percept.source} reported {percept_text(percept.value)}"
-    return Why(text, (), seen.frame_index, seen.time, percept)
+    return Why(text, (), observation.frame_index, observation.time, percept)
 
 
 def percept_text(value: object) -> str:
@@ -104,4 +106,4 @@ def percept_text(value: object) -> str:
     return text if len(text) <= 70 else f"{text[:67]}..."
 
 
-showing(Why)
+enable_display(Why)

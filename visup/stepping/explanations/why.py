@@ -24,7 +24,7 @@ from visup.agent import (
 from visup.agent.model.errors import SettingsError
 from visup.rules.coupling.reasoner import COUPLING
 from visup.rules.safety.queries import explain
-from visup.rules.safety.reasoner import kept
+from visup.rules.safety.reasoner import rule_memory
 from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import (
     Why,
@@ -117,7 +117,7 @@ class ReasonFinder:
 
     def _cause(self, kind: str, event: Event) -> Why:
         """Why a concern of some kind held after this step."""
-        if kind in {rule.name for rule in kept(self.mind).rules}:
+        if kind in {rule.name for rule in rule_memory(self.mind).rules}:
             return self.rule(kind, event.objects)
         stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
         if kind == "stage_failing":

@@ -12,9 +12,9 @@ from visup.rules.identity.votes import VOTES, IdentityReasoner, ObjectVotes, Vot
 from visup.rules.presence.object_tracks import ObjectTrack, at_border, presence_memory
 from visup.rules.presence.reasoner import PresenceReasoner
 from visup.rules.presence.step_context import PresenceSettings
-from visup.rules.safety.explain import Explanation
-from visup.rules.safety.queries import choices, explain, rule_named, values_of
-from visup.rules.safety.reasoner import kept
+from visup.rules.safety.explain import RuleExplanation
+from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
+from visup.rules.safety.reasoner import rule_memory
 from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import Why, explanation_tree
 
@@ -38,7 +38,7 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     """
     found = [explain(mind, name, *ids)] if ids else _each(mind, name)
     if not found:
-        count = len(rule_named(values_of(mind), name).variables)
+        count = len(rule_named(evaluation_of(mind), name).variables)
         return Why(f"{name} is about {count} object(s), and so many are not in view")
     nearest = max(found, key=lambda e: (e.verdict is Truth.TRUE, *e.parts[0].interval))
     if nearest.verdict is Truth.TRUE:
@@ -54,12 +54,12 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     return Why(nearest.line(), tuple(parts), mind.frame_index, mind.time)
 
 
-def _each(mind: Mind, name: str) -> list[Explanation]:
-    values = values_of(mind)
-    return [explain(mind, name, *ids) for ids in choices(values, rule_named(values, name))]
+def _each(mind: Mind, name: str) -> list[RuleExplanation]:
+    values = evaluation_of(mind)
+    return [explain(mind, name, *ids) for ids in object_choices(values, rule_named(values, name))]
 
 
-def _unmet(node: Explanation) -> Iterator[Why]:
+def _unmet(node: RuleExplanation) -> Iterator[Why]:
     """What keeps a formula from being true: its parts that are not; a comparison with its quantities."""
     for part in node.parts:
         if part.verdict is None:
@@ -227,7 +227,7 @@ def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
         if alert.kind == kind and (not objects or set(alert.objects) == set(objects)):
             return Why(f"alert {alert.id} is open since {alert.opened:.2f} s: {alert.cause}")
     why = rule_unmet(mind, kind, objects)
-    cooling = kept(mind).cooling.items()
+    cooling = rule_memory(mind).cooling.items()
     resting = [
         Why(f"it rests for objects {sorted(who)} until {until:.2f} s")
         for (rule, who), until in cooling

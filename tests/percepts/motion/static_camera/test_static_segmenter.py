@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tests.percepts.motion.clips import FPS, SIZE, Shot, clip, texture
 from visup.agent import Frame, Region
+from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.segmenter import MotionSegmenter
@@ -24,11 +25,13 @@ from visup.percepts.motion.static_camera.blob_track import BlobTracks, find_blob
 from visup.percepts.motion.static_camera.blob_tracker import track_blobs
 from visup.percepts.motion.static_camera.static_segmenter import region_mask, swept_mask
 from visup.percepts.motion.static_camera.track_fusion import (
+    FusionFrame,
     MotionEvidence,
     TrackFusion,
     are_near,
     common_pixels,
 )
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 GROUND = np.repeat(texture(1, SIZE)[..., None], 3, axis=2).astype(np.float32)
 NOWHERE = np.zeros(SIZE, dtype=bool)
@@ -220,8 +223,9 @@ def test_a_region_is_told_whole_where_its_points_move_and_the_picture_sees_a_par
     sure: float, many: float, whole: bool
 ) -> None:
     """Half of the region is of one tone with the rest."""
-    body, part, ids, born = box(60, 60, 40, 40), box(60, 60, 22, 40), 1, 0
-    size, telling = SIZE[::-1], TrackFusion()
+    body, part, born = box(60, 60, 40, 40), box(60, 60, 22, 40), 0
+    fusion, ids = TrackFusion(), IdAllocator()
+    ids.reserve(1)
     known: BlobTracks = ()
     told: tuple[Region, ...] = ()
     for n in range(12):
@@ -231,11 +235,35 @@ def test_a_region_is_told_whole_where_its_points_move_and_the_picture_sees_a_par
         image: Floats = with_boxes((seen, 250.0))
         view = find_blobs(image, seen, 20, n / FPS, 1 / FPS)
         known, born = track_blobs(known, view, born)
-        telling.note([own], n / FPS, 12.0)
+        fusion.note([own], n / FPS, 12.0)
         evidence = points(np.roll(body & ~part, shift, axis=1), sure)
-        told, known, ids = telling.fuse(size, view, known, [own], ids, evidence, many)
+        frame = FusionFrame(SIZE[::-1], view, evidence, many)
+        told, known = fusion.fuse(frame, known, [own], ids)
     assert len(told) == 1
     assert (told[0].area == own.area) == whole
+
+
+def test_two_regions_are_never_reported_under_one_id() -> None:
+    """Region 2 was reported as blob 3; the track that is confirmed as 3 is another object."""
+    fusion, ids = TrackFusion(), IdAllocator()
+    ids.reserve(3)
+    two, three = (replace(region(box(x, 60)), id=i) for i, x in ((2, 40), (3, 90)))
+    fusion._note_alias(two, [replace(two, id=3)])
+    assert [r.id for r in fusion.passthrough([two, three], ids, 1e9)] == [3, 4]
+    assert [r.id for r in fusion.passthrough([three], ids, 1e9)] == [4]  # and so it stays
+
+
+@given(st.dictionaries(st.integers(1, 6), st.integers(1, 6)), st.sets(st.integers(1, 6)))
+def test_ids_are_unique_whatever_regions_were_reported_as(
+    aliases: dict[int, int], living: set[int]
+) -> None:
+    fusion, ids = TrackFusion(), IdAllocator()
+    ids.reserve(6)
+    own = region(box(60, 60))
+    for number, other in aliases.items():
+        fusion._note_alias(replace(own, id=number), [replace(own, id=other)])
+    seen = fusion.passthrough([replace(own, id=number) for number in sorted(living)], ids, 1e9)
+    assert len({r.id for r in seen}) == len(living)
 
 
 def thin(frames: int, camera: float = 0.0) -> list[Shot]:

@@ -6,7 +6,7 @@ import pytest
 from tests.percepts.motion.clips import FPS, Shot, clip, texture
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.segmenter import MotionSegmenter
-from visup.percepts.motion.tracks.track import PATH_S
+from visup.percepts.motion.tracks.track_prediction import PATH_S
 
 PERIOD = 25
 

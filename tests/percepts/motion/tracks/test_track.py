@@ -8,7 +8,10 @@ from hypothesis import strategies as st
 from tests.percepts.motion.features.test_superpixels_jit import cells_of
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
-from visup.percepts.motion.tracks.track import PartMotion, Track, predict_tracks, update_track
+from visup.percepts.motion.layers.dense_labelling import Labelling
+from visup.percepts.motion.tracks.track import PartMotion, Track
+from visup.percepts.motion.tracks.track_prediction import predict_tracks
+from visup.percepts.motion.tracks.track_update import update_track
 
 STEP_S = 0.04
 
@@ -31,8 +34,8 @@ def test_what_is_hidden_does_not_wear_away(seed: int) -> None:
     for n in range(30):
         posterior = np.zeros((cells.count, 4), np.float32)
         posterior[:, 2] = 1  # another object is everywhere
-        winner = posterior.argmax(axis=1)
-        track = update_track(track, posterior, winner, 1, cells, n * STEP_S, 50.0)
+        labelling = Labelling(posterior, posterior.argmax(axis=1))
+        track = update_track(track, 1, labelling, cells, n * STEP_S, 50.0)
         assert track.occluded is not None
         assert track.mostly_occluded
         hidden.append(track.occluded)
@@ -51,7 +54,8 @@ def test_what_fades_before_an_occluder_is_hidden_all_the_same() -> None:
     track = Track(1, 1, 0.0, 0.0, ones, motions=motions, predicted_share=ones, frames=9)
     for shares in ([0.1, 0.48, 0.42, 0.0], [0.1, 0.3, 0.6, 0.0]):
         posterior = np.tile(np.array(shares, np.float32), (cells.count, 1))
-        track = update_track(track, posterior, posterior.argmax(axis=1), 1, cells, STEP_S, 50.0)
+        labelling = Labelling(posterior, posterior.argmax(axis=1))
+        track = update_track(track, 1, labelling, cells, STEP_S, 50.0)
         (track,) = predict_tracks((track,), still, cells, cells, STEP_S)
     assert track.occluded is not None
     assert track.occluded.mean() > 0.95

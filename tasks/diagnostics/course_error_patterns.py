@@ -1,33 +1,37 @@
-"""Mistakes inside a course; see `mistakes.py`, which says in which order they are looked for."""
+"""Errors that people often make inside a course; `error_patterns.py` says in which order they are tried."""
 
 from __future__ import annotations
 
 import re
 
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.grammar.statement import NAME, WORDS, Mistake
+from visup.tasks.grammar.statement import NAME, RESERVED_WORDS, RecognisedError
 
 
-def open_angle(text: str) -> Mistake | None:
+def open_angle(text: str) -> RecognisedError | None:
     """A reference with one angle bracket."""
     # A quantity may be compared with a parameter: `gap(arm, satellite) < reach`.
     m = re.search(rf"<(?:(?<!\))(?<!\) )[ ]*)?({NAME})(?![ ]*>|\w)", text)
     if m is not None:
-        return Mistake("E107", m.start(), len(m[0]), f"`<{m[1]}` is not closed", f"`<{m[1]}>`")
+        return RecognisedError(
+            "E107", m.start(), len(m[0]), f"`<{m[1]}` is not closed", f"`<{m[1]}>`"
+        )
     m = re.search(rf"(?<![<\w ])[ ]+({NAME})[ ]*>", text)
     if m is not None:
         what = f"`{m[1]}>` is not opened"
-        return Mistake("E107", m.start(1), len(m[1]) + 1, what, f"`<{m[1]}>`")
+        return RecognisedError("E107", m.start(1), len(m[1]) + 1, what, f"`<{m[1]}>`")
     return None
 
 
-def brackets(text: str) -> Mistake | None:
+def brackets(text: str) -> RecognisedError | None:
     """Brackets of the wrong kind, not closed, or not opened."""
     m = re.search(r"[\[\]{}]", text)
     if m is not None:
         what = f"`{m[0]}` is no bracket of the language"
         hint = "what may be left out is written `( ... )?`, what is repeated `( ... )*`"
-        return Mistake("E112", m.start(), 1, what, "`(` and `)` for groups and actors", hint)
+        return RecognisedError(
+            "E112", m.start(), 1, what, "`(` and `)` for groups and actors", hint
+        )
     opened: list[int] = []
     for m in re.finditer(r"[()]", text):
         if m[0] == "(":
@@ -35,40 +39,42 @@ def brackets(text: str) -> Mistake | None:
         elif opened:
             opened.pop()
         else:
-            return Mistake("E111", m.start(), 1, "`)` has no `(` before it")
+            return RecognisedError("E111", m.start(), 1, "`)` has no `(` before it")
     if opened:
-        return Mistake("E110", opened[0], 1, "`(` is not closed", "`)`")
+        return RecognisedError("E110", opened[0], 1, "`(` is not closed", "`)`")
     return None
 
 
-def action_in_angles(text: str) -> Mistake | None:
+def action_in_angles(text: str) -> RecognisedError | None:
     """An action written `<converging>(arm, satellite)`."""
     m = re.search(rf"<[ ]*({NAME})[ ]*>[ ]*\((?=[ ]*{NAME}[ ]*,)", text)
     if m is None:
         return None
     what = f"action `{m[1]}` is written in angle brackets"
-    return Mistake("E113", m.start(), len(m[0].rstrip("( ")), what, f"`{m[1]}(...)`")
+    return RecognisedError("E113", m.start(), len(m[0].rstrip("( ")), what, f"`{m[1]}(...)`")
 
 
-def operators(text: str) -> Mistake | None:
+def operators(text: str) -> RecognisedError | None:
     """Operators of other languages."""
     m = re.search(r"\|\||&&", text)
     if m is not None:
         what = f"`{m[0]}` is written once in this language"
-        return Mistake("E122", m.start(), 2, what, f"`{m[0][0]}`")
+        return RecognisedError("E122", m.start(), 2, what, f"`{m[0][0]}`")
     m = re.search(r"(!|~|¬)(?=\s*[\w(<])", text)
     if m is not None:
         hint = (
             "a stage asks for what should be: `decoupled`, `apart`, `gone`; conditions have `not`"
         )
-        return Mistake("E122", m.start(), 1, f"`{m[0]}` is not part of the language", None, hint)
+        return RecognisedError(
+            "E122", m.start(), 1, f"`{m[0]}` is not part of the language", None, hint
+        )
     m = re.search(r"[>)\w]\s+(/)\s+[<(\w]", text)
     if m is not None:
-        return Mistake("E122", m.start(1), 1, "`/` does not part alternatives", "`|`")
+        return RecognisedError("E122", m.start(1), 1, "`/` does not part alternatives", "`|`")
     return None
 
 
-def empty_part(text: str) -> Mistake | None:
+def empty_part(text: str) -> RecognisedError | None:
     """Nothing beside `|` or `&`."""
     m = re.search(r"(?:::=|[(|&])\s*([|&])|([|&])\s*(?:\)|[|&]|$)|\(\s*\)(?<![\w]\))", text)
     if m is None:
@@ -76,81 +82,83 @@ def empty_part(text: str) -> Mistake | None:
     for group, side in ((1, "before"), (2, "after")):
         if m[group]:
             what = f"nothing stands {side} `{m[group]}`"
-            return Mistake("E114", m.start(group), 1, what, "an action, a stage or a group")
+            return RecognisedError("E114", m.start(group), 1, what, "an action, a stage or a group")
     return None
 
 
-def no_brackets(text: str) -> Mistake | None:
+def no_brackets(text: str) -> RecognisedError | None:
     """An action whose actors stand behind it without brackets."""
     m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME})[ ]+({NAME})", text)
     if m is not None and m[2] in ACTIONS:
         what = f"`{m[2]}` stands between its actors"
         expected = f"`{m[2]}({m[1]}, {m[3]})`"
-        return Mistake("E219", m.start(1), m.end(3) - m.start(1), what, expected)
+        return RecognisedError("E219", m.start(1), m.end(3) - m.start(1), what, expected)
     m = re.search(rf"(?:::=|[|&>)])\s*({NAME})[ ]+({NAME}(?:\s*,\s*{NAME})+)", text)
-    if m is None or m[1] in WORDS:
+    if m is None or m[1] in RESERVED_WORDS:
         return None
     what = f"the actors of `{m[1]}` stand without brackets"
-    return Mistake("E219", m.start(1), m.end(2) - m.start(1), what, f"`{m[1]}({m[2]})`")
+    return RecognisedError("E219", m.start(1), m.end(2) - m.start(1), what, f"`{m[1]}({m[2]})`")
 
 
-def no_actors(text: str) -> Mistake | None:
+def no_actors(text: str) -> RecognisedError | None:
     """Brackets with nothing in them."""
     m = re.search(rf"({NAME})[ ]*\(\s*\)", text)
     if m is not None:
         what = f"action `{m[1]}` has no actors"
-        return Mistake("E118", m.start(1), len(m[0]), what, f"`{m[1]}(arm, satellite)`")
+        return RecognisedError("E118", m.start(1), len(m[0]), what, f"`{m[1]}(arm, satellite)`")
     m = re.search(r"\(\s*\)", text)
     if m is not None:
-        return Mistake(
+        return RecognisedError(
             "E114", m.start(), len(m[0]), "an empty group", "an action, a stage or a group"
         )
     return None
 
 
-def clause(text: str) -> Mistake | None:
+def clause(text: str) -> RecognisedError | None:
     """`for` or `within` without a proper duration."""
     m = re.search(r"\b(for|within)\b\s*(-\s*\d\S*)", text)
     if m is not None:
-        return Mistake(
+        return RecognisedError(
             "E115", m.start(2), len(m[2]), "a duration is never negative", "a number and a unit"
         )
     m = re.search(r"\b(for|within)\b(?!\s*[\d-])(?!\s*\()", text)
     if m is not None:
         what = f"`{m[1]}` is not followed by a duration"
-        return Mistake("E115", m.start(1), len(m[1]), what, f"such as `{m[1]} 5 s`")
+        return RecognisedError("E115", m.start(1), len(m[1]), what, f"such as `{m[1]} 5 s`")
     m = re.search(r"([<>]=?)\s*(\d+(?:\.\d+)?)(?![\d.]|\s*[^\W\d]|\s*%)", text)
     if m is not None:
         what = f"`{m[2]}` has no unit"
-        return Mistake("E116", m.start(2), len(m[2]), what, "a unit, such as `5 px` or `3 px/s`")
+        return RecognisedError(
+            "E116", m.start(2), len(m[2]), what, "a unit, such as `5 px` or `3 px/s`"
+        )
     m = re.search(r"\b(for|within)\s+(\d+(?:\.\d+)?)(?![\d.]|[ ]*[^\W\d])", text)
     if m is not None:
         what = f"`{m[0]}` has no unit"
         expected = f"`s`, `min`, `ms` or `h`, such as `{m[1]} {m[2]} s`"
-        return Mistake("E116", m.start(2), len(m[2]), what, expected)
+        return RecognisedError("E116", m.start(2), len(m[2]), what, expected)
     return None
 
 
-def commas(text: str) -> Mistake | None:
+def commas(text: str) -> RecognisedError | None:
     """Commas missing between actors, or standing where none belongs."""
     m = re.search(rf"{NAME}[ ]*\([^()]*?({NAME})[ ]+({NAME})[^()]*\)", text)
     if m is not None:
         what = f"actors `{m[1]}` and `{m[2]}` are not parted by a comma"
         length = m.end(2) - m.start(1)
-        return Mistake("E117", m.start(1), length, what, f"`{m[1]}, {m[2]}`")
+        return RecognisedError("E117", m.start(1), length, what, f"`{m[1]}, {m[2]}`")
     m = re.search(r"\([^()]*?(,\s*)(?=[,)])|\(\s*(,)", text)
     if m is not None:
         start = m.start(1) if m[1] else m.start(2)
-        return Mistake("E117", start, 1, "no actor stands beside this comma", "an actor")
+        return RecognisedError("E117", start, 1, "no actor stands beside this comma", "an actor")
     m = re.search(r"[>)?*+]\s*(,|;(?=\s*[<\w]))", text)
     if m is not None and not re.search(r"\bany\s+order\b", text):
         what = f"`{m[1]}` between stages"
         hint = "what comes next simply follows; at the same time is `&`"
-        return Mistake("E119", m.start(1), 1, what, "the next stage", hint)
+        return RecognisedError("E119", m.start(1), 1, what, "the next stage", hint)
     return None
 
 
-def signs(text: str) -> Mistake | None:
+def signs(text: str) -> RecognisedError | None:
     """`begins when` and the like without a condition, or without `when`."""
     m = re.search(
         r"[>)?*+smh]\s+((?:begins|ends|progresses|fails|starts|stops)\b)(?!\s+when\b)", text
@@ -158,48 +166,48 @@ def signs(text: str) -> Mistake | None:
     if m is not None:
         meant = {"starts": "begins", "stops": "ends"}.get(m[1], m[1])
         what = f"`{m[1]}` is not followed by `when` and a condition"
-        return Mistake(
+        return RecognisedError(
             "E133", m.start(1), len(m[1]), what, f"`{meant} when touching(arm, satellite)`"
         )
     m = re.search(rf"\bwhen\b(?!\s+(?:not\b|\(|{NAME}\s*\())", text)
     if m is not None:
         what = "`when` is not followed by a condition"
         expected = "such as `when touching(arm, satellite) and not converging(arm, satellite)`"
-        return Mistake("E133", m.start(), 4, what, expected)
+        return RecognisedError("E133", m.start(), 4, what, expected)
     m = re.search(r"\b(starts|stops|succeeds|completes)\s+when\b", text)
     if m is not None:
         what = f"`{m[1]} when` is not part of the language"
         expected = "`begins when`, `ends when`, `progresses when` or `fails when`"
-        return Mistake("E133", m.start(1), len(m[1]), what, expected)
+        return RecognisedError("E133", m.start(1), len(m[1]), what, expected)
     return None
 
 
-def times(text: str) -> Mistake | None:
+def times(text: str) -> RecognisedError | None:
     """A number of times that is not complete, or written otherwise."""
     m = re.search(r"\b(for|within)\s+(at\s+(?:least|most))\b", text)
     if m is not None:
         what = f"`{m[1]}` already says that, without `{m[2]}`"
-        return Mistake("E115", m.start(2), len(m[2]), what, f"such as `{m[1]} 5 s`")
+        return RecognisedError("E115", m.start(2), len(m[2]), what, f"such as `{m[1]} 5 s`")
     m = re.search(r"\brepeat(?:ed|s)?\b(?!\s*[(>])", text)
     if m is not None:
         what = f"`{m[0]}` is not how repetitions are written"
         expected = "`?`, `*`, `+` or `at least 2 times at most 3 times`"
-        return Mistake("E134", m.start(), len(m[0]), what, expected)
+        return RecognisedError("E134", m.start(), len(m[0]), what, expected)
     m = re.search(r"\bat\s+(least|most)\b(?!\s+\d{1,6}\s+times?\b)", text)
     if m is not None:
         what = f"`at {m[1]}` is not followed by a whole number and `times`"
-        return Mistake("E134", m.start(), len(m[0]), what, f"`at {m[1]} 2 times`")
+        return RecognisedError("E134", m.start(), len(m[0]), what, f"`at {m[1]} 2 times`")
     m = re.search(r"[>)?*+]\s+((?:(?:exactly\s+)?\d+\s*(?:times?|x)|once|twice|thrice)\b)", text)
     if m is not None:
         what = f"`{m[1]}` is not how repetitions are written"
         word, number = m[1].split()[0], re.search(r"\d+", m[1])
         n = number[0] if number else {"once": "1", "twice": "2"}.get(word, "3")
         expected = f"`at least {n} times at most {n} times`"
-        return Mistake("E134", m.start(1), len(m[1]), what, expected)
+        return RecognisedError("E134", m.start(1), len(m[1]), what, expected)
     return None
 
 
-def any_order(text: str) -> Mistake | None:
+def any_order(text: str) -> RecognisedError | None:
     """`any order` without its list."""
     m = re.search(r"\b(?:in\s+)?any\s+order\b(?!\s*\([^()]*(?:\([^()]*\)[^()]*)*,)", text)
     m = m or re.search(r"\bin\s+any\s+order\b", text)
@@ -210,10 +218,10 @@ def any_order(text: str) -> Mistake | None:
         what = "`any order` needs at least two things, parted by commas"
     if m[0].startswith("in"):
         what = "`in` does not stand before `any order`"
-    return Mistake("E135", m.start(), len(m[0]), what, "`any order (<a>, <b>)`")
+    return RecognisedError("E135", m.start(), len(m[0]), what, "`any order (<a>, <b>)`")
 
 
-def joining_word(text: str) -> Mistake | None:
+def joining_word(text: str) -> RecognisedError | None:
     """`then`, `and` and the like between stages."""
     words = "and|then|or|with|next|followed"
     if re.search(r"\bwhen\b|^\s*(?:never|always)\b", text):
@@ -223,19 +231,21 @@ def joining_word(text: str) -> Mistake | None:
         return None
     hint = "in turn is `<a> <b>`, either is `<a> | <b>`, at the same time is `<a> & <b>`"
     what = f"`{m[1]}` between stages"
-    return Mistake("E119", m.start(1), len(m[1]), what, "the next stage, `|` or `&`", hint)
+    return RecognisedError("E119", m.start(1), len(m[1]), what, "the next stage, `|` or `&`", hint)
 
 
-def full_stop(text: str) -> Mistake | None:
+def full_stop(text: str) -> RecognisedError | None:
     """A rule that ends in `.` or `;`."""
     m = re.search(r"([.;])\s*$", text)
     if m is None:
         return None
     what = f"`{m[1]}` at the end of a rule"
-    return Mistake("E120", m.start(1), 1, what, hint="a rule ends where the next one begins")
+    return RecognisedError(
+        "E120", m.start(1), 1, what, hint="a rule ends where the next one begins"
+    )
 
 
-def repeat_in_front(text: str) -> Mistake | None:
+def repeat_in_front(text: str) -> RecognisedError | None:
     """A repetition mark that stands behind nothing, or twice."""
     m = re.search(r"(?:::=|[|&(])\s*([?*+])|([?*+])\s*([?*+])|\s([?*+])[ ]*(?=[<(\w])", text)
     if m is None:
@@ -244,13 +254,13 @@ def repeat_in_front(text: str) -> Mistake | None:
     mark = m[group]
     what = f"`{mark}` does not stand behind one thing that it repeats"
     expected = f"such as `<approach>{mark}` or `( ... ){mark}`"
-    return Mistake("E126", m.start(group), 1, what, expected)
+    return RecognisedError("E126", m.start(group), 1, what, expected)
 
 
-def mixed_names(text: str) -> Mistake | None:
+def mixed_names(text: str) -> RecognisedError | None:
     """A name that stands alone among actions and stages."""
     m = re.search(rf"(?<![<\w(,])[ ]+({NAME})(?=\s+(?:<|\(|{NAME}\s*[(<])|\s*[|&?*+])", text)
-    if m is None or m[1] in WORDS:
+    if m is None or m[1] in RESERVED_WORDS:
         return None
     start, what = m.start(1), f"`{m[1]}` stands alone: neither an action with actors nor a stage"
-    return Mistake("E103", start, len(m[1]), what, f"`<{m[1]}>` or `{m[1]}(...)`")
+    return RecognisedError("E103", start, len(m[1]), what, f"`<{m[1]}>` or `{m[1]}(...)`")

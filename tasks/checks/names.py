@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isinf
 
-from visup.tasks.actions.actions import Meaning
+from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault, did_you_mean
-from visup.tasks.diagnostics.recovery import Parsed
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, did_you_mean
+from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.conditions import Amount, Comparison, Name, Span, facts_of
-from visup.tasks.grammar.nodes import Actors, Course, Judged, Task, Timed, walk
+from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
 from visup.tasks.grammar.units import MEANT, SIZE, TIME, UNITS, dimension, units_of
 
 Asked = tuple[str, tuple[Name, ...], Span]
@@ -21,7 +21,7 @@ Asked = tuple[str, tuple[Name, ...], Span]
 
 
 @dataclass(frozen=True)
-class WordCheck:
+class NameCheck:
     """Checks of the words of a task.
 
     Attributes:
@@ -32,9 +32,9 @@ class WordCheck:
         asked: Every action that the file names.
     """
 
-    parsed: Parsed
+    parsed: ParsedFile
     source: Source
-    actions: Mapping[str, Meaning]
+    actions: Mapping[str, ActionDefinition]
     percepts: AnySet[str]
     asked: list[Asked]
 
@@ -52,12 +52,12 @@ class WordCheck:
     @cached_property
     def comparisons(self) -> list[Comparison]:
         """Every comparison of the file."""
-        signs = (s for c in self.courses if isinstance(c, Judged) for s in c.conditions)
+        signs = (s for c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in self.task.invariants]
         found = [c for c in self.courses if isinstance(c, Comparison)]
         return found + [f for c in conditions for f in facts_of(c) if isinstance(f, Comparison)]
 
-    def faults(self) -> Iterator[TaskFault]:
+    def faults(self) -> Iterator[Diagnostic]:
         """All faults of the words."""
         yield from self.amounts()
         yield from self.compared()
@@ -71,7 +71,7 @@ class WordCheck:
         for course in self.courses:
             if isinstance(course, Timed):
                 yield from ((c.duration, TIME) for c in course.clauses)
-            if isinstance(course, Judged):
+            if isinstance(course, Conditioned):
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
@@ -79,7 +79,7 @@ class WordCheck:
             meaning = self.actions.get(comparison.quantity.name)
             yield comparison.amount, meaning.measures if meaning else ""
 
-    def amounts(self) -> Iterator[TaskFault]:
+    def amounts(self) -> Iterator[Diagnostic]:
         """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
         for parameter in self.task.parameters:
             if parameter.amount.parameter:
@@ -101,7 +101,7 @@ class WordCheck:
             else:
                 yield from self.of_kind(known[amount.parameter], wanted, amount)
 
-    def amount(self, amount: Amount, wanted: str) -> Iterator[TaskFault]:
+    def amount(self, amount: Amount, wanted: str) -> Iterator[Diagnostic]:
         """What is wrong with one amount that is not a parameter."""
         if amount.unit not in UNITS:
             meant = MEANT.get(amount.unit.casefold())
@@ -122,7 +122,7 @@ class WordCheck:
         else:
             yield from self.of_kind(amount, wanted, amount)
 
-    def of_kind(self, amount: Amount, wanted: str, used: Amount) -> Iterator[TaskFault]:
+    def of_kind(self, amount: Amount, wanted: str, used: Amount) -> Iterator[Diagnostic]:
         """A fault when an amount does not measure what is wanted where it is used."""
         measured = dimension(amount)
         if wanted in _MEASURED and measured and measured != wanted:
@@ -132,7 +132,7 @@ class WordCheck:
             hint = "did you mean `min`?" if (wanted, amount.unit) == (TIME, "m") else None
             yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
 
-    def compared(self) -> Iterator[TaskFault]:
+    def compared(self) -> Iterator[Diagnostic]:
         """Quantities that are not compared, comparisons of what is none."""
         compared = {id(c.quantity.span) for c in self.comparisons}
         for name, _, span in self.asked:
@@ -147,7 +147,7 @@ class WordCheck:
                 some = sorted(m.name for m in self.actions.values() if m.measures)
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
-    def kinds(self) -> Iterator[TaskFault]:
+    def kinds(self) -> Iterator[Diagnostic]:
         """Zones where actors belong, and the other way round."""
         zones = {z.name for z in self.task.zones}
         for name, actors, _ in self.asked:
@@ -165,7 +165,7 @@ class WordCheck:
                     what = f"`{said}` is a zone, and `{name}` speaks of an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
 
-    def declared(self) -> Iterator[TaskFault]:
+    def declared(self) -> Iterator[Diagnostic]:
         """Names declared twice; those of actors alone are told elsewhere."""
         first: dict[str, str] = {a.name: "an actor" for a in self.task.actors}
         for kind, declared in (("a zone", self.task.zones), ("a parameter", self.task.parameters)):
@@ -175,7 +175,7 @@ class WordCheck:
                     yield self.source.fault("E224", what, one.span, "another name")
                 first.setdefault(one.name, kind)
 
-    def unused(self) -> Iterator[TaskFault]:
+    def unused(self) -> Iterator[Diagnostic]:
         """Zones and parameters that nothing uses; included files may offer more than is used."""
         if self.parsed.faults:
             return
@@ -187,7 +187,7 @@ class WordCheck:
                     what = f"{kind} `{one.name}` is declared but not used"
                     yield self.source.fault("E225", what, one.span)
 
-    def unobserved(self) -> Iterator[TaskFault]:
+    def unobserved(self) -> Iterator[Diagnostic]:
         """Actions that need percepts that will not be at hand, each told once."""
         told = set()
         for name, _, span in self.asked:

@@ -7,21 +7,21 @@ from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
 
-from visup.tasks.actions.actions import Meaning, contradict
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault
+from visup.tasks.actions.actions import ActionDefinition, contradict
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
-from visup.tasks.grammar.graphs import reach
+from visup.tasks.grammar.graphs import reachable
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
     AnyOrder,
+    Conditioned,
     Counted,
     Course,
     Deadline,
     Hold,
     Invariant,
-    Judged,
     Reference,
     Repeated,
     Task,
@@ -48,7 +48,7 @@ class CourseCheck:
 
     task: Task
     source: Source
-    actions: Mapping[str, Meaning]
+    actions: Mapping[str, ActionDefinition]
     whole: bool
     grammar: Grammar
 
@@ -58,7 +58,7 @@ class CourseCheck:
         bodies = [s.body for s in self.task.stages if not isinstance(s.body, Actors)]
         return [c for body in bodies for c in walk(body)]
 
-    def faults(self) -> Iterator[TaskFault]:
+    def faults(self) -> Iterator[Diagnostic]:
         """All faults of the courses."""
         yield from self.endless()
         yield from self.conditions()
@@ -68,9 +68,9 @@ class CourseCheck:
         yield from self.invariants()
         yield from self.repetitions()
 
-    def endless(self) -> Iterator[TaskFault]:
+    def endless(self) -> Iterator[Diagnostic]:
         """Stages that never begin or never end."""
-        begins = self.grammar.begin_with_themselves()
+        begins = self.grammar.left_recursive()
         for stage in begins:
             what = f"stage `<{stage.name}>` begins with itself and so never begins"
             hint = f"let something come first, such as `<try> | <try> <{stage.name}>`"
@@ -79,14 +79,14 @@ class CourseCheck:
             )
         if begins or not self.whole:
             return
-        for stage in self.grammar.never_end():
+        for stage in self.grammar.non_terminating():
             what = f"stage `<{stage.name}>` can never end"
             hint = f"offer a way out, such as `( ... <{stage.name}> )?` or `| ...`"
             yield self.source.fault(
                 "E207", what, stage.span, "a course without the stage itself", hint
             )
 
-    def clauses(self) -> Iterator[TaskFault]:
+    def clauses(self) -> Iterator[Diagnostic]:
         """Clauses said twice, that contradict each other, or that hold nothing."""
         for course in self.courses:
             if not isinstance(course, Timed):
@@ -99,18 +99,18 @@ class CourseCheck:
                     yield self.source.fault(
                         "E208", f"`{word}` is said twice", span, f"one `{word}`"
                     )
-            least = self.grammar.least_time(course)
+            least = self.grammar.min_duration(course)
             for deadline in deadlines[:1]:
                 if float("inf") > least > value(self.task.amount(deadline.duration)) > 0:
                     what = f"what takes at least {least:g} s cannot be over {deadline}"
                     yield self.source.fault("E208", what, deadline.span, "a longer `within`")
-            if holds and self.grammar.follows_on(course.item):
+            if holds and self.grammar.is_sequential(course.item):
                 what = f"`{holds[0]}` stands behind things that follow one another"
                 hint = "put `for` behind the one that must hold"
                 expected = "one action, or several at the same time"
                 yield self.source.fault("E216", what, holds[0].span, expected, hint)
 
-    def together(self) -> Iterator[TaskFault]:
+    def together(self) -> Iterator[Diagnostic]:
         """Actions that can never hold at the same time."""
         for course in self.courses:
             if not isinstance(course, Together):
@@ -135,7 +135,7 @@ class CourseCheck:
             return False
         return {str(x) for x in a.actors} == {str(x) for x in b.actors} and contradict(one, other)
 
-    def invariants(self) -> Iterator[TaskFault]:
+    def invariants(self) -> Iterator[Diagnostic]:
         """Invariants that the task itself breaks."""
         for invariant in self.task.invariants:
             meant = self.meant(invariant.during)
@@ -151,7 +151,7 @@ class CourseCheck:
         if not during:
             return self.grammar.stages.keys()
         known = [r.stage for r in during if r.stage in self.grammar.stages]
-        return reach(self.grammar.mentions, known)
+        return reachable(self.grammar.mentions, known)
 
     def breaks(self, invariant: Invariant, fact: Fact) -> bool:
         """Whether a stage that asks for something breaks an invariant."""
@@ -162,10 +162,10 @@ class CourseCheck:
             return (fact.name, {*fact.actors}) == (said.name, {*said.actors})
         return self.contradict(said, fact)
 
-    def conditions(self) -> Iterator[TaskFault]:
+    def conditions(self) -> Iterator[Diagnostic]:
         """Signs said twice, or that hold for nothing in particular."""
         for course in self.courses:
-            if not isinstance(course, Judged):
+            if not isinstance(course, Conditioned):
                 continue
             told: set[str] = set()
             for sign in course.conditions:
@@ -176,13 +176,13 @@ class CourseCheck:
                         "E235", what, sign.span, f"one `{sign.kind} when`", hint
                     )
                 told.add(sign.kind)
-                if sign.kind in ("begins", "ends") and self.grammar.follows_on(course.item):
+                if sign.kind in ("begins", "ends") and self.grammar.is_sequential(course.item):
                     what = f"`{sign.kind} when` stands behind things that follow one another"
                     hint = f"put it behind the one that {sign.kind} so"
                     expected = "one action, or several at the same time"
                     yield self.source.fault("E232", what, sign.span, expected, hint)
 
-    def counts(self) -> Iterator[TaskFault]:
+    def counts(self) -> Iterator[Diagnostic]:
         """Numbers of times that contradict each other, and orders that are too many."""
         for course in self.courses:
             if isinstance(course, Counted) and course.most is not None:
@@ -199,13 +199,13 @@ class CourseCheck:
                 expected = f"at most {MOST_IN_ANY_ORDER}"
                 yield self.source.fault("E234", what, course.span, expected, hint)
 
-    def repetitions(self) -> Iterator[TaskFault]:
+    def repetitions(self) -> Iterator[Diagnostic]:
         """Repetitions of what may be left out."""
         for course in self.courses:
             mark = "at least" if isinstance(course, Counted) else getattr(course, "mark", "?")
             if not isinstance(course, Repeated | Counted) or mark == "?":
                 continue
-            if self.grammar.may_be_left_out(course.item):
+            if self.grammar.nullable(course.item):
                 what = f"`{mark}` repeats what may be left out, so it has no end"
                 hint = "leave the `?` or `*` inside away"
                 yield self.source.fault("E215", what, course.span, hint=hint)

@@ -17,16 +17,16 @@ from typing import Any
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.model.errors import BehaviourError
-from visup.agent.plugins.settings import validated
+from visup.agent.plugins.settings import validate_settings
 
-Kind = Callable[..., object]
+Constructor = Callable[..., object]
 """A class of behaviours, or a function that makes one."""
 
 MODULE_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class BehaviourFactory:
     """Something that makes a behaviour.
 
     Attributes:
@@ -34,7 +34,7 @@ class Offer:
         where: Where it was found, for messages.
     """
 
-    kind: Kind
+    kind: Constructor
     where: str
 
     @property
@@ -60,7 +60,7 @@ class Offer:
             SettingsError: A setting is not as it should be.
         """
         name = self.contract.name if self.contract else getattr(self.kind, "__name__", "behaviour")
-        given = validated(self.settings, settings or {}, name)
+        given = validate_settings(self.settings, settings or {}, name)
         try:
             made = self.kind() if given is None else self.kind(given)
         except BehaviourError:
@@ -73,10 +73,12 @@ class Offer:
                 where=self.where,
                 expected=f"a class that is made with {takes}",
             ) from fault
-        return checked(made, self.where)
+        return as_behaviour(made, self.where)
 
 
-def load(where: str, settings: Mapping[str, Mapping[str, Any]] | None = None) -> list[Behaviour]:
+def load_behaviours(
+    where: str, settings: Mapping[str, Mapping[str, Any]] | None = None
+) -> list[Behaviour]:
     """Behaviours of a file or a module.
 
     Args:
@@ -88,10 +90,12 @@ def load(where: str, settings: Mapping[str, Mapping[str, Any]] | None = None) ->
         SettingsError: A setting is not as it should be.
     """
     values = settings or {}
-    return [o.make(values.get(o.contract.name) if o.contract else None) for o in offers(where)]
+    return [
+        o.make(values.get(o.contract.name) if o.contract else None) for o in find_factories(where)
+    ]
 
 
-def offers(where: str) -> list[Offer]:
+def find_factories(where: str) -> list[BehaviourFactory]:
     """What a file or a module offers.
 
     Raises:
@@ -108,10 +112,10 @@ def offers(where: str) -> list[Offer]:
             where=where,
             expected=f"one of: {', '.join(known)}" if known else "a class with a contract",
         )
-    return [Offer(getattr(module, name), where)]
+    return [BehaviourFactory(getattr(module, name), where)]
 
 
-def checked(made: object, where: str) -> Behaviour:
+def as_behaviour(made: object, where: str) -> Behaviour:
     """The same object, once it is known to be a behaviour.
 
     Raises:
@@ -124,7 +128,7 @@ def checked(made: object, where: str) -> Behaviour:
             expected="an attribute `contract = Contract(name, gives=(...))`",
         )
     perceive = getattr(made, "perceive", None)
-    expected = "perceive(self, frame, seen, directives) -> percepts"
+    expected = "perceive(self, frame, observation, directives) -> percepts"
     if not callable(perceive):
         raise BehaviourError(
             f"{type(made).__name__} has no method `perceive`", where=where, expected=expected
@@ -150,7 +154,7 @@ def module_name(path: Path) -> str:
     return f"visup_plugin_{path.stem}_{place}"
 
 
-def module_of(path: Path) -> ModuleType:
+def import_file(path: Path) -> ModuleType:
     """A file of behaviours, imported anew.
 
     Raises:
@@ -165,14 +169,14 @@ def module_of(path: Path) -> ModuleType:
     return module
 
 
-def _of_file(path: Path) -> list[Offer]:
+def _of_file(path: Path) -> list[BehaviourFactory]:
     if not path.is_file():
         raise BehaviourError(
             "there is no such file",
             where=str(path),
             expected="a Python file, or package.module:Class",
         )
-    module = _run(lambda: module_of(path), str(path))
+    module = _run(lambda: import_file(path), str(path))
     offered = [c for c in _own_classes(module) if hasattr(c, "contract")]
     if not offered:
         raise BehaviourError(
@@ -181,7 +185,7 @@ def _of_file(path: Path) -> list[Offer]:
             expected="a class with `contract = Contract(name, gives=(...))` and `perceive`",
             hint="visup behaviours new NAME writes a complete one",
         )
-    return [Offer(kind, str(path)) for kind in offered]
+    return [BehaviourFactory(kind, str(path)) for kind in offered]
 
 
 def _run(imported: Callable[[], ModuleType], where: str) -> ModuleType:

@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
-from visup.tasks.grammar.graphs import sorted_by_need
+from visup.tasks.grammar.graphs import dependencies_first
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
     AnyOrder,
     Choice,
+    Conditioned,
     Counted,
     Course,
     Hold,
-    Judged,
     Reference,
     Repeated,
     Sequence,
@@ -35,7 +35,7 @@ NOTHING = Action("", ())
 
 
 @dataclass(frozen=True)
-class AlikeCheck:
+class AmbiguityCheck:
     """Checks whether the stages of a task can be told apart.
 
     Attributes:
@@ -48,7 +48,7 @@ class AlikeCheck:
     source: Source
     grammar: Grammar
 
-    def faults(self) -> Iterator[TaskFault]:
+    def faults(self) -> Iterator[Diagnostic]:
         """One fault for each pair of neighbours that look the same."""
         for stage in self.grammar.stages.values():
             if isinstance(stage.body, Actors):
@@ -59,7 +59,7 @@ class AlikeCheck:
                 elif isinstance(course, Sequence):
                     yield from self.turns(course)
 
-    def options(self, choice: Choice) -> Iterator[TaskFault]:
+    def options(self, choice: Choice) -> Iterator[Diagnostic]:
         """Alternatives that ask for the same."""
         seen: dict[int, Course] = {}
         for option in choice.options:
@@ -71,7 +71,7 @@ class AlikeCheck:
             elif form is not None:
                 seen[form] = option
 
-    def turns(self, sequence: Sequence) -> Iterator[TaskFault]:
+    def turns(self, sequence: Sequence) -> Iterator[Diagnostic]:
         """Neighbours that ask for the same, without a `for` or a sign that parts them."""
         for before, after in zip(sequence.items, sequence.items[1:], strict=False):
             one, other = self.bare(before), self.bare(after)
@@ -80,7 +80,7 @@ class AlikeCheck:
                 hint = f"say it once, or how long the first lasts: `{before} for 5 s {after}`"
                 yield self.fault(what, after.span, hint)
 
-    def fault(self, what: str, span: Span, hint: str) -> TaskFault:
+    def fault(self, what: str, span: Span, hint: str) -> Diagnostic:
         """A fault at the place of a course."""
         return self.source.fault("E230", what, span, hint=hint)
 
@@ -93,7 +93,7 @@ class AlikeCheck:
         """Whether a `for` or a sign stands between a course and its only action."""
         for _ in range(DEEPEST):
             match course:
-                case Judged():
+                case Conditioned():
                     return True
                 case Timed(item=item, clauses=clauses):
                     if any(isinstance(c, Hold) for c in clauses):
@@ -123,7 +123,7 @@ class _Forms:
     def __init__(self, grammar: Grammar) -> None:
         self._numbers: dict[object, int] = {}
         self._stages: dict[str, int | None] = {}
-        for name in sorted_by_need(grammar.mentions):
+        for name in dependencies_first(grammar.mentions):
             body = grammar.stages[name].body
             course = Action(name, body.names) if isinstance(body, Actors) else body
             self._stages[name] = self.of(course)
@@ -141,7 +141,7 @@ class _Forms:
             return self._number((type(course).__name__, frozenset(inner)))
         if isinstance(course, Sequence):
             return self._number(tuple(inner))
-        if isinstance(course, Judged | Timed | Counted | Repeated):
+        if isinstance(course, Conditioned | Timed | Counted | Repeated):
             return self._number((replace(course, item=NOTHING), inner[0]))
         return None
 

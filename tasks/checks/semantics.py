@@ -13,35 +13,38 @@ from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
-from visup.tasks.actions.actions import ACTIONS, Meaning
-from visup.tasks.checks.check_ambiguity import AlikeCheck
-from visup.tasks.checks.check_courses import CourseCheck
-from visup.tasks.checks.check_names import WordCheck
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault, closest, did_you_mean
-from visup.tasks.diagnostics.recovery import Parsed
+from visup.tasks.actions.actions import ACTIONS, ActionDefinition
+from visup.tasks.checks.ambiguity import AmbiguityCheck
+from visup.tasks.checks.courses import CourseCheck
+from visup.tasks.checks.names import NameCheck
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, closest, did_you_mean
+from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
     Comparison,
+    Conditioned,
     Course,
-    Judged,
     Name,
     Reference,
     Span,
     Stage,
     walk,
 )
-from visup.tasks.grammar.statement import WORDS
+from visup.tasks.grammar.statement import RESERVED_WORDS
 
 MANY = 500  # so many names are not compared with one another
 ALIKE = 0.85  # two names that are so alike are taken to be meant as one
 
 
-def check(
-    parsed: Parsed, source: Source, actions: Mapping[str, Meaning], percepts: AnySet[str]
-) -> list[TaskFault]:
+def check_semantics(
+    parsed: ParsedFile,
+    source: Source,
+    actions: Mapping[str, ActionDefinition],
+    percepts: AnySet[str],
+) -> list[Diagnostic]:
     """All mistakes of meaning in what could be read of a file.
 
     Args:
@@ -55,14 +58,14 @@ def check(
     """
     if not parsed.task.stages:
         return []
-    return list(_Check(parsed, source, actions, percepts).faults())
+    return list(_Semantics(parsed, source, actions, percepts).faults())
 
 
 @dataclass(frozen=True)
-class _Check:
-    parsed: Parsed
+class _Semantics:
+    parsed: ParsedFile
     source: Source
-    actions: Mapping[str, Meaning]
+    actions: Mapping[str, ActionDefinition]
     percepts: AnySet[str]
 
     @cached_property
@@ -81,7 +84,7 @@ class _Check:
         """Every action that the file names, with its actors: (action, actors, place)."""
         task = self.parsed.task
         facts = [c for _, c in self.courses if isinstance(c, Action | Comparison)]
-        signs = (s for _, c in self.courses if isinstance(c, Judged) for s in c.conditions)
+        signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
         facts += [f for c in conditions for f in facts_of(c)]
         actions = map(action_of, facts)
@@ -98,7 +101,7 @@ class _Check:
         """Identities of the places of heads."""
         return {id(s.span) for s in self.parsed.task.stages}
 
-    def faults(self) -> Iterator[TaskFault]:
+    def faults(self) -> Iterator[Diagnostic]:
         yield from self.plain_lists()
         yield from self.reserved()
         yield from self.unknown_actions()
@@ -106,18 +109,18 @@ class _Check:
         yield from self.references()
         yield from self.twice()
         if not self.parsed.faults:
-            yield from self.unreached()
+            yield from self.unreachable()
             yield from self.slips()
             yield from self.idle_actors()
         whole = not (self.undefined or self.parsed.faults)
         yield from CourseCheck(
             self.parsed.task, self.source, self.actions, whole, self.grammar
         ).faults()
-        yield from WordCheck(
+        yield from NameCheck(
             self.parsed, self.source, self.actions, self.percepts, self.asked
         ).faults()
         if whole:
-            yield from AlikeCheck(self.parsed.task, self.source, self.grammar).faults()
+            yield from AmbiguityCheck(self.parsed.task, self.source, self.grammar).faults()
 
     def misread(self, stage: Stage) -> str:
         """What a plain list of names was meant to be when it is no action, or empty."""
@@ -136,7 +139,7 @@ class _Check:
     def defined(self) -> set[str]:
         return {s.name for s in self.parsed.task.stages}
 
-    def plain_lists(self) -> Iterator[TaskFault]:
+    def plain_lists(self) -> Iterator[Diagnostic]:
         for stage in self.parsed.task.stages:
             if not isinstance(stage.body, Actors):
                 continue
@@ -155,16 +158,16 @@ class _Check:
                     what = "stages are referred to without angle brackets"
                     yield self.source.fault("E220", what, stage.body.span, meant)
 
-    def reserved(self) -> Iterator[TaskFault]:
+    def reserved(self) -> Iterator[Diagnostic]:
         task = self.parsed.task
         named = [a for _, actors, _ in self.asked for a in actors]
         named += [Name(a.name, a.span) for a in task.declared]
         for name in named:
-            if str(name) in WORDS:
+            if str(name) in RESERVED_WORDS:
                 what = f"`{name}` is a word of the language"
                 yield self.source.fault("E123", what, name.span, "another name")
 
-    def unknown_actions(self) -> Iterator[TaskFault]:
+    def unknown_actions(self) -> Iterator[Diagnostic]:
         told = set()
         for name, _, span in self.asked:
             if name in self.actions or name in told:
@@ -183,7 +186,7 @@ class _Check:
     def is_head(self, span: Span) -> bool:
         return id(span) in self.heads
 
-    def actors_of_actions(self) -> Iterator[TaskFault]:
+    def actors_of_actions(self) -> Iterator[Diagnostic]:
         for name, actors, span in self.asked:
             meaning = self.actions.get(name)
             if meaning is None:
@@ -210,7 +213,7 @@ class _Check:
                 found.setdefault(r.stage, r)
         return found
 
-    def references(self) -> Iterator[TaskFault]:
+    def references(self) -> Iterator[Diagnostic]:
         defined = [s.name for s in self.parsed.task.stages]
         heads = self.headless()
         for name, reference in self.undefined.items():
@@ -236,7 +239,7 @@ class _Check:
                     found.setdefault(c.stage, c)
         return found
 
-    def twice(self) -> Iterator[TaskFault]:
+    def twice(self) -> Iterator[Diagnostic]:
         first: dict[str, Span] = {}
         for stage in self.parsed.task.stages:
             if stage.name in first:
@@ -252,7 +255,7 @@ class _Check:
                 yield self.source.fault("E212", what, actor.span, "`or` between its models", hint)
             declared.setdefault(actor.name, actor.span)
 
-    def unreached(self) -> Iterator[TaskFault]:
+    def unreachable(self) -> Iterator[Diagnostic]:
         if self.headless():
             return
         missing = {closest(u, self.grammar.stages) for u in self.undefined}
@@ -263,7 +266,7 @@ class _Check:
             for n in s.body.names
         }
         roots = self.parsed.task.roots
-        for stage in self.grammar.unreached():
+        for stage in self.grammar.unreachable():
             if stage.name not in missing | misread and not stage.span.file:
                 what = f"task `{roots[0]}` never comes to stage `<{stage.name}>`"
                 if len(roots) > 1:
@@ -271,7 +274,7 @@ class _Check:
                 hint = "refer to it from another stage, or take it out; the first rule is the task"
                 yield self.source.fault("E204", what, stage.span, hint=hint)
 
-    def slips(self) -> Iterator[TaskFault]:
+    def slips(self) -> Iterator[Diagnostic]:
         """Actors that are named once and look like another that is declared or named more often."""
         counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
         task = self.parsed.task
@@ -291,7 +294,7 @@ class _Check:
                         "E214", what, actor.span, hint=f"did you mean `{meant}`?"
                     )
 
-    def idle_actors(self) -> Iterator[TaskFault]:
+    def idle_actors(self) -> Iterator[Diagnostic]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
         for actor in self.parsed.task.actors:
             if actor.span.file or actor.name in named:

@@ -28,7 +28,7 @@ def _as_html(record: Any) -> str:
     return text
 
 
-def showing(*kinds: type) -> None:
+def enable_display(*kinds: type) -> None:
     """Let records of some kinds show themselves."""
     for kind in kinds:
         kind.__rich__ = _as_rich  # type: ignore[attr-defined]

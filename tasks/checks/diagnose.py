@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AnySet
 
-from visup.agent.model.errors import ManyErrors, TaskError, VisupError
-from visup.tasks.actions.actions import ALL_PERCEPTS, Meaning, known_actions
-from visup.tasks.checks.check import check
+from visup.agent.model.errors import ErrorGroup, TaskError, VisupError
+from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.files import read_beside
-from visup.tasks.diagnostics.diagnostic import Source, TaskFault
+from visup.tasks.checks.semantics import check_semantics
+from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.diagnostics.includes import Read, join_included
-from visup.tasks.diagnostics.normalise import clean
+from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import parse
 from visup.tasks.grammar.nodes import Task
 
 FOREIGN = ("E121", "E127")  # what is not this language at all need not be spelt well
 
 
-def examine(
+def diagnose(
     text: str,
     file: str = "<text>",
-    actions: Mapping[str, Meaning] | None = None,
+    actions: Mapping[str, ActionDefinition] | None = None,
     percepts: AnySet[str] = ALL_PERCEPTS,
     read: Read = read_beside,
-) -> tuple[Task, list[TaskFault]]:
+) -> tuple[Task, list[Diagnostic]]:
     """The tree of a text and all its mistakes.
 
     Args:
@@ -39,20 +39,20 @@ def examine(
         included files last; the tree may be used only when there are none.
     """
     source = Source(text, file)
-    cleaned, odd = clean(text, source)
+    cleaned, odd = normalise(text, source)
     parsed = join_included(parse(cleaned, source), source, read)
     foreign = {f.place.line for f in parsed.faults if f.code in FOREIGN}
     odd = [f for f in odd if f.place.line not in foreign]
     known = known_actions() if actions is None else actions
-    faults = [*odd, *parsed.faults, *check(parsed, source, known, percepts)]
+    faults = [*odd, *parsed.faults, *check_semantics(parsed, source, known, percepts)]
     if not faults and not any(not s.span.file for s in parsed.task.stages):
         expected = "a rule such as `<dock> ::= converging(arm, satellite)`"
-        faults = [TaskFault("E129", "there is no rule", source.place(1, 1), expected=expected)]
+        faults = [Diagnostic("E129", "there is no rule", source.place(1, 1), expected=expected)]
     order = {name: i for i, name in enumerate((file, *source.included))}
     return parsed.task, sorted(faults, key=lambda f: _order(f, order))
 
 
-def _order(fault: TaskFault, files: Mapping[str, int]) -> tuple[int, int, int, str]:
+def _order(fault: Diagnostic, files: Mapping[str, int]) -> tuple[int, int, int, str]:
     place = fault.place
     return files.get(place.file, 0), place.line, place.column, fault.code
 
@@ -68,4 +68,4 @@ def raise_all(faults: Sequence[TaskError]) -> None:
         raise faults[0]
     if faults:
         many: list[VisupError] = list(faults)
-        raise ManyErrors(many)
+        raise ErrorGroup(many)

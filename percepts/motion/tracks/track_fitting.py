@@ -1,0 +1,183 @@
+"""The motions of tracks, fitted to the constraints inside their outlines (the M step)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features.motion_constraints import Constraints
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.layers.affine import Affine, distances, fit_affine
+from visup.percepts.motion.layers.affine_rate import AffineRate
+from visup.percepts.motion.layers.background_motion import BackgroundMotion
+from visup.percepts.motion.layers.layer_discovery import affine_rate, layer_slack, median_motion
+from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
+from visup.percepts.motion.tracks.track import Indices, PartMotion, Track
+
+ALIKE_PX_S = 12.0  # pixels per second within which a part moves like what is hidden
+UNLIKE_PX_S = 8.0  # pixels per second by which a part may differ between baselines
+SHORT_S = 0.1  # baselines up to which noise on a few edges passes for motion, seconds
+PART_COST = 4.0  # squared distance that a further part of a track must save
+
+
+def fit_tracks(tracks: tuple[Track, ...], scene: FrameMeasurements) -> tuple[Track, ...]:
+    """Renew each track's motion from the constraints inside its outline."""
+    for m in scene.measured:
+        c = m.constraints
+        at = scene.owner[scene.cell_of(c)]
+        tracks = tuple(_fitted(t, m, at == k, scene.time) for k, t in enumerate(tracks, 1))
+    return tracks
+
+
+def moves_like(motion: PartMotion, other: Track) -> bool:
+    """Whether a part moves as a track did when it was last in full view."""
+    rate = motion.best_rate(other.centre)
+    if rate is None:
+        return False
+    gap = rate.velocity(other.centre) - np.asarray(other.unoccluded_velocity)
+    return bool(np.hypot(*gap) < ALIKE_PX_S + 0.2 * np.hypot(*other.unoccluded_velocity))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PartFit:
+    """A motion fitted to the constraints of one part.
+
+    Attributes:
+        model: Over the baseline of the constraints.
+        rate: The same per second.
+        constraints: N, those in the outline of the track.
+        weight: (N,) float32, 1 for those of the part.
+    """
+
+    model: Affine
+    rate: AffineRate
+    constraints: Constraints
+    weight: Floats
+
+    def renewed(self, part: PartMotion, least_share: float) -> PartMotion | None:
+        """The part with this rate; None when it rests on too few constraints to tell."""
+        if self.model.support < max(5.0, least_share * part.support):
+            return None
+        support = max(self.model.support, 0.99 * part.support)
+        return part.with_rate(self.constraints.lag, self.rate, support)
+
+
+def _fitted(t: Track, m: BaselineMotion, mine: NDArray[np.bool_], now: float) -> Track:
+    """A track whose parts each take the constraints that they explain best, and are fitted to them.
+
+    Args:
+        t: The track.
+        m: Motion over one baseline.
+        mine: (N,) bool, the constraints in its outline.
+        now: Seconds.
+    """
+    if not mine.any():
+        return t
+    c = m.constraints.take(np.flatnonzero(mine))
+    models = t.predicted(c.lag, c.span_s)
+    own, nearest = _assigned(t, models, c, m.background.distances(m.constraints)[mine])
+    # Of a part that is nearly occluded little is told: what was known is kept.
+    least_share = 0.6 if t.mostly_occluded else 0.0
+    parts: list[PartMotion] = []
+    for i, (part, start) in enumerate(zip(t.motions, models, strict=True)):
+        weight = (own & (nearest == i)).astype(np.float32)
+        fit = _fit_part(c, weight, start, t.centre, now, first=i == 0)
+        if i == 0:
+            parts.append(fit.renewed(part, least_share) or part)
+        elif (renewed := _further_part(t, part, fit, m.background, least_share)) is not None:
+            parts.append(renewed)
+    whole = t.whole_rate if len(parts) < 2 else _whole_rate(c, own, models[0], now) or t.whole_rate
+    return replace(t, motions=tuple(parts), whole_rate=whole)
+
+
+def _assigned(
+    t: Track, models: Sequence[Affine], c: Constraints, to_background: Floats
+) -> tuple[NDArray[np.bool_], Indices]:
+    """Which of N constraints may draw a track after them, (N,) bool; the part nearest to each, (N,)."""
+    off = np.stack([distances(model, c, layer_slack(model, t.centre)) for model in models])
+    # The first part comes first: an edge along the motion fits any part, and must not feed them.
+    off[1:] += PART_COST
+    # What the background explains, and no part does, must not draw the track after it.
+    # When that holds for most of it, it has stopped instead.
+    own = (off.min(axis=0) < 9) | (to_background > 4)
+    own = own if np.count_nonzero(own) > 0.5 * len(own) else np.ones_like(own)
+    return own, off.argmin(axis=0)
+
+
+def _fit_part(
+    c: Constraints,
+    weight: Floats,
+    start: Affine,
+    centre: tuple[float, float],
+    now: float,
+    *,
+    first: bool,
+) -> _PartFit:
+    fit = fit_affine(c, weight, start, slack=layer_slack(start, centre))
+    if first and fit.support < 0.5 * weight.sum():
+        # It may have stopped or turned: what most of its points do is tried as well.
+        other = fit_affine(c, weight, median_motion(c, np.flatnonzero(weight)), slack=0.3)
+        fit = other if other.support > fit.support else fit
+    return _PartFit(fit, affine_rate(fit, c, now), c, weight)
+
+
+def _further_part(
+    t: Track, part: PartMotion, fit: _PartFit, background: BackgroundMotion, least_share: float
+) -> PartMotion | None:
+    """A part besides the first, renewed or faded; None when it is given up.
+
+    One that has come to move as the background does is given up, lest the background be swallowed.
+    """
+    if _is_momentary(part, t.motions[0], fit.rate.time):
+        return None
+    c = fit.constraints
+    steady = _agrees_across_baselines(part, fit.rate, t.centre)
+    renewed = fit.renewed(part, least_share) if steady else None
+    if renewed is not None:
+        swallows = c.span_s > 0.3 and background.moves_as(fit.model, _middle_of(c, fit.weight))
+        return None if swallows else renewed
+    if steady and c.lag == 1:
+        return part
+    faded = replace(part, support=0.8 * part.support)
+    return faded if faded.support >= 4 else None
+
+
+def _whole_rate(
+    c: Constraints, own: NDArray[np.bool_], start: Affine, now: float
+) -> AffineRate | None:
+    """One shift for all parts together: what the edges of one leave open, those of others close."""
+    fit = fit_affine(c, own.astype(np.float32), start, rigidity=1e4, slack=0.5)
+    return affine_rate(fit, c, now) if fit.support >= 5 else None
+
+
+def _middle_of(c: Constraints, weight: Floats) -> tuple[float, float]:
+    """Where a part lies: a motion fitted there says little of other places."""
+    x, y = c.xy[weight > 0].mean(axis=0)
+    return float(x), float(y)
+
+
+def _is_momentary(part: PartMotion, first: PartMotion, now: float) -> bool:
+    """Whether a part is seen from frame to frame only, while the first is seen over longer too."""
+    longer = [r for r in first.rates.values() if r.span_s > SHORT_S and now - r.time < r.span_s]
+    return bool(longer) and all(r.span_s < SHORT_S for r in part.rates.values())
+
+
+def _agrees_across_baselines(
+    motion: PartMotion, rate: AffineRate, where: tuple[float, float]
+) -> bool:
+    """Whether a part moves over one baseline about as it does over the others.
+
+    A few edges fit any motion for a moment; a part that follows them explains whatever it meets.
+    """
+    rest = [r for r in motion.rates.values() if r.span_s != rate.span_s]
+    fresh = [r for r in rest if rate.time - r.time < 0.5 + 0.25 * r.span_s]
+    if not fresh:
+        return True
+    best = min(fresh, key=lambda r: r.sigma)
+    speed = best.velocity(where)
+    gap = float(np.hypot(*(rate.velocity(where) - speed)))
+    return gap < 3 * (rate.sigma + best.sigma) + 0.5 * float(np.hypot(*speed)) + UNLIKE_PX_S

@@ -1,0 +1,132 @@
+"""Tracks brought to the next frame: where they are expected, and the label shares that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from visup.agent.model.fast_replace import replace
+from visup.percepts.motion.features._superpixels_jit import carry_shares
+from visup.percepts.motion.features.superpixels import Superpixels
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.tracks.track import Track, Tracks
+
+PATH_S = 2.8  # how long the path of a track is remembered, seconds
+EVERY = 4  # of the pixels of a cell, one in so many is asked where it comes from
+FADE = 0.4  # share of the memory of where a track was that is left after a second
+
+
+def predict_tracks(
+    tracks: Tracks, flow: Floats, old: Superpixels, new: Superpixels, seconds: float
+) -> Tracks:
+    """Bring tracks to the next frame.
+
+    What is visible goes with the flow. Where it would be by its own motion is kept as well: if
+    another object turns up there, the track is hidden behind it. That map is moved by whole pixels,
+    so that it is not blurred by many small moves.
+
+    Args:
+        tracks: The tracks as of the frame before.
+        flow: (h, w, 2) float32, from the newest image back to the last.
+        old: Superpixels of the frame before.
+        new: Superpixels of the newest frame.
+        seconds: Between the two frames.
+
+    Returns:
+        The tracks as predicted for the newest image.
+    """
+    if not tracks:
+        return ()
+    before = [t.share for t in tracks]
+    before += [t.share if t.recent_share is None else t.recent_share for t in tracks]
+    shares = np.stack(before, axis=1).astype(np.float32, copy=False)
+    found = carry_shares(
+        old.labels, new.labels, flow, np.ascontiguousarray(shares), new.area, EVERY
+    )
+    moved = np.ascontiguousarray(found.T)
+    return tuple(
+        _predicted(t, share, np.float32(FADE**seconds) * recent, old, new, seconds)
+        for t, share, recent in zip(tracks, moved, moved[len(tracks) :], strict=False)
+    )
+
+
+def _predicted(
+    track: Track, share: Floats, recent: Floats, old: Superpixels, new: Superpixels, seconds: float
+) -> Track:
+    """A track where it is expected, given what of it and of its past comes to each superpixel."""
+    drift = np.asarray(track.pending_shift) + np.asarray(track.unoccluded_velocity) * seconds
+    pixels = np.round(drift)
+    rest = drift - pixels
+    step_xy = track.instant_velocity() * seconds
+    last = track.path[-1] if track.path else (track.initiated, 0.0, 0.0)
+    here = (last[0] + seconds, last[1] + float(step_xy[0]), last[2] + float(step_xy[1]))
+    path = tuple(p for p in track.path if here[0] - p[0] < PATH_S)
+    by = int(pixels[0]), int(pixels[1])
+    # Where an occluder comes, an object fades before it is hidden: what it still has counts.
+    body = track.share > 0.5
+    if track.core is not None:
+        body = body | track.core
+    whole = None
+    if track.occluded is None:
+        own = new.shifted(old, body, by)
+    else:
+        whole = shift_map(np.maximum(old.paint(body), track.occluded), *by)
+        own = new.mean(whole)
+    return replace(
+        track,
+        share=share,
+        recent_share=np.maximum(recent, share),
+        occluded=None if track.occluded is None else shift_map(track.occluded, *by),
+        predicted_share=own,
+        predicted_map=whole,
+        core=None,
+        path=(*(path or (last,)), here),
+        pending_shift=(float(rest[0]), float(rest[1])),
+    )
+
+
+def shift_map(image: Floats, dx: int, dy: int) -> Floats:
+    """An image moved by whole pixels, zeros coming in."""
+    if dx == 0 and dy == 0:
+        return image
+    matrix = np.array([[1, 0, dx], [0, 1, dy]], dtype=np.float64)
+    size = (image.shape[1], image.shape[0])
+    return np.asarray(cv2.warpAffine(image, matrix, size, flags=cv2.INTER_NEAREST))
+
+
+def label_priors(tracks: Sequence[Track], cells: Superpixels) -> Floats:
+    """Label shares expected in the newest image.
+
+    Args:
+        tracks: Carried tracks.
+        cells: Superpixels of the newest image.
+
+    Returns:
+        (count, K + 2) float32: background, each track, and unknown motion (zero).
+    """
+    out = np.zeros((cells.count, len(tracks) + 2), dtype=np.float32)
+    for k, track in enumerate(tracks, 1):
+        out[:, k] = track.share
+    for track in tracks:
+        if track.occluded is not None:
+            # An occluder is expected no further than its own motion takes it.
+            there = cells.mean(track.occluded) > 0.3
+            for k, other in enumerate(tracks, 1):
+                if other is not track and other.predicted_share is not None:
+                    out[there, k] = np.minimum(out[there, k], other.predicted_share[there])
+    free = np.clip(1 - out.sum(axis=1), 0, 1)
+    for k, track in enumerate(tracks, 1):
+        if track.occluded is not None:
+            # What was hidden is expected back where its occluder has gone.
+            out[:, k] += free * np.maximum(cells.mean(track.occluded) - out[:, k], 0)
+    out /= np.maximum(out.sum(axis=1, keepdims=True), 1)
+    out[:, 0] = np.clip(1 - out.sum(axis=1), 0, 1)
+    return sharpen(out)
+
+
+def sharpen(shares: Floats) -> Floats:
+    """Push label shares (count, K) towards their winner, lest beliefs fade by being carried."""
+    squared = shares * shares
+    return np.asarray(squared / np.maximum(squared.sum(axis=1, keepdims=True), 1e-6))

@@ -1,0 +1,101 @@
+"""What each operator does to single intervals, defined once.
+
+Compiled into the loops of `vm`, and called as it is by `monitor`, for which plain Python on two floats is
+faster than a call of compiled loops. An interval is a pair (low, high) of floats; `p` and `q` are the
+constants of an operation.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from visup.compiled import compiled
+
+Pair = tuple[float, float]
+
+
+@compiled
+def shifted(v: Pair, p: float, q: float) -> Pair:
+    """The interval plus two numbers: how far a quantity lies above a bound."""
+    return v[0] + p + q, v[1] + p + q
+
+
+@compiled
+def mirrored(v: Pair, p: float, q: float) -> Pair:
+    """Two numbers minus the interval: how far a quantity lies below a bound; 'not' when both are 0."""
+    return -v[1] + p + q, -v[0] + p + q
+
+
+@compiled
+def absolute(v: Pair, p: float, q: float) -> Pair:
+    """Of an interval that spans 0, all up to the farther bound."""
+    return max(max(v[0], -v[1]), 0.0), max(-v[0], v[1])
+
+
+@compiled
+def added(v: Pair, w: Pair, p: float) -> Pair:
+    """The sum; NaN becomes unknown."""
+    low, high = v[0] + w[0], v[1] + w[1]
+    return -inf if low != low else low, inf if high != high else high
+
+
+@compiled
+def subtracted(v: Pair, w: Pair, p: float) -> Pair:
+    """The difference; NaN becomes unknown."""
+    low, high = v[0] - w[1], v[1] - w[0]
+    return -inf if low != low else low, inf if high != high else high
+
+
+@compiled
+def compared(v: Pair, w: Pair, p: float) -> Pair:
+    """How far one quantity lies above another; `p` decides ties."""
+    low, high = v[0] - w[1], v[1] - w[0]
+    return (-inf if low != low else low) + p, (inf if high != high else high) + p
+
+
+@compiled
+def rate(v: Pair, w: Pair, p: float) -> Pair:
+    """The difference times a factor."""
+    low, high = v[0] - w[1], v[1] - w[0]
+    return (-inf if low != low else low) * p, (inf if high != high else high) * p
+
+
+@compiled
+def product(v: Pair, w: Pair, p: float) -> Pair:
+    """The product; 0 times infinity is 0."""
+    one = 0.0 if v[0] == 0.0 or w[0] == 0.0 else v[0] * w[0]
+    two = 0.0 if v[0] == 0.0 or w[1] == 0.0 else v[0] * w[1]
+    three = 0.0 if v[1] == 0.0 or w[0] == 0.0 else v[1] * w[0]
+    four = 0.0 if v[1] == 0.0 or w[1] == 0.0 else v[1] * w[1]
+    return min(min(one, two), min(three, four)), max(max(one, two), max(three, four))
+
+
+@compiled
+def quotient(v: Pair, w: Pair, p: float) -> Pair:
+    """The quotient; by an interval that holds 0, nothing is known of it."""
+    if w[0] <= 0.0 <= w[1]:
+        return -inf, inf
+    return product(v, (1.0 / w[1], 1.0 / w[0]), p)
+
+
+@compiled
+def recalled(v: Pair, kept: Pair, at: float, now: float, span: float) -> tuple[Pair, Pair, float]:
+    """The interval last known, while that is no older than `span`; what to retain, and of when.
+
+    Args:
+        v: The interval of this sample.
+        kept: The one that was known last.
+        at: When it was, microseconds.
+        now: Microseconds.
+        span: Microseconds.
+    """
+    if v[0] > -inf or v[1] < inf:
+        return v, v, now
+    return (kept if now - at <= span else v), kept, at
+
+
+@compiled
+def latched(enter: Pair, leave: Pair, entered: bool) -> tuple[Pair, bool]:
+    """A comparison with two thresholds: the second counts from when it is true to when it is false."""
+    v = leave if entered else enter
+    return v, v[0] > 0.0 or (entered and v[1] >= 0.0)

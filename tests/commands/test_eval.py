@@ -1,0 +1,39 @@
+"""The table of evaluations: every row can be run as it is written."""
+
+from __future__ import annotations
+
+import json
+from importlib import import_module
+from inspect import signature
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from visup.commands.eval.catalogue import EVALUATIONS, eval_app
+from visup.commands.eval.evaluation import Evaluation
+
+
+@pytest.mark.parametrize("evaluation", EVALUATIONS, ids=lambda e: e.name)
+def test_a_function_takes_what_its_command_gives(evaluation: Evaluation) -> None:
+    module, _, name = evaluation.function.partition(":")
+    given = [s.name for s in evaluation.settings]
+    given += [evaluation.argument.name] if evaluation.argument else []
+    signature(getattr(import_module(module), name)).bind(**dict.fromkeys([*given, "progress"]))
+
+
+def test_figures_are_shown_and_written(tmp_path: Path) -> None:
+    file = tmp_path / "figures.json"
+    words = ["relations", "--draws", "5", "--minutes", "0.1", "--json", str(file)]
+    done = CliRunner().invoke(eval_app(), words)
+    assert done.exit_code == 0, done.output
+    assert "of 5 random pairs, RCC-8 is wrong in 0, QTC in 0" in done.output
+    record = json.loads(file.read_text())
+    assert (record["settings"]["draws"], record["settings"]["minutes"]) == (5, 0.1)
+    assert "noise_px" in record["settings"]
+    assert record["items"]
+
+
+def test_a_folder_that_is_not_there_is_refused_at_once(tmp_path: Path) -> None:
+    done = CliRunner().invoke(eval_app(), ["motion", str(tmp_path / "nothing")])
+    assert "there is no such folder" in str(done.exception)

@@ -1,0 +1,220 @@
+"""Evaluations that need more than to be called with their options, and what is printed below their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+Figures = Mapping[str, Any]
+Progress = Callable[[str], None]
+
+
+def shapes_closing(figures: Figures) -> Iterator[str]:
+    """How many of the first ten neighbours are right, where that was counted."""
+    if ranks := figures["total"].get("ranks"):
+        yield "ranks 1 to 10: " + " ".join(str(r) for r in ranks)
+
+
+def clips(names: list[str] | None, cache: Path, progress: Progress) -> Figures:
+    """Rendered clips and their bars."""
+    from visup.commands.render import needs_renderer
+    from visup.evaluation.motion.rendered_clips import evaluate_clips
+
+    needs_renderer()
+    return evaluate_clips(cache, names or (), progress=progress)
+
+
+def clips_closing(figures: Figures) -> Iterator[RenderableType]:
+    """Each clip with what it missed, and how many pass."""
+    from visup.commands.eval.tables import clips_table
+
+    total = figures["total"]
+    yield clips_table(figures["items"])
+    yield f"{total['passed']} of {total['clips']} clips pass"
+
+
+def scale(folder: Path, views: int, seed: int, progress: Progress) -> Figures:
+    """Model databases that grow."""
+    from visup.evaluation.shape.scale import evaluate_scale
+
+    return evaluate_scale(folder, most=views, seed=seed, progress=progress)
+
+
+def scale_closing(figures: Figures) -> Iterator[str]:
+    """How fast views are built, and how cost grows with them."""
+    total = figures["total"]
+    yield (
+        f"built at {total['build_views_per_s']:.0f} views a second; "
+        f"ten times the views take {total['slower']:.2f} times as long"
+    )
+
+
+def views_closing(figures: Figures) -> Iterator[RenderableType]:
+    """Each condition, the time of a query, and what is hardest."""
+    from visup.commands.eval.tables import hardest_views, views_table
+
+    total = figures["total"]
+    yield views_table(total)
+    yield (
+        f"{total['ms_query']:.1f} ms a query, {total['compared']:.1%} of views compared, "
+        f"{total['build_views_per_s']:.0f} views built per second"
+    )
+    yield hardest_views(figures["items"])
+
+
+def reasoning(
+    folder: Path, *, merge: bool, long: int, progress: Progress, **settings: int
+) -> Figures:
+    """Reasoning alone; with `long` instead so many frames of a script, for memory and speed."""
+    if long:
+        from visup.evaluation.runtime.endurance import evaluate_endurance
+
+        return evaluate_endurance(long, progress=progress)
+    from visup.evaluation.reasoning.simulated_missions import evaluate_reasoning
+    from visup.evaluation.simulation.percepts import PerceptNoise
+
+    noise = PerceptNoise(merge_coupled=merge)
+    return evaluate_reasoning(folder, **settings, noise=noise, progress=progress)
+
+
+def reasoning_closing(figures: Figures) -> Iterator[RenderableType]:
+    """How far confidence in identities can be believed."""
+    from visup.commands.eval.tables import reliability_table
+
+    if "reliability" in figures["total"]:
+        yield reliability_table(figures)
+
+
+def relations_settings(given: dict[str, Any]) -> dict[str, Any]:
+    """The options of `visup eval relations`, and what is fixed."""
+    from visup.evaluation.reasoning.relations import settings_of_record
+
+    return {**given, **settings_of_record()}
+
+
+def relations_closing(figures: Figures) -> Iterator[str]:
+    """What the oracles found wrong."""
+    yield "of {draws} random pairs, RCC-8 is wrong in {rcc8_wrong}, QTC in {qtc_wrong}".format(
+        **figures["total"]
+    )
+
+
+def rules_closing(figures: Figures) -> Iterator[str]:
+    """That there was nothing to compare with."""
+    if not figures["total"]["rtamt"]:
+        yield "rtamt is not installed: nothing was compared with it (pip install rtamt)"
+
+
+def rules_differ(figures: Figures) -> bool:
+    """Whether any formula came out otherwise than the oracle says."""
+    return any(item.get("different") for item in figures["items"].values())
+
+
+def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Figures:
+    """Recognition of random tasks, with its bars."""
+    from visup.evaluation.reasoning.recognition import evaluate_recognition
+
+    figures, bars = evaluate_recognition(grammars, tasks, seed, progress)
+    return {"total": figures, "items": {}, "bars": bars}
+
+
+def recognition_closing(figures: Figures) -> Iterator[RenderableType]:
+    """All figures, and which bars are held."""
+    from visup.commands.eval.tables import totals_table
+
+    yield totals_table(figures)
+    for bar, held in figures["bars"].items():
+        yield f"{'held' if held else 'MISSED'}: {bar}"
+
+
+def tasks(count: int, seed: int, progress: Progress) -> Figures:
+    """Damaged task files, long ones, and a usual one."""
+    from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
+    from visup.tasks.checks.files import read_text
+
+    found = fuzz(count, seed)
+    times = {f"long_{name}_s": seconds(text) for name, text in long_files()}
+    times["usual_ms"] = 1000 * seconds(read_text("inspect"), 20)
+    total = {
+        "files": found.count,
+        "tracebacks": len(found.raised),
+        "without_place": len(found.placeless),
+        "layout_unstable": len(found.unstable),
+        "over_1_s": len(found.slow),
+        "slowest_s": round(found.slowest_s, 3),
+        "read_without_mistake": found.good,
+        "codes_given": len(found.codes),
+        **{name: round(value, 3) for name, value in times.items()},
+    }
+    seeds = {"without place": found.placeless[:10], "unstable": found.unstable[:10]}
+    failures = [f"seed {number}: {what}" for number, what in found.raised[:10]]
+    failures += [f"{name}: seeds {some}" for name, some in seeds.items() if some]
+    return {"total": total, "items": {}, "failures": failures, "failed": bool(found.failures)}
+
+
+def tasks_closing(figures: Figures) -> Iterator[RenderableType]:
+    """All figures, and the first failures."""
+    from visup.commands.eval.tables import totals_table
+
+    yield totals_table(figures)
+    yield from figures["failures"]
+
+
+def resume(kills: int, seed: int, demo: bool, progress: Progress) -> Figures:
+    """Runs that are killed and resumed."""
+    from visup.evaluation.runtime.resume import evaluate_resume
+    from visup.runs.demo import demo_settings
+
+    return evaluate_resume(
+        demo_settings(5) if demo else None,
+        kills=kills,
+        seed=seed,
+        state_every_s=4.0 if demo else 0.4,
+        progress=progress,
+    )
+
+
+def resume_failed(figures: Figures) -> bool:
+    """Whether a resumed run differed from the unbroken one, or lost anything."""
+    total = figures["total"]
+    return bool(total["equal"] < total["kills"] or total["lost"] > 0)
+
+
+def totals_closing(figures: Figures) -> Iterator[str]:
+    """Each total on a line of its own."""
+    for name, value in figures["total"].items():
+        yield f"{name}: {value:.6g}"
+
+
+def stepping_closing(figures: Figures) -> Iterator[str]:
+    """The totals, and the bars that were missed."""
+    from visup.evaluation.runtime.stepping import missed
+
+    yield from totals_closing(figures)
+    yield from missed(dict(figures))
+
+
+def stepping_failed(figures: Figures) -> bool:
+    """Whether a bar was missed."""
+    from visup.evaluation.runtime.stepping import missed
+
+    return bool(missed(dict(figures)))
+
+
+def failures_closing(form: str) -> Callable[[Figures], Iterator[str]]:
+    """The first failures, each in this form."""
+
+    def closing(figures: Figures) -> Iterator[str]:
+        for failure in figures["failures"][:20]:
+            yield form.format(**failure)
+
+    return closing
+
+
+def any_failures(figures: Figures) -> bool:
+    """Whether there were failures."""
+    return bool(figures.get("failed", figures.get("failures")))

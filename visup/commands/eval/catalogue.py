@@ -1,0 +1,293 @@
+"""The evaluations, a row for each; the commands of `visup eval` are made from this table."""
+
+from __future__ import annotations
+
+from inspect import Parameter
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from visup.commands.eval import adapters
+from visup.commands.eval.evaluation import Evaluation, folder_argument
+from visup.commands.options import Setting
+from visup.runs.settings import Option
+
+
+def _count(name: str, default: int | None, about: str, at_least: int | None = 1) -> Setting:
+    """A whole number."""
+    kind = int if default is not None else int | None
+    return Setting(name, kind, default, Option(about, at_least=at_least))
+
+
+def _flag(name: str, about: str) -> Setting:
+    return Setting(name, bool, False, Option(about, f"--{name}"))
+
+
+_FOLDER = folder_argument("Folder with the data and its ground truth.")
+_LIMIT = _count("limit", None, "Frames (or shapes) of each item, for a quick look.", None)
+_SEED = _count("seed", 0, "Of all that is drawn.", 0)
+_CLIP_NAMES = Parameter(
+    "names",
+    Parameter.KEYWORD_ONLY,
+    default=None,
+    annotation=Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="Which clips; all if none.")
+    ],
+)
+_ADAPTERS = "visup.commands.eval.adapters"
+
+EVALUATIONS = (
+    Evaluation(
+        "motion",
+        "Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.",
+        "visup.evaluation.motion.runner:evaluate_motion",
+        "segmenting",
+        ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio"),
+        (_LIMIT,),
+        _FOLDER,
+    ),
+    Evaluation(
+        "shapes",
+        "Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time.",
+        "visup.evaluation.shape.retrieval:evaluate_shapes",
+        "comparing",
+        ("nn1", "rank_sum", "bullseye", "ms_shape", "ms_pair", "compared", "lost"),
+        (_LIMIT,),
+        _FOLDER,
+        adapters.shapes_closing,
+    ),
+    Evaluation(
+        "missions",
+        "Whole missions: identity, events, stages, alerts, verdicts, speed.",
+        "visup.evaluation.missions.runner:evaluate_missions",
+        "supervising",
+        (
+            *("identity", "event_precision", "event_recall", "event_f1", "stage"),
+            *("failing_latency_s", "alerts_found", "alerts_expected", "false_alerts"),
+            *("false_alerts_per_hour", "verdicts_right", "verdicts", "verdict"),
+            *("view_deg", "spin_error", "fps"),
+        ),
+        (Setting("models", Path | None, None, Option("Model database.")), _LIMIT),
+        _FOLDER,
+    ),
+    Evaluation(
+        "health",
+        "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
+        "visup.evaluation.health.runner:evaluate_health",
+        "watching",
+        (
+            *("clips", "found", "named", "latency_s", "early"),
+            *("false_reports", "hours", "false_reports_per_hour", "ms"),
+        ),
+        (
+            _count("faults", 100, "How many faults are injected."),
+            _SEED,
+            _count("limit", None, "Frames of each video when it is run unharmed."),
+        ),
+        folder_argument("Folder with sound video anywhere below it."),
+    ),
+    Evaluation(
+        "clips",
+        """Rendered clips of what footage lacks: pan, shake, zoom, stops, eclipse ...
+
+        Each has a bar. Exit code 1 when a clip misses its bar.
+        """,
+        f"{_ADAPTERS}:clips",
+        "rendering and segmenting",
+        (),
+        (Setting("cache", Path, Path("runs/clips"), Option("Folder for the rendered clips.")),),
+        _CLIP_NAMES,
+        adapters.clips_closing,
+        lambda figures: figures["total"]["passed"] < figures["total"]["clips"],
+        lambda given: {"clips": given["names"] or "all"},
+    ),
+    Evaluation(
+        "scale",
+        "Model databases that grow: opening, answering, memory, and what the index loses.",
+        f"{_ADAPTERS}:scale",
+        "growing",
+        (
+            *("open_ms", "first_ms", "ms_query", "ms_search", "ms_cpu"),
+            *("ms_worst", "rss_mb", "compared", "lost"),
+        ),
+        (_count("views", 100_000, "Views of the largest database."), _SEED),
+        folder_argument("Folder of meshes (*.ply)."),
+        adapters.scale_closing,
+    ),
+    Evaluation(
+        "robustness",
+        "Damaged database files and odd masks: a clear error, an answer or nothing, within a second.",
+        "visup.evaluation.shape.robustness:evaluate_robustness",
+        "damaging",
+        ("trials", "refused", "answered", "nothing", "failed", "worst_s"),
+        (
+            _count("files", 2000, "How many damaged database files.", 0),
+            _count("masks", 2000, "How many odd masks.", 0),
+            _SEED,
+        ),
+        closing=adapters.failures_closing("{kind}, number {number}: {what}, {seconds:.2f} s"),
+        failed=adapters.any_failures,
+    ),
+    Evaluation(
+        "views",
+        "Views from unseen directions: clean, with contour noise, cut by a border, both.",
+        "visup.evaluation.shape.view_recognition:evaluate_views",
+        "recognising",
+        (),
+        (
+            _count("views", 32, "Views of each mesh in the database."),
+            _count("queries", 12, "Silhouettes asked for of each mesh."),
+            _count("seed", 0, "Of the queries.", 0),
+            _count("limit", None, "Meshes, for a quick look."),
+        ),
+        folder_argument("Folder of mesh files."),
+        adapters.views_closing,
+    ),
+    Evaluation(
+        "faults",
+        """Faults put into behaviours: every run ends, every fault is told, nothing unknown reads fine.
+
+        Exit code: 0 when that is so, else 1.
+        """,
+        "visup.evaluation.runtime.behaviour_faults:evaluate_faults",
+        "injecting",
+        ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
+        (_count("count", 1000, "How many faults are injected."), _SEED),
+        closing=adapters.failures_closing("number {number}, {fault} in '{kind}': {problem}"),
+        failed=adapters.any_failures,
+    ),
+    Evaluation(
+        "relations",
+        "Relations of boxes: frames per second, changes of what rests, drift, oracles.",
+        "visup.evaluation.reasoning.relations:evaluate_relations",
+        "judging",
+        ("fps", "fps_cpu", "plain_fps", "ratio", "changes", "seen_s"),
+        (
+            _count("draws", 10_000, "Random pairs for the oracles."),
+            Setting("minutes", float, 10.0, Option("How long boxes rest.", at_least=0.1)),
+            _SEED,
+        ),
+        closing=adapters.relations_closing,
+        recorded=adapters.relations_settings,
+    ),
+    Evaluation(
+        "rules",
+        "Rules over time: equal to an oracle and to rtamt, cost of windows, of rules, of snapshots.",
+        "visup.evaluation.reasoning.rules:evaluate_rules",
+        "judging",
+        (
+            *("formulas", "samples", "online", "different", "us", "samples_per_s", "times_rtamt"),
+            *("rules", "ms", "concerns", "kept", "kb_each", "slower"),
+        ),
+        (_count("formulas", 10_000, "How many random formulas.", 10), _SEED),
+        closing=adapters.rules_closing,
+        failed=adapters.rules_differ,
+    ),
+    Evaluation(
+        "reasoning",
+        "Reasoning alone, on percepts made from the truth with noise: identity, events, verdicts.",
+        f"{_ADAPTERS}:reasoning",
+        "reasoning",
+        (
+            *("identity", "event_precision", "event_recall", "event_f1", "false_coupled"),
+            *("false_exit", "ece", "spin_error", "stage", "failing_latency_s", "alerts_found"),
+            *("alerts_expected", "false_alerts", "verdicts_right", "verdicts"),
+            # Of a long script:
+            *("frames", "ms", "ms_ten", "rss_mb", "grown", "snapshot_kb"),
+        ),
+        (
+            _count("seeds", 20, "Runs of each mission."),
+            _count("first", 0, "The first seed.", 0),
+            _count("every", 1, "Use every n-th frame."),
+            _count("jobs", 2, "Processes."),
+            _flag("merge", "Coupled objects are seen as one region."),
+            _count("long", 0, "Instead: so many frames of a script, for memory and speed.", 0),
+        ),
+        folder_argument("A mission, or a folder of missions."),
+        adapters.reasoning_closing,
+        recorded=lambda given: {k: v for k, v in given.items() if k != "jobs"},
+    ),
+    Evaluation(
+        "tasks",
+        "Damage task files and read them; time long files and a usual one.",
+        f"{_ADAPTERS}:tasks",
+        "damaging",
+        (),
+        (
+            _count("count", 100_000, "How many damaged files are read.", 0),
+            _count("seed", 0, "Seed of the first; one more for each file.", None),
+        ),
+        closing=adapters.tasks_closing,
+        failed=adapters.any_failures,
+    ),
+    Evaluation(
+        "recognition",
+        "Recognise random tasks: as the exact oracle does, seen badly, and fast.",
+        f"{_ADAPTERS}:recognition",
+        "recognising",
+        (),
+        (
+            _count("grammars", 2_000, "Small grammars compared with the exact oracle."),
+            _count("tasks", 20, "Tasks of 30 stages that are followed."),
+            _count("seed", 0, "Seed of the first; one more for each.", None),
+        ),
+        closing=adapters.recognition_closing,
+        failed=lambda figures: not all(figures["bars"].values()),
+    ),
+    Evaluation(
+        "resume",
+        "Kill runs with SIGKILL, resume them, and compare them with an unbroken run.",
+        f"{_ADAPTERS}:resume",
+        "killing",
+        ("kills", "early", "resumed", "equal", "lost", "resume_s"),
+        (
+            _count("kills", 200, "How many runs are killed."),
+            _count("seed", 0, "Of the moments.", 0),
+            _flag("demo", "Kill runs of the shipped clip."),
+        ),
+        closing=lambda figures: iter(figures["failures"]),
+        failed=adapters.resume_failed,
+    ),
+    Evaluation(
+        "soak",
+        "A run of hours of scripted percepts: time of a step and memory at its start and end.",
+        "visup.evaluation.runtime.soak:evaluate_soak",
+        "soaking",
+        ("ms", "rss_mb"),
+        (_count("frames", 200_000, "Length of the run.", None),),
+        closing=adapters.totals_closing,
+    ),
+    Evaluation(
+        "stepping",
+        "Going back by 500 steps: its time, the memory that it takes, and whether it leads to the same.",
+        "visup.evaluation.runtime.stepping:evaluate_stepping",
+        "stepping",
+        ("median_ms", "most_ms"),
+        (
+            _count("steps", 10_000, "How many are made and kept.", None),
+            _count("seed", 0, "Of the places to go back from.", 0),
+        ),
+        closing=adapters.stepping_closing,
+        failed=adapters.stepping_failed,
+    ),
+    Evaluation(
+        "pace",
+        "The time of a step without perception, of replay and observers, and what a kept mind takes.",
+        "visup.evaluation.runtime.pace:evaluate_pace",
+        "stepping",
+        ("ms", "ms_low", "think_ms", "alerts", "observers", "replay_fps", "mind_kb"),
+        (
+            _count("steps", 2000, "Length of each script.", None),
+            _count("kept", 10_000, "Minds that are kept in a row.", 100),
+        ),
+    ),
+)
+
+
+def eval_app() -> typer.Typer:
+    """The commands of `visup eval`."""
+    app = typer.Typer(no_args_is_help=True)
+    for evaluation in EVALUATIONS:
+        app.command(evaluation.name)(evaluation.command())
+    return app

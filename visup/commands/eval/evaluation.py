@@ -1,0 +1,122 @@
+"""An evaluation as a command: its options, its run, its table, its file of figures, its exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib import import_module
+from inspect import Parameter, Signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from visup.commands.options import Given, Setting
+from visup.runs.settings import Option
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+Figures = Mapping[str, Any]
+"""With `items` by name, and `total`; others are for the file."""
+
+JSON = Setting(
+    "json_file", Path | None, None, Option("Write the figures to this file too.", "--json")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """One command of `visup eval`.
+
+    Attributes:
+        name: Of the command.
+        about: What it measures: its help.
+        function: What computes the figures, 'module:function'; called with the argument, the settings and
+            `progress`.
+        verb: What is said to be done while it runs.
+        keys: Figures that make columns of the table, in order; none for an evaluation that draws its own.
+        settings: Its options.
+        argument: What stands without an option, or None.
+        closing: What is printed after the table, from the figures.
+        failed: Whether the exit code is 1, from the figures.
+        recorded: What the file of figures says of the settings; all of them by default.
+    """
+
+    name: str
+    about: str
+    function: str
+    verb: str
+    keys: tuple[str, ...] = ()
+    settings: tuple[Setting, ...] = ()
+    argument: Parameter | None = None
+    closing: Callable[[Figures], Iterator[RenderableType]] = field(default=lambda _: iter(()))
+    failed: Callable[[Figures], bool] = field(default=lambda _: False)
+    recorded: Callable[[Given], Given] = field(default=dict)
+
+    def command(self) -> Callable[..., None]:
+        """What typer makes a command of."""
+
+        def run(json_file: Path | None, **given: Any) -> None:
+            self._run(json_file, given)
+
+        run.__doc__ = self.about
+        parameters = [self.argument] if self.argument else []
+        parameters += [s.parameter() for s in (*self.settings, JSON)]
+        run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {}
+        return run
+
+    def _run(self, json_file: Path | None, given: Given) -> None:
+        from rich.console import Console
+
+        from visup.commands.eval.tables import figures_table
+        from visup.evaluation.record import write_record
+
+        folder = given.get("folder")
+        _check_paths(folder, json_file)
+        module, _, function = self.function.partition(":")
+        with _progress_line(self.verb) as progress:
+            figures = getattr(import_module(module), function)(**given, progress=progress)
+        console = Console(highlight=False)
+        if self.keys:
+            title = f"{self.name}: {folder}" if folder else self.name
+            console.print(figures_table(title, figures, self.keys))
+        for text in self.closing(figures):
+            console.print(text, soft_wrap=isinstance(text, str), markup=False)
+        if json_file:
+            settings = {k: v for k, v in given.items() if k != "folder"}
+            write_record(json_file, figures, self.recorded(settings))
+        if self.failed(figures):
+            raise typer.Exit(1)
+
+
+def folder_argument(about: str) -> Parameter:
+    """The argument of an evaluation that reads a folder."""
+    annotation = Annotated[Path, typer.Argument(help=about)]
+    return Parameter("folder", Parameter.KEYWORD_ONLY, annotation=annotation)
+
+
+def _check_paths(folder: Path | None, json_file: Path | None) -> None:
+    """Refuse what cannot work before an evaluation of minutes begins.
+
+    Raises:
+        SettingsError: The folder does not exist.
+        OutputError: The folder of the file for the figures does not exist.
+    """
+    from visup.agent.model.errors import OutputError, SettingsError
+
+    if folder is not None and not folder.is_dir():
+        raise SettingsError("there is no such folder", where=str(folder))
+    if json_file and not json_file.absolute().parent.is_dir():
+        raise OutputError("its folder does not exist", where=str(json_file))
+
+
+@contextmanager
+def _progress_line(verb: str) -> Iterator[Callable[[str], None]]:
+    """A line on standard error that says what is being done, replaced as items are done."""
+    from rich.console import Console
+
+    with Console(stderr=True).status(verb) as status:
+        yield lambda text: status.update(f"{verb}: {text}")
