@@ -249,14 +249,8 @@ def touching_at(depths: dict[int, tuple[str, float]], expected: bool) -> set[str
         ]
         return seen(i, boxes, names=NAMES, depths=depths)
 
-<<<<<<< HEAD
     thoughts = reason((approach(i) for i in range(110)), task)
-    return {c.kind for t in thoughts for c in t.concerns}
-=======
-    rules = default_reasoners()
-    thoughts = think((*rules.update, *rules.cogitate, task), (approach(i) for i in range(110)))
     return {c.kind for t in thoughts for c in t.conditions}
->>>>>>> evaluation
 
 
 def test_contact_is_told_where_depths_agree_and_no_task_brought_the_two_together() -> None:

@@ -74,13 +74,8 @@ def test_rules_that_serve_two_agents_by_turns_tell_each_what_they_tell_it_alone(
     together = [think(shared, s) for s in scripts]
     by_turns = list(zip(*together, strict=True))
     for k, script in enumerate(scripts):
-<<<<<<< HEAD
         alone = reason(script)
-        assert [t[k].concerns for t in by_turns] == [t.concerns for t in alone]
-=======
-        alone = run(script)
         assert [t[k].conditions for t in by_turns] == [t.conditions for t in alone]
->>>>>>> evaluation
 
 
 def test_closing_in_is_a_collision_course_where_no_task_wants_it() -> None:
@@ -154,13 +149,8 @@ def test_a_concern_ends_with_its_cause_after_the_hold() -> None:
     stops = (o for o in closing(3.0))
     last = list(closing(3.0))[-1].of("region")
     still = (seen(i, last, names=NAMES) for i in range(75, 250))
-<<<<<<< HEAD
     thoughts = reason([*stops, *still])
-    until = max(t.mind.time for t in thoughts if t.concerns)
-=======
-    thoughts = run([*stops, *still])
     until = max(t.mind.time for t in thoughts if t.conditions)
->>>>>>> evaluation
     assert 4.0 < until < 8.0
 
 
