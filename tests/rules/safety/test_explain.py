@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.oracles.reasoning.rule_scenes import minds, twenty_rules
 from tests.rules.runs import Thought, reason
 from tests.rules.safety.test_reasoner import NAMES, believed
 from tests.rules.scenes import box_region, seen
@@ -16,7 +17,6 @@ from visup.agent import Binding, Expectation, Mind, Observation, Outcome, TaskBe
 from visup.agent.model.errors import RuleError
 from visup.agent.model.mind import Pose, Spin, Zone
 from visup.cli import app
-from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES

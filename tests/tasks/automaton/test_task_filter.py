@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.oracles.reasoning.recognition import compare, follow
 from tests.oracles.recognition_tasks import Draw, text_of
 from visup.agent import Status
-from visup.evaluation.reasoning.recognition import compare, follow
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.derivatives import TaskStep
 from visup.tasks.automaton.stage_hmm import DEFAULT_HMM, ActionStatus, PhaseKind, StageHmm
