@@ -4,15 +4,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test check oracles bench clean
+.PHONY: setup demo test check oracles bench docs clean
 
 setup: $(STAMP)
 
+# The plain way of an editable install (a path, no import hook) is what type checkers and editors can follow.
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "visup needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
+	  --config-settings editable_mode=compat -e '.[dev]'
 	touch $@
 
 demo: setup
@@ -22,6 +24,7 @@ test: setup
 	$(BIN)/python -m pytest -n 2
 
 check: setup
+	@! git grep -InE '^(<{7}|>{7}|[|]{7})( |$$)' || { echo 'Conflict markers: resolve the merges named above.'; exit 1; }
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -33,6 +36,11 @@ oracles: setup
 bench: setup
 	$(BIN)/python -m visup.evaluation.bench
 
+# The documentation as a site in site/; every warning is an error.
+docs: setup
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo 'Documentation: site/index.html'
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info demo-run runs .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) build dist site *.egg-info demo-run runs .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

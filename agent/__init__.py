@@ -20,30 +20,20 @@ from visup.agent.contract.phases import Phase, Snapshot
 from visup.agent.contract.saving import Saveable
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
-from visup.agent.model.mind import (
-    Binding,
+from visup.agent.model.events import Alert, AlertCondition, Directive, Event, Severity
+from visup.agent.model.memory import MemoryKey
+from visup.agent.model.mind import Mind, Zone
+from visup.agent.model.object_beliefs import (
     Candidate,
     Coupling,
-    Expectation,
-    Mind,
     ObjectBelief,
     Pose,
     Presence,
-    Prospect,
     Question,
     Spin,
-    StageBelief,
-    Status,
-    TaskBelief,
-    Verdict,
-    Zone,
 )
 from visup.agent.model.records import (
-    Alert,
-    AlertCondition,
     Depth,
-    Directive,
-    Event,
     Frame,
     Health,
     HealthStatus,
@@ -54,12 +44,20 @@ from visup.agent.model.records import (
     Region,
     Report,
     ReportState,
-    Severity,
     Truth,
 )
 from visup.agent.model.relation_columns import Column, Relation
 from visup.agent.model.relation_table import RelationTable
 from visup.agent.model.step import Step
+from visup.agent.model.task_beliefs import (
+    Binding,
+    Expectation,
+    Prospect,
+    StageBelief,
+    Status,
+    TaskBelief,
+    Verdict,
+)
 
 if TYPE_CHECKING:
     from visup.agent.cycle.agent import Agent, Reasoners
@@ -92,6 +90,7 @@ __all__ = [
     "HealthStatus",
     "Hypothesis",
     "Limits",
+    "MemoryKey",
     "Mind",
     "ObjectBelief",
     "Observation",

@@ -1,4 +1,4 @@
-"""What is dear runs only where it is called: a closer look while two things are near each other."""
+"""An expensive behaviour runs only when it is called: a closer look while two things are near each other."""
 
 from __future__ import annotations
 

@@ -19,15 +19,8 @@ from scipy.spatial.distance import pdist
 
 from visup.agent.contract.behaviour import Contract
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.records import (
-    Depth,
-    Directive,
-    Frame,
-    Hypothesis,
-    Observation,
-    Percept,
-    Region,
-)
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Depth, Frame, Hypothesis, Observation, Percept, Region
 from visup.percepts.shape.database.model_database import ModelDatabase
 
 FOV_VERTICAL_DEG = 40.0

@@ -12,7 +12,7 @@ from visup.rules.identity.questions import QuestionReasoner, QuestionSettings
 from visup.rules.identity.votes import IdentityReasoner, VoteSettings
 from visup.rules.language.parser import shipped_rules
 from visup.rules.pose.reasoner import PoseReasoner, PoseSettings
-from visup.rules.presence.association import ObjectReasoner, ObjectSettings
+from visup.rules.presence.objects import ObjectReasoner, ObjectSettings
 from visup.rules.presence.reasoner import PresenceReasoner, PresenceSettings
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import RelationReasoner

@@ -39,6 +39,19 @@ def test_the_links_lead_to_the_folders(part: str) -> None:
     assert link.readlink() == Path("..") / part
 
 
+def test_no_file_holds_the_markers_of_a_merge() -> None:
+    made = subprocess.run(
+        ["git", "grep", "-InE", r"^(<{7}|>{7}|[|]{7})( |$)"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if made.returncode == 128:
+        pytest.skip("not a git checkout")
+    assert made.stdout == ""
+
+
 def test_pinned_versions_name_no_registry() -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     assert lines

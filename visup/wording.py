@@ -15,3 +15,12 @@ def worded_once(events: Sequence[Event]) -> list[Event]:
         if held is None or event.severity > held.severity:
             gravest[event.text] = event
     return list(gravest.values())
+
+
+def prose(text: str) -> str:
+    """A sentence as people read it: names of tasks and stages in quotes.
+
+    >>> prose("Stage `captured` is failing.")
+    "Stage 'captured' is failing."
+    """
+    return text.replace("`", "'")

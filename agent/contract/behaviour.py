@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from visup.agent.contract.contract import Contract
+from visup.agent.model.events import AlertCondition, Directive, Event
 from visup.agent.model.mind import Mind
-from visup.agent.model.records import AlertCondition, Directive, Event, Frame, Observation, Percept
+from visup.agent.model.records import Frame, Observation, Percept
 
 __all__ = ["Behaviour", "Contract", "Outcome", "Reasoner"]
 
@@ -60,4 +61,4 @@ class Outcome:
 
 Reasoner = Callable[[Mind, Observation], Outcome]
 """A pure function of the mind and of what was observed. It keeps nothing to itself: what it must
-remember goes into `Mind.memory` under its own name, so that minds can be kept and restored."""
+remember goes into the mind under its own `MemoryKey`, so that minds can be saved and restored."""

@@ -59,7 +59,7 @@ class Contract:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise BehaviourError(
-                f"{self.name!r} is no name for a behaviour",
+                f"{self.name!r} is not a valid name for a behaviour",
                 where="contract",
                 expected="a word of letters, digits and underscores, such as 'lamp'",
             )

@@ -6,7 +6,7 @@ The policy, in one place:
   `hang_s`, which is so long that only a hang reaches it, even where others keep the machine or its disk
   busy; the same frames give the same steps.
 - *Budgets are asked for* (`budgets=True`), when frames come in real time: then a run that takes
-  longer than its contract's `cost_ms` is given up, and what it gives is unknown in that step.
+  longer than its contract's `cost_ms` is given up, and its output is unavailable in that step.
 - *Within the process* a run goes to a thread that serves this behaviour alone. The step waits for it
   no longer than the limit. Python cannot kill a thread: one that was given up is asked to stop, which
   stops Python code but not code that is stuck in a library; the behaviour counts as late until it

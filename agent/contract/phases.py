@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from visup.agent.model.events import Directive
 from visup.agent.model.mind import NO_ANSWERS, Mind
-from visup.agent.model.records import Directive
 
 
 class Phase(StrEnum):
@@ -17,6 +17,7 @@ class Phase(StrEnum):
     UPDATE = "update"
     COGITATE = "cogitate"
     MATCH = "match"
+    ATTEND = "attend"
     ACT = "act"
 
 

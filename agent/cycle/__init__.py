@@ -1,4 +1,4 @@
-"""The cogitation-action cycle: perceive, update, cogitate, match, act.
+"""The cogitation-action cycle: perceive, update, cogitate, match, attend, act.
 
 Read `agent.py` (the cycle on one screen), `outcomes.py` (conclusions of reasoners are merged),
 `alerts.py` (alerts open and close) and `answers.py` (what the operator says becomes a fact).

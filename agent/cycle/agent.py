@@ -17,15 +17,10 @@ from visup.agent.cycle.outcomes import merge_outcomes
 from visup.agent.execution.behaviour_slot import BehaviourSlot
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.execution.runners import error_line
+from visup.agent.model.events import AlertCondition, Directive, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.mind import Mind, Zone
-from visup.agent.model.records import (
-    AlertCondition,
-    Directive,
-    Frame,
-    Observation,
-    Severity,
-)
+from visup.agent.model.records import Frame, Observation
 from visup.agent.model.step import Observer, Step
 
 
@@ -37,11 +32,14 @@ class Reasoners:
         update: Percepts enter the mind.
         cogitate: Relations and rules are evaluated, events derived.
         match: Stages of tasks are matched and verified.
+        attend: What deserves a closer look is chosen, behaviours are called, and faults of the runtime
+            become conditions of alerts.
     """
 
     update: tuple[Reasoner, ...] = ()
     cogitate: tuple[Reasoner, ...] = ()
     match: tuple[Reasoner, ...] = ()
+    attend: tuple[Reasoner, ...] = ()
 
     def by_phase(self) -> tuple[tuple[Phase, tuple[Reasoner, ...]], ...]:
         """The phases that reason, in order, each with its reasoners."""
@@ -49,7 +47,12 @@ class Reasoners:
             (Phase.UPDATE, self.update),
             (Phase.COGITATE, self.cogitate),
             (Phase.MATCH, self.match),
+            (Phase.ATTEND, self.attend),
         )
+
+    def __iter__(self) -> Iterator[Reasoner]:
+        """All reasoners, in the order in which they run."""
+        return (reasoner for _, reasoners in self.by_phase() for reasoner in reasoners)
 
 
 @dataclass(slots=True)
@@ -88,7 +91,7 @@ class Agent:
         self._slots = ordered_slots(self.behaviours, self.limits)
 
     def step(self, frame: Frame) -> Step:
-        """Perceive, update, cogitate, match, act: one turn of the cycle.
+        """Perceive, update, cogitate, match, attend, act: one turn of the cycle.
 
         Args:
             frame: The next frame; its time must not be before that of the last one.
@@ -122,7 +125,7 @@ class Agent:
     def phases(
         self, observation: Observation, answers: Mapping[int, str] | None = None
     ) -> Iterator[tuple[Phase, Outcome]]:
-        """Update, cogitate, match: one after the other, to look in between; the mind stays as it is.
+        """Update, cogitate, match, attend: one after the other, to look in between; the mind stays as it is.
 
         Args:
             observation: What was perceived of the next frame.

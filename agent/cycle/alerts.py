@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from visup.agent.model.events import Alert, AlertCondition, Event, Severity
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.records import (
-    FAULT_STATES,
-    Alert,
-    AlertCondition,
-    Event,
-    Observation,
-    ReportState,
-    Severity,
-)
+from visup.agent.model.records import FAULT_STATES, Observation, ReportState
 
 GRACE_S = 1.0
 """A concern may be silent this long before its alert closes: alerts must not flicker."""
@@ -32,7 +25,7 @@ def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
             "behaviour_failed",
             (),
             Severity.WARNING,
-            f"The behaviour '{r.behaviour}' {_ails(r.state)}; what it gives is unknown.",
+            f"The behaviour '{r.behaviour}' {_ails(r.state)}; its output is unavailable.",
             (r.error,),
             key=r.behaviour,
             needs=(),
@@ -89,7 +82,7 @@ def alert_events(
     """The events that tell of alerts that opened or closed."""
     told = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
     over = [
-        _event("alert_closed", f"No longer so: {a.cause}", a, time, frame_index, Severity.INFO)
+        _event("alert_closed", f"Resolved: {a.cause}", a, time, frame_index, Severity.INFO)
         for a in closed
     ]
     return (*told, *over)

@@ -8,8 +8,9 @@ from difflib import get_close_matches
 from types import MappingProxyType
 
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.mind import UNKNOWN_OBJECT, Mind
-from visup.agent.model.records import Event
+from visup.agent.model.events import Event
+from visup.agent.model.mind import Mind
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
 NOBODY = ("unknown", UNKNOWN_OBJECT)
 """Answers that say that an object is none of the models."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import isfinite
 
 from visup.agent.contract.behaviour import Outcome
+from visup.agent.model.events import AlertCondition, Directive, Event
 from visup.agent.model.mind import Mind
-from visup.agent.model.records import AlertCondition, Directive, Event, Observation
+from visup.agent.model.records import Observation
 
 
 def merge_outcomes(so_far: Outcome, more: Outcome, observation: Observation) -> Outcome:

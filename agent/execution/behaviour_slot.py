@@ -1,7 +1,7 @@
 """A behaviour in its place in an agent: when it runs, and what comes of its conduct.
 
 After three failures in a row a behaviour is suspended for a while, twice as long each time; what
-hangs, dies or takes too much memory is suspended at once. Whatever it gives is unknown from its
+hangs, dies or takes too much memory is suspended at once. Its output is unavailable from its
 failure until it has run again, also in the steps in which it would not have run.
 """
 
@@ -27,10 +27,9 @@ from visup.agent.execution.runners import (
     error_line,
     resident_mb,
 )
+from visup.agent.model.events import WAKE, Directive
 from visup.agent.model.records import (
     FAULT_STATES,
-    WAKE,
-    Directive,
     Frame,
     Observation,
     PastFrame,

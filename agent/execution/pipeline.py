@@ -1,7 +1,7 @@
 """The first phase of a step: the behaviours run on the frame, each contained.
 
 A behaviour that raises, hangs or breaks its contract never reaches the mind: its report says so,
-and what it gives is unknown. `slot.py` has one behaviour, `limits.py` the policy.
+and its output is unavailable. `slot.py` has one behaviour, `limits.py` the policy.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.limits import Limits
 from visup.agent.execution.behaviour_slot import BehaviourSlot, make_slot, superseded
 from visup.agent.model.errors import BehaviourError
-from visup.agent.model.records import Directive, Frame, Observation, ReportState
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, ReportState
 
 
 def ordered_slots(

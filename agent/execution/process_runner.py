@@ -35,7 +35,8 @@ from visup.agent.execution.worker import (
     serve,
 )
 from visup.agent.model.errors import BehaviourError
-from visup.agent.model.records import Directive, Frame, Observation, Percept
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, Percept
 
 LARGEST_REPLY_BYTES = 256 * 2**20
 """Bytes of one answer; what is larger is refused unread."""

@@ -21,7 +21,8 @@ from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.execution.validation import check_percepts, collect_percepts
 from visup.agent.model.errors import BehaviourError
-from visup.agent.model.records import Directive, Frame, Observation, Percept
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, Percept
 
 STOPPING_S = 0.05
 """How long a step waits for a thread that it has just asked to stop, seconds."""

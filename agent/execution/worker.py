@@ -24,7 +24,8 @@ import numpy as np
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.execution.runners import error_line, run_behaviour, start_behaviour
-from visup.agent.model.records import Directive, Frame, Observation, PastFrame, Percept
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, PastFrame, Percept
 from visup.agent.plugins.factory import import_file
 
 _TOLD = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)

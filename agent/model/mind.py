@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from visup.agent.model.events import Alert
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.records import Alert, Health, HealthStatus, Percept, Region, Truth, empty
+from visup.agent.model.memory import MemoryKey, Remembered
+from visup.agent.model.object_beliefs import Coupling, ObjectBelief, Presence, Question
+from visup.agent.model.records import Health, HealthStatus, Percept, Truth, empty
 from visup.agent.model.relation_columns import Relation
 from visup.agent.model.relation_table import RelationTable
+from visup.agent.model.task_beliefs import TaskBelief
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,95 +27,6 @@ if TYPE_CHECKING:
 NO_OBJECTS: Mapping[int, ObjectBelief] = MappingProxyType({})
 NO_ANSWERS: Mapping[int, str] = MappingProxyType({})
 HEALTHY = Health(HealthStatus.OK)
-UNKNOWN_OBJECT = "unknown object"
-
-
-class Presence(StrEnum):
-    """Where an object is believed to be."""
-
-    SEEN = "seen"
-    HIDDEN = "hidden"
-    LEFT = "left"
-
-
-class Status(StrEnum):
-    """How a stage of a task stands."""
-
-    PENDING = "pending"
-    ACTIVE = "active"
-    PROGRESSING = "progressing"
-    STALLED = "stalled"
-    FAILING = "failing"
-    FAILED = "failed"
-    DONE = "done"
-    UNKNOWN = "unknown"
-
-
-class Verdict(StrEnum):
-    """How a task as a whole stands."""
-
-    IN_PROGRESS = "in_progress"
-    SUCCEEDED = "succeeded"
-    FAILED = "failed"
-    INTERRUPTED = "interrupted"
-    UNKNOWN = "unknown"
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """An identity that an object may have.
-
-    Attributes:
-        name: Model name.
-        votes: Time-discounted votes (paper, section 5).
-        share: Share of all votes for the object, 0 to 1.
-        confidence: How likely it is the right one, 0 to 1; what is left over those of all candidates
-            is how likely the object is none of the models known.
-    """
-
-    name: str
-    votes: float
-    share: float
-    confidence: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Spin:
-    """How fast an object turns about itself.
-
-    Attributes:
-        rate: Degrees per second, not negative.
-        sigma: Standard deviation of `rate`.
-        axis: Unit vector in the camera's frame (x right, y down, z forward), about which it turns by
-            the right-hand rule.
-    """
-
-    rate: float
-    sigma: float
-    axis: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """Which way an object faces under its most likely identity (paper, section 5, figure 5).
-
-    Attributes:
-        name: The model.
-        view: Number of the view within the model.
-        direction: Unit vector from the object to the viewer in the model's frame.
-        rotation: In-plane rotation from view to region, radians, or None when it is not known.
-        since: Seconds since when this view is believed.
-        confidence: 0 to 1.
-        spin: How it turns, or None while that is not known.
-    """
-
-    name: str
-    view: int
-    direction: tuple[float, float, float]
-    rotation: float | None
-    since: float
-    confidence: float = 1.0
-    spin: Spin | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,178 +42,6 @@ class Zone:
     name: str
     polygon: tuple[tuple[float, float], ...]
     depth: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Question:
-    """What the operator is asked: which of some candidates an object is.
-
-    Attributes:
-        object_id: The object.
-        names: The candidates, most likely first.
-        asked: Seconds.
-        text: The sentence, with question mark.
-    """
-
-    object_id: int
-    names: tuple[str, ...]
-    asked: float
-    text: str
-
-
-@dataclass(frozen=True, eq=False)
-class ObjectBelief:
-    """What is believed about one object.
-
-    Attributes:
-        id: Stable number; an object keeps it through occlusion and reappearance.
-        region: The region as last seen.
-        presence: Seen, hidden or left.
-        first_seen: Seconds.
-        last_seen: Seconds.
-        confirmed: Seen often enough to have had its entry told.
-        candidates: Identities, most likely first; empty while nothing is known.
-        depth: Relative depth in the units of the best candidate's model, or None when unknown.
-        depth_sigma: Standard deviation of `depth`.
-        pose: Which way it faces and how it spins, or None while that is not known.
-        unknown: How likely it is none of the models known, 0 to 1.
-    """
-
-    id: int
-    region: Region
-    presence: Presence
-    first_seen: float
-    last_seen: float
-    confirmed: bool = False
-    candidates: tuple[Candidate, ...] = ()
-    depth: float | None = None
-    depth_sigma: float | None = None
-    pose: Pose | None = None
-    unknown: float = 1.0
-
-    @property
-    def name(self) -> str:
-        """Most likely identity, or 'unknown object'."""
-        return self.candidates[0].name if self.candidates else UNKNOWN_OBJECT
-
-    @property
-    def strength(self) -> float:
-        """Vote share of the most likely identity, 0 to 1."""
-        return self.candidates[0].share if self.candidates else 0.0
-
-    @property
-    def confidence(self) -> float:
-        """How likely its name is right, 0 to 1; of an unknown object, how likely none is."""
-        return self.candidates[0].confidence if self.candidates else self.unknown
-
-
-@dataclass(frozen=True, slots=True)
-class Coupling:
-    """Two objects believed to be rigidly connected.
-
-    Attributes:
-        objects: Ids, smaller first.
-        since: Seconds.
-    """
-
-    objects: tuple[int, int]
-    since: float
-
-
-@dataclass(frozen=True, slots=True)
-class Binding:
-    """An actor of a task matched to an object.
-
-    Attributes:
-        actor: Name in the task file.
-        models: Model names that the actor may be.
-        object_id: The object believed to play it, or None when none does.
-        strength: Strength of that belief, 0 to 1.
-    """
-
-    actor: str
-    models: tuple[str, ...]
-    object_id: int | None = None
-    strength: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Expectation:
-    """An action that the current stage of a task asks for; rules are suspended by it.
-
-    Attributes:
-        relation: Name of the relation, such as 'converging'.
-        objects: Ids of the objects that play its actors.
-    """
-
-    relation: str
-    objects: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Prospect:
-    """A stage that may begin next.
-
-    Attributes:
-        stage: Its name.
-        probability: 0 to 1.
-    """
-
-    stage: str
-    probability: float
-
-
-@dataclass(frozen=True, slots=True)
-class StageBelief:
-    """How one stage of a task stands.
-
-    Attributes:
-        stage: Its name.
-        status: Pending, active, progressing, ...
-        since: Seconds since when it has this status.
-        confidence: 0 to 1.
-        evidence: One sentence: why.
-    """
-
-    stage: str
-    status: Status
-    since: float
-    confidence: float = 1.0
-    evidence: str = ""
-
-
-@dataclass(frozen=True)
-class TaskBelief:
-    """How a task stands.
-
-    Attributes:
-        task: Its name.
-        verdict: Overall.
-        stages: In the order of the task.
-        current: Name of the stage that is under way, or None.
-        bindings: Which object plays which actor.
-        expected: What the current stage asks for.
-        unexplained: Ids of objects that no actor of the task explains.
-        confidence: 0 to 1.
-        evidence: One sentence: why the verdict is what it is.
-        prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
-            end of the task.
-        success: Probability that the task still ends well, or None while nothing is followed.
-        active: How likely it is that the task is going on at all; 1 when it is the only one given.
-    """
-
-    task: str
-    verdict: Verdict
-    stages: tuple[StageBelief, ...] = ()
-    current: str | None = None
-    bindings: tuple[Binding, ...] = ()
-    expected: tuple[Expectation, ...] = ()
-    unexplained: tuple[int, ...] = ()
-    confidence: float = 1.0
-    evidence: str = ""
-    prospects: tuple[Prospect, ...] = ()
-    success: float | None = None
-    active: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,7 +64,7 @@ class Mind:
         zones: Parts of the scene that rules can name.
         questions: Those that wait for the operator's answer.
         answers: Object id -> what the operator said it is.
-        memory: What reasoners remember, by reasoner; immutable values only.
+        memory: What reasoners remember, by the names of their keys (`MemoryKey`); immutable values only.
     """
 
     time: float = 0.0
@@ -342,15 +84,20 @@ class Mind:
     answers: Mapping[int, str] = field(default_factory=lambda: NO_ANSWERS)
     memory: Mapping[str, Any] = field(default_factory=empty)
 
-    def remember(self, reasoner: str, value: object, **changes: Any) -> Mind:
+    def recall(self, key: MemoryKey[Remembered]) -> Remembered:
+        """What a reasoner remembers, or the default of its key."""
+        found: Remembered = self.memory.get(key.name, key.default)
+        return found
+
+    def remember(self, key: MemoryKey[Remembered], value: Remembered, **changes: Any) -> Mind:
         """The same mind with one reasoner's memory replaced, and other fields with it.
 
         Args:
-            reasoner: Its name.
+            key: Of the reasoner.
             value: What it remembers; must be immutable.
             changes: Field -> value.
         """
-        memory = MappingProxyType({**self.memory, reasoner: value})
+        memory = MappingProxyType({**self.memory, key.name: value})
         return replace(self, memory=memory, **changes)
 
     def with_objects(self, *beliefs: ObjectBelief) -> Mind:

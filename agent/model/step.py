@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from visup.agent.model.display import drawn
 from visup.agent.model.errors import SettingsError
+from visup.agent.model.events import Alert, Directive, Event
 from visup.agent.model.mind import Mind
-from visup.agent.model.records import (
-    Alert,
-    Directive,
-    Event,
-    Frame,
-    Observation,
-    Report,
-)
+from visup.agent.model.records import Frame, Observation, Report
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -96,7 +96,7 @@ def read_settings(path: Path) -> Values:
         )
     if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
         raise SettingsError(
-            "`behaviours` is no table of tables",
+            "`behaviours` is not a table of tables",
             where=str(path),
             expected="[behaviours.NAME] with KEY = VALUE below it",
         )
@@ -135,7 +135,7 @@ def _worded(fault: Mapping[str, Any], name: str) -> VisupError:
     wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if fault["type"] == "missing":
         return SettingsError("a setting is missing", where=place, hint=f"--set {place}=VALUE")
-    return SettingsError(f"{fault['input']!r} will not do", where=place, expected=wanted)
+    return SettingsError(f"{fault['input']!r} is not valid", where=place, expected=wanted)
 
 
 def _refuse(faults: list[VisupError]) -> None:

@@ -182,7 +182,7 @@ class _StateReader:
     def named(self, name: str, nodes: list[_Node]) -> Any:
         kind = _class(name)
         if not issubclass(kind, tuple):
-            raise ValueError(f"{name} is no tuple")
+            raise ValueError(f"{name} is not a tuple")
         return tuple.__new__(kind, self.many(nodes))
 
     def csr(self, *parts: _Node) -> Any:
@@ -194,7 +194,7 @@ class _StateReader:
     def enum(self, name: str, node: _Node) -> Any:
         kind = _class(name)
         if not issubclass(kind, Enum):
-            raise ValueError(f"{name} is no enumeration")
+            raise ValueError(f"{name} is not an enumeration")
         return kind(self._of(node))
 
 
@@ -224,7 +224,7 @@ def _class(name: str) -> type:
     for part in path.split("."):
         found = vars(found)[part]
     if not isinstance(found, type) or found.__module__ != module:
-        raise ValueError(f"{name} is no class")
+        raise ValueError(f"{name} is not a class")
     return found
 
 

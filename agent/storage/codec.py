@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import from_json, to_json
 
-from visup.agent.model import mind, records
+from visup.agent.model import events, mind, object_beliefs, records, task_beliefs
 from visup.agent.model.errors import OutputError
 from visup.agent.model.records import Observation, Percept, Region, Report, ReportState
 from visup.agent.storage._codec_jit import NO_DIGIT, chain_digits, chain_points, run_lengths
@@ -35,7 +35,7 @@ _LEFT_OUT = (records.Frame, records.Observation, mind.Mind)
 _TYPES: Mapping[str, type] = MappingProxyType(
     {
         name: kind
-        for module in (records, mind)
+        for module in (records, events, object_beliefs, task_beliefs, mind)
         for name, kind in vars(module).items()
         if isinstance(kind, type)
         and kind.__module__ == module.__name__

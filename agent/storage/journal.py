@@ -18,9 +18,10 @@ from typing import Any
 from pydantic_core import to_json
 
 from visup.agent.model.errors import OutputError
-from visup.agent.model.mind import TaskBelief
-from visup.agent.model.records import Alert, Event, Frame
+from visup.agent.model.events import Alert, Event
+from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
+from visup.agent.model.task_beliefs import TaskBelief
 from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.jsonable import event_record, object_summary, to_jsonable
 

@@ -134,7 +134,7 @@ class Recording:
     def _record(self, text: Any) -> dict[str, Any]:
         loaded = self._loaded(text)
         if not isinstance(loaded, dict):
-            raise _damaged(str(self.path), "a record is no JSON object")
+            raise _damaged(str(self.path), "a record is not a JSON object")
         return loaded
 
     def _loaded(self, text: Any) -> Any:

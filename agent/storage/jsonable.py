@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from visup.agent.model.mind import Mind, ObjectBelief
-from visup.agent.model.records import Event, Region
+from visup.agent.model.events import Event
+from visup.agent.model.mind import Mind
+from visup.agent.model.object_beliefs import ObjectBelief
+from visup.agent.model.records import Region
 from visup.agent.model.relation_table import RelationTable
 
 

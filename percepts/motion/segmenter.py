@@ -28,7 +28,11 @@ from visup.percepts.motion.features.superpixels import Superpixels, superpixels
 from visup.percepts.motion.features.work_image import Floats, ImageHistory, WorkImage, prepare_image
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
-from visup.percepts.motion.layers.background_motion import empty_prevalence, fit_background
+from visup.percepts.motion.layers.background_motion import (
+    ExpectedBackground,
+    empty_prevalence,
+    fit_background,
+)
 from visup.percepts.motion.layers.dense_labelling import (
     Labelling,
     LabelPrior,
@@ -74,7 +78,7 @@ class MotionSegmenter:
 
     Attributes:
         settings: As given.
-        looked: How the last frame was understood; None before the second one of a size.
+        trace: How the last frame was understood; None before the second one of a size.
     """
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
@@ -272,9 +276,10 @@ class MotionSegmenter:
         image, lag = scene.image, c.lag
         camera = self._predicted(image.time, c.span_s)
         # Until a baseline is long enough to tell, what is still in the image may be background.
-        still_too = self._camera_fixed_until is None or image.time < self._camera_fixed_until
+        fixed_too = self._camera_fixed_until is None or image.time < self._camera_fixed_until
         clear = background_weights(scene)[c.index]
-        bg = fit_background(c, clear, image.shape, camera, still_too, self._prevalence, lag)
+        expected = ExpectedBackground(camera, fixed_too, self._prevalence)
+        bg = fit_background(c, clear, image.shape, expected, lag)
         self._prevalence = bg.prevalence
         if bg.fixed is not None:
             until = self._camera_fixed_until or 0.0

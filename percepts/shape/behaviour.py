@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.contract.behaviour import Contract
-from visup.agent.model.records import Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Hypothesis, Observation, Percept, Region
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
 from visup.percepts.shape.silhouette.silhouette import normalise
 

@@ -15,13 +15,14 @@ from types import MappingProxyType
 
 from visup.agent import AlertCondition, Contract, Directive, Mind, Observation, Outcome, Severity
 from visup.agent.model.errors import BehaviourError, VisupError
-from visup.agent.model.records import WAKE
+from visup.agent.model.events import WAKE
+from visup.agent.model.memory import MemoryKey
 from visup.rules.formula.nodes import Rule, calls
 from visup.rules.language.parser import parse_rules
 from visup.rules.predicates.inputs_missing import percepts_read
-from visup.rules.safety.reasoner import SAFETY, RuleMemory, RuleReasoner
+from visup.rules.safety.reasoner import RuleMemory, RuleReasoner
 
-ACTIVATION = "rules.waking"
+ACTIVATION = MemoryKey("rules.waking", RuleMemory())
 _PREFIX = "awake_"
 
 
@@ -42,7 +43,7 @@ def _rule(contract: Contract) -> Rule:
         (rule,) = parse_rules(text, "awake")
     except (VisupError, ValueError) as fault:
         raise BehaviourError(
-            f"`awake` is no condition about an object `a`: {fault}",
+            f"`awake` is not a condition about an object `a`: {fault}",
             where=f"contract of '{contract.name}'",
             expected='a condition of the rule language, such as "expected(a)"',
             hint="see docs/rules.md; a choice of others is `exists b: ...`",
@@ -71,7 +72,7 @@ def always_active(contracts: Sequence[Contract], rules: Sequence[Rule]) -> froze
 
 @dataclass(frozen=True, slots=True)
 class ActivationReasoner:
-    """Reasoner of the match phase, after the tasks: calls behaviours that are asleep else.
+    """Reasoner of the attend phase: calls behaviours that are asleep else.
 
     Attributes:
         rules: From `activation_rules`.
@@ -81,15 +82,12 @@ class ActivationReasoner:
     _reasoner: RuleReasoner = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_reasoner", RuleReasoner(self.rules))
+        object.__setattr__(self, "_reasoner", RuleReasoner(self.rules, ACTIVATION))
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        # What these rules remember stands, while they look, where rules look for it.
-        own = mind.remember(SAFETY, mind.memory.get(ACTIVATION, RuleMemory()))
-        asked = self._reasoner(own, observation)
-        mind = mind.remember(ACTIVATION, asked.mind.memory[SAFETY])
-        return Outcome(mind, directives=tuple(_directives(mind, asked.conditions)))
+        asked = self._reasoner(mind, observation)
+        return Outcome(asked.mind, directives=tuple(_directives(mind, asked.conditions)))
 
 
 def _directives(mind: Mind, concerns: Sequence[AlertCondition]) -> Iterator[Directive]:

@@ -15,8 +15,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Directive, Mind, ObjectBelief, Observation, Outcome
+from visup.agent.model.memory import MemoryKey
 
-ATTENTION = "rules.attention"
+ATTENTION: MemoryKey[Mapping[int, tuple[str, float]]] = MemoryKey(
+    "rules.attention", MappingProxyType({})
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +41,13 @@ class AttentionSettings:
 
 @dataclass(frozen=True, slots=True)
 class AttentionReasoner:
-    """Reasoner of the match phase, after the tasks: says which regions need not be matched now."""
+    """Reasoner of the attend phase: says which regions need not be matched now."""
 
     settings: AttentionSettings = field(default_factory=AttentionSettings)
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[int, tuple[str, float]] = mind.memory.get(ATTENTION, MappingProxyType({}))
+        old = mind.recall(ATTENTION)
         since = {b.id: self._since(b, old, mind.time) for b in mind.objects.values()}
         wanted = {i for t in mind.tasks for e in t.expected for i in e.objects}
         resting = [

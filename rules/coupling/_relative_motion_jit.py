@@ -1,4 +1,4 @@
-"""How fast places on a path go on, compiled; see `joint.py`."""
+"""How fast places on a path go on, compiled; see `relative_motion.py`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def fused_velocity(path: Floats, begin: int, lasts: float) -> tuple[Floats, Floa
     """The slope of places, joined with the mean of velocities, each by its precision.
 
     Args:
-        path: (N, 6) of time, place (x, y), velocity (x, y) and the variance of that; see `Joint.path`.
+        path: (N, 6) of time, place (x, y), velocity (x, y) and its variance; see `RelativeTrack.path`.
         begin: The first place that counts; those before tell of noise alone.
         lasts: Errors of velocities are alike for so long, seconds.
 

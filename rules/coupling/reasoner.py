@@ -5,17 +5,18 @@ Two bodies are believed coupled when, for a while, they are at rest to each othe
 - they touch and move together; or
 - the number of regions fell, and the region that is left is like the union of the two.
 
-Rest is judged by how both outlines move relative to each other (`joint.py`), in a sequential test: each
-velocity tells odds of rest against motion, and these add up until they suffice (Wald 1945) or
-are lost. A body that bounces off, whose relative velocity is zero for a moment, is so not taken for
+Rest is judged by how both outlines move relative to each other (`relative_motion.py`), in a sequential
+test: each velocity gives odds of rest against motion, and these add up until they suffice (Wald 1945)
+or are lost. A body that bounces off, whose relative velocity is zero for a moment, is so not taken for
 one that was caught, and one that clearly rests is not waited for. Outlines that touch in the image may still
 be apart in space: with the depth of one of the two unknown this is not told apart from contact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -34,6 +35,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
@@ -45,9 +47,8 @@ from visup.rules.geometry.regions import image_diagonal
 from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics
+from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
 from visup.rules.wording.sentences import sentence
-
-COUPLING = "rules.coupling"
 
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
@@ -96,13 +97,18 @@ class CouplingEvidence:
         converged_at: When they last were converging, not touching yet.
         rest_odds: Logarithm of the odds, from 0 on, that they touch and are at rest.
         apart_since: Since when they are apart.
-        joint: How they have moved relative to each other since they are near.
+        relative_track: How they have moved relative to each other since they are near.
     """
 
     converged_at: float | None = None
     rest_odds: float = 0.0
     apart_since: float | None = None
-    joint: RelativeTrack | None = None
+    relative_track: RelativeTrack | None = None
+
+
+COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
+    "rules.coupling", MappingProxyType({})
+)
 
 
 NO_EVIDENCE = CouplingEvidence()
@@ -136,84 +142,105 @@ class CouplingReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[Pair, CouplingEvidence] = mind.memory.get(COUPLING, MappingProxyType({}))
+        return self._judged(mind, observation, None)
+
+    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
+        """What the decisions 'coupled' and 'decoupled' of a step hang on, for every pair.
+
+        Args:
+            mind: As this reasoner got it in that step.
+            observation: What was perceived.
+        """
+        log = DecisionLog()
+        self._judged(mind, observation, log)
+        coupled = {c.objects for c in mind.couplings}
+        for pair in combinations(sorted(mind.objects), 2):
+            there = Condition("both are believed to be there", _both_present(pair, mind))
+            log.setdefault(("coupled", pair), (there, _coupling_is(pair in coupled, False)))
+            log.setdefault(("decoupled", pair), (there, _coupling_is(pair in coupled, True)))
+        return log
+
+    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+        old = mind.recall(COUPLING)
         coupled = {c.objects: c for c in mind.couplings}
         table = _table(mind)
-        sights = _observed_pairs(table, mind)
+        observed = _observed_pairs(table, mind)
         kept: dict[Pair, CouplingEvidence] = {}
         events: list[Event] = []
-        for sight in sights:
-            pair = sight.pair
-            p = self._look(old.get(pair, NO_EVIDENCE), sight, mind)
-            if pair not in coupled and self._joined(p, sight, mind):
+        for seen in observed:
+            pair = seen.pair
+            evidence = self._look(old.get(pair, NO_EVIDENCE), seen, mind)
+            if pair in coupled:
+                if decide(self._decoupling(evidence, mind), log, "decoupled", pair):
+                    del coupled[pair]
+                    text = "{0} and {1} {are} no longer coupled."
+                    events.append(_event("decoupled", text, pair, mind, observation))
+                    evidence = NO_EVIDENCE
+            elif log is None and evidence.relative_track is None:
+                pass  # as nearly always: they are not near each other; the first condition
+            elif decide(self._coupling(evidence, seen, mind), log, "coupled", pair):
                 coupled[pair] = Coupling(pair, mind.time)
-                events.append(
-                    _event("coupled", "{0} and {1} {are} coupled.", pair, mind, observation)
-                )
-                p = replace(p, apart_since=None)
-            elif pair in coupled and _lasts(p.apart_since, self.settings.part_s, mind.time):
-                del coupled[pair]
-                text = "{0} and {1} {are} no longer coupled."
-                events.append(_event("decoupled", text, pair, mind, observation))
-                p = NO_EVIDENCE
-            kept[pair] = p
+                text = "{0} and {1} {are} coupled."
+                events.append(_event("coupled", text, pair, mind, observation))
+                evidence = replace(evidence, apart_since=None)
+            kept[pair] = evidence
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_block(_coupled_cells(sights, coupled, mind))
+        table = table.with_block(_coupled_cells(observed, coupled, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
 
     def _look(
-        self, before: CouplingEvidence, sight: PairObservation, mind: Mind
+        self, before: CouplingEvidence, seen: PairObservation, mind: Mind
     ) -> CouplingEvidence:
-        converging = sight.converging == YES and sight.touching != YES
-        far = sight.diverging == YES or sight.gap > 0.02 * image_diagonal(mind.frame_size)
-        apart = sight.touching == NO and far
-        joint = self._follow(before.joint, sight, mind)
+        converging = seen.converging == YES and seen.touching != YES
+        far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
+        apart = seen.touching == NO and far
+        track = self._follow(before.relative_track, seen, mind)
         odds = before.rest_odds
-        if joint is None or sight.touching != YES:
+        if track is None or seen.touching != YES:
             odds = 0.0
-        elif joint is not before.joint:
-            odds = self._rest(odds, before.joint, joint, mind)
-        same = joint is before.joint and odds == before.rest_odds and not converging
+        elif track is not before.relative_track:
+            odds = self._rest(odds, before.relative_track, track, mind)
+        same = track is before.relative_track and odds == before.rest_odds and not converging
         if same and apart == (before.apart_since is not None):
             return before  # as nearly always: most pairs are far from each other
         converged = mind.time if converging else before.converged_at
         return CouplingEvidence(
-            converged, odds, _since(before.apart_since, apart, mind.time), joint
+            converged, odds, _since(before.apart_since, apart, mind.time), track
         )
 
     def _follow(
-        self, before: RelativeTrack | None, sight: PairObservation, mind: Mind
+        self, before: RelativeTrack | None, seen: PairObservation, mind: Mind
     ) -> RelativeTrack | None:
         """How the two move relative to each other; the same as before when they are not seen."""
         s = self.settings
-        merged = sight.host is not None
+        merged = seen.host is not None
         if (
             before is None
             and not merged
-            and not sight.gap <= s.near * image_diagonal(mind.frame_size)
+            and not seen.gap <= s.near * image_diagonal(mind.frame_size)
         ):
             return None
-        regions = _regions(sight, mind)
+        regions = _regions(seen, mind)
         if regions is None:
             old = before is None or mind.time - before.path_end > s.path_s / 2
             return None if old else before
-        if not merged and not sight.gap <= s.near * image_diagonal(mind.frame_size):
+        if not merged and not seen.gap <= s.near * image_diagonal(mind.frame_size):
             return None
         if before is None and merged:
             # Not seen side by side before: one is followed as it was last seen, the other with it.
-            return begin_relative_track(_apart(sight.pair, mind), mind.time, mind.frame_size)
+            return begin_relative_track(_apart(seen.pair, mind), mind.time, mind.frame_size)
         return update_relative_track(
             before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
         )
 
     def _rest(
-        self, odds: float, before: RelativeTrack | None, joint: RelativeTrack, mind: Mind
+        self, odds: float, before: RelativeTrack | None, track: RelativeTrack, mind: Mind
     ) -> float:
         """The odds of rest after another sight of both."""
         s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
-        found = relative_velocity(joint, mind.time, s.window_s)
+        found = relative_velocity(track, mind.time, s.window_s)
         if found is None:
             return odds
         diagonal = image_diagonal(mind.frame_size)
@@ -222,16 +249,39 @@ class CouplingReasoner:
         # Odds beyond the bound would only delay that the opposite is believed.
         return min(max(0.0, odds + told), 2 * s.odds)
 
-    def _joined(self, p: CouplingEvidence, sight: PairObservation, mind: Mind) -> bool:
-        s = self.settings
-        watched = p.joint is not None and p.joint.path_end == mind.time
-        if not watched or p.rest_odds < s.odds:
-            return False
-        if sight.host is not None:
-            return True
-        if mind.truth("moving_together", *sight.pair) is Truth.TRUE:
-            return True
-        return p.converged_at is not None and mind.time - p.converged_at <= s.approach_s
+    def _coupling(
+        self, evidence: CouplingEvidence, seen: PairObservation, mind: Mind
+    ) -> Iterator[Condition]:
+        """Conditions of two becoming one body."""
+        s, track = self.settings, evidence.relative_track
+        watched = track is not None and track.path_end == mind.time
+        yield Condition("both are seen near each other", watched)
+        text = "log odds that they touch and are at rest"
+        yield at_least(text, evidence.rest_odds, s.odds)
+        if seen.host is not None or mind.truth("moving_together", *seen.pair) is Truth.TRUE:
+            return
+        at = evidence.converged_at
+        if at is None:
+            yield Condition("they have come together, move together, or share a region", False)
+        else:
+            text = "since they came together"
+            ago = mind.time - at
+            yield Condition(text, ago <= s.approach_s, ago, s.approach_s, " s", below=True)
+
+    def _decoupling(self, evidence: CouplingEvidence, mind: Mind) -> Iterator[Condition]:
+        """Conditions of two no longer being one body."""
+        yield Condition("they are apart", evidence.apart_since is not None)
+        if evidence.apart_since is not None:
+            lasted = mind.time - evidence.apart_since
+            yield at_least("apart for", lasted, self.settings.part_s, " s", slack=1e-6)
+
+
+def _both_present(pair: Pair, mind: Mind) -> bool:
+    return set(pair) <= {b.id for b in mind.present()}
+
+
+def _coupling_is(coupled: bool, wanted: bool) -> Condition:
+    return Condition("they are coupled" if wanted else "they are not coupled", coupled is wanted)
 
 
 def _observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
@@ -240,15 +290,15 @@ def _observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
     hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
     gaps = now.gap.tolist() if now.ids == ids else None
     told = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
-    sights = []
+    observed = []
     for i, a in enumerate(ids):
         for j in range(i + 1, len(ids)):
             b = ids[j]
             gap = gaps[i][j] if gaps else now.pair("gap", a, b)
             touching, closing, parting = next(told)
             host = hosts.get((a, b))
-            sights.append(PairObservation((a, b), touching, closing, parting, gap, host))
-    return sights
+            observed.append(PairObservation((a, b), touching, closing, parting, gap, host))
+    return observed
 
 
 def _table(mind: Mind) -> RelationTable:
@@ -260,33 +310,33 @@ def _table(mind: Mind) -> RelationTable:
 
 
 def _coupled_cells(
-    sights: Sequence[PairObservation], coupled: Mapping[Pair, Coupling], mind: Mind
+    observed: Sequence[PairObservation], coupled: Mapping[Pair, Coupling], mind: Mind
 ) -> RelationBlock:
     """The relation of being coupled."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
-    state, since = [0] * len(sights), [mind.time] * len(sights)
-    for k, sight in enumerate(sights):
-        if sight.pair in coupled:
-            state[k], since[k] = 1, coupled[sight.pair].since
-        elif sight.touching == MAYBE or (hidden and not hidden.isdisjoint(sight.pair)):
+    state, since = [0] * len(observed), [mind.time] * len(observed)
+    for k, seen in enumerate(observed):
+        if seen.pair in coupled:
+            state[k], since[k] = 1, coupled[seen.pair].since
+        elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
             state[k] = UNKNOWN_CODE
-    sure = np.full((1, len(sights)), CONFIDENCE)
+    sure = np.full((1, len(observed)), CONFIDENCE)
     return RelationBlock(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
 
 
-def _regions(sight: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
+def _regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
     """The regions in which the two are seen now, twice the same one when they are merged."""
-    if sight.host is not None:
-        host = mind.objects[sight.host]
+    if seen.host is not None:
+        host = mind.objects[seen.host]
         return (host.region, host.region) if host.last_seen == mind.time else None
-    first, second = (mind.objects[i] for i in sight.pair)
+    first, second = (mind.objects[i] for i in seen.pair)
     if first.last_seen < mind.time or second.last_seen < mind.time:
         return None
     return first.region, second.region
 
 
 def _apart(pair: Pair, mind: Mind) -> tuple[Region, Region]:
-    """The regions of two that are merged: what was last seen of the one, and the joint one."""
+    """The regions of two that are merged: what was last seen of the one, and the merged one."""
     first, second = (mind.objects[i].region for i in pair)
     return first, second
 
@@ -295,10 +345,6 @@ def _since(before: float | None, holds: bool, now: float) -> float | None:
     if not holds:
         return None
     return now if before is None else before
-
-
-def _lasts(since: float | None, least: float, now: float) -> bool:
-    return since is not None and now - since >= least - 1e-6
 
 
 def _event(kind: str, template: str, pair: Pair, mind: Mind, observation: Observation) -> Event:

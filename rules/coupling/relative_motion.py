@@ -114,7 +114,7 @@ class TargetOutline:
 
     Attributes:
         points: (M, 2) pixels; points no further apart than a few pixels.
-        boxes: Of their runs; see `outline_loops.py`.
+        boxes: Of their runs; see `_outlines_jit.py`.
     """
 
     points: Floats
@@ -151,7 +151,7 @@ def registered(kept: OutlineTemplate, target: TargetOutline) -> OutlineTemplate 
 
 
 def update_relative_track(
-    joint: RelativeTrack | None,
+    track: RelativeTrack | None,
     regions: tuple[Region, Region],
     now: float,
     size: tuple[int, int],
@@ -162,7 +162,7 @@ def update_relative_track(
     """What is known of two bodies after another sight of them.
 
     Args:
-        joint: What was known.
+        track: What was known.
         regions: Of the first and the second; twice the same when they are one region.
         now: Seconds.
         size: (width, height) of the image, pixels.
@@ -173,20 +173,20 @@ def update_relative_track(
         The same with a further place on its path; None when the two cannot be followed.
     """
     apart = regions[0] is not regions[1]
-    if joint is None:
+    if track is None:
         return begin_relative_track(regions, now, size) if apart else None
-    first = registered(joint.first, target_of(regions[0]))
-    second = registered(joint.second, target_of(regions[1]))
+    first = registered(track.first, target_of(regions[0]))
+    second = registered(track.second, target_of(regions[1]))
     if first is None or second is None:
-        return begin_relative_track(regions, now, size) if apart else replace(joint, path=())
-    x, y = (b + s - f for b, s, f in zip(joint.before, second.shift, first.shift, strict=True))
+        return begin_relative_track(regions, now, size) if apart else replace(track, path=())
+    x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
     place = (now, x, y, *_image_motion(regions))
-    path = (*(p for p in joint.path if p[0] > now - lasts_s), place)
-    if apart and now - joint.since > anew_s:
+    path = (*(p for p in track.path if p[0] > now - lasts_s), place)
+    if apart and now - track.since > anew_s:
         fresh = begin_relative_track(regions, now, size)
         if fresh is not None:
             return replace(fresh, before=(x, y), path=path)
-    return replace(joint, first=first, second=second, path=path)
+    return replace(track, first=first, second=second, path=path)
 
 
 def begin_relative_track(
@@ -247,20 +247,20 @@ class RelativeVelocity:
         return 0.5 * (log(free / rest) - (rests - moves))
 
 
-def relative_velocity(joint: RelativeTrack, now: float, window_s: float) -> RelativeVelocity | None:
+def relative_velocity(track: RelativeTrack, now: float, window_s: float) -> RelativeVelocity | None:
     """How two bodies move relative to each other.
 
     Args:
-        joint: What is known of them.
+        track: What is known of them.
         now: Seconds.
         window_s: Over how long; longer where gaps leave too few places within.
 
     Returns:
         The motion up to now; None while too little is known.
     """
-    if len(joint.path) <= LEAST_SAMPLES:
+    if len(track.path) <= LEAST_SAMPLES:
         return None
-    places = np.fromiter(chain.from_iterable(joint.path), float, 6 * len(joint.path)).reshape(-1, 6)
+    places = np.fromiter(chain.from_iterable(track.path), float, 6 * len(track.path)).reshape(-1, 6)
     begin = first_recent(places, now, window_s, LEAST_SAMPLES)
     span = float(places[-1, 0] - places[begin, 0])
     if span < 0.6 * window_s - 1e-6:

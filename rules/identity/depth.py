@@ -9,10 +9,9 @@ from types import MappingProxyType
 
 from visup.agent import Depth, Mind, ObjectBelief, Observation, Outcome
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.rules.presence.association import region_owners
 from visup.rules.presence.object_tracks import visible_share
-
-DEPTHS = "rules.depth"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +42,9 @@ class DepthEstimate:
     time: float
 
 
+DEPTHS: MemoryKey[Mapping[int, DepthEstimate]] = MemoryKey("rules.depth", MappingProxyType({}))
+
+
 @dataclass(frozen=True, slots=True)
 class DepthReasoner:
     """Reasoner of the cogitate phase, after the votes: the depth of each object.
@@ -55,7 +57,7 @@ class DepthReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Take in one observation; see `Reasoner`."""
-        old: Mapping[int, DepthEstimate] = mind.memory.get(DEPTHS, MappingProxyType({}))
+        old = mind.recall(DEPTHS)
         owner = region_owners(mind)
         told = {(owner.get(d.region_id), d.name): d for d in observation.of("depth")}
         kept: dict[int, DepthEstimate] = {}

@@ -22,9 +22,8 @@ from visup.agent import (
     Question,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.rules.wording.sentences import called, spaced
-
-QUESTIONS = "rules.questions"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +53,9 @@ class Ambiguity:
     asked: float | None = None
 
 
+QUESTIONS: MemoryKey[Mapping[int, Ambiguity]] = MemoryKey("rules.questions", MappingProxyType({}))
+
+
 @dataclass(frozen=True, slots=True)
 class QuestionReasoner:
     """Reasoner of the cogitate phase, after the votes: keeps the questions that wait."""
@@ -62,7 +64,7 @@ class QuestionReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old: Mapping[int, Ambiguity] = mind.memory.get(QUESTIONS, MappingProxyType({}))
+        old = mind.recall(QUESTIONS)
         open_now = {q.object_id: q for q in mind.questions}
         doubts: dict[int, Ambiguity] = {}
         waiting: list[Question] = []

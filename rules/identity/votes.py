@@ -29,7 +29,7 @@ the operator answers is no evidence but a fact, and settles the vote.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import exp
 from types import MappingProxyType
@@ -45,13 +45,14 @@ from visup.agent import (
     Presence,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.memory import MemoryKey
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.rules.pose.reasoner import pose_support
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
+from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
 from visup.rules.wording.sentences import called, seems, spaced
 
-VOTES = "rules.votes"
 VoteCounts = tuple[tuple[str, float], ...]
 
 
@@ -98,20 +99,20 @@ class ObjectVotes:
     """What is remembered of one object's votes.
 
     Attributes:
-        tally: (name, votes), most votes first.
-        stranger: Votes for its being none of the models.
+        counts: (name, votes), most votes first.
+        none: Votes for its being none of the models.
         heard: Seconds of the last hypotheses about it, or None.
         leader: The name that leads clearly now, or None.
         leads_since: Seconds since when it does.
-        told: The name that was told last, or None.
+        reported: The name that was reported last, or None.
     """
 
-    tally: VoteCounts = ()
-    stranger: float = 0.0
+    counts: VoteCounts = ()
+    none: float = 0.0
     heard: float | None = None
     leader: str | None = None
     leads_since: float = 0.0
-    told: str | None = None
+    reported: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +126,15 @@ class VoteMemory:
 
     time: float
     of: Mapping[int, ObjectVotes] = field(default_factory=lambda: MappingProxyType({}))
+
+
+VOTES: MemoryKey[VoteMemory | None] = MemoryKey("rules.votes", None)
+
+
+def object_votes(mind: Mind, object_id: int) -> ObjectVotes:
+    """What is remembered of the votes on an object."""
+    memory = mind.recall(VOTES) or VoteMemory(mind.time)
+    return memory.of.get(object_id, ObjectVotes())
 
 
 def weights(
@@ -241,33 +251,65 @@ class IdentityReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Count one step; see `Reasoner`."""
-        old: VoteMemory = mind.memory.get(VOTES, VoteMemory(observation.time))
+        return self._judged(mind, observation, None)
+
+    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
+        """What the decision 'identified' of a step hangs on, for every object.
+
+        Args:
+            mind: As this reasoner got it in that step.
+            observation: What was perceived.
+        """
+        log = DecisionLog()
+        self._judged(mind, observation, log)
+        return log
+
+    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
+        old = mind.recall(VOTES) or VoteMemory(observation.time)
         dt = max(0.0, observation.time - old.time)
-        said = hypotheses_by_object(mind, observation)
-        ballots: dict[int, ObjectVotes] = {}
+        hypotheses = hypotheses_by_object(mind, observation)
+        every: dict[int, ObjectVotes] = {}
         events: list[Event] = []
         beliefs: list[ObjectBelief] = []
         for object_id, belief in sorted(mind.objects.items()):
             before = old.of.get(object_id, ObjectVotes())
-            ballot = self._count(mind, belief, before, said.get(object_id, ()), dt)
-            believed = self._believe(mind, belief, ballot)
+            votes = self._count(mind, belief, before, hypotheses.get(object_id, ()), dt)
+            believed = self._believe(mind, belief, votes)
             beliefs.append(believed)
-            after = self._lead(ballot, believed.candidates, observation.time)
-            if after.told != before.told:
-                event = _identified(mind.with_objects(believed), believed, before.told, observation)
-                after = after if belief.confirmed else replace(after, told=before.told)
-                events += [event] if belief.confirmed else []
-            ballots[object_id] = after
+            votes = self._lead(votes, believed.candidates, observation.time)
+            if decide(self._conditions(believed, votes, mind), log, "identified", (object_id,)):
+                now = mind.with_objects(believed)
+                events.append(_identified(now, believed, votes.reported, observation))
+                votes = replace(votes, reported=votes.leader)
+            every[object_id] = votes
         mind = mind.with_objects(*beliefs)
-        mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(ballots)))
+        mind = mind.remember(VOTES, VoteMemory(observation.time, MappingProxyType(every)))
         return Outcome(mind, tuple(events))
+
+    def _conditions(
+        self, belief: ObjectBelief, votes: ObjectVotes, mind: Mind
+    ) -> Iterator[Condition]:
+        """Of an object's being identified as what leads its votes."""
+        s = self.settings
+        if not belief.candidates:
+            answered = mind.answers.get(belief.id) == UNKNOWN_OBJECT
+            yield Condition("the operator did not say that it is none of the models", not answered)
+            yield Condition("it may be one of the models", False)
+            most = votes.counts[0][1] if votes.counts else 0.0
+            yield at_least("votes of the best name", most, s.known_votes)
+            yield at_least("votes of the best name, beside none of the models,", most, votes.none)
+        name = belief.name
+        yield Condition(f"it was not identified as {name} before", votes.reported != name)
+        yield at_least(f"likelihood of {name}", belief.confidence, s.settle)
+        yield at_least("leads for", mind.time - votes.leads_since, s.settle_s, " s", slack=1e-9)
+        yield Condition("it has entered", belief.confirmed)
 
     def _count(
         self,
         mind: Mind,
         belief: ObjectBelief,
-        ballot: ObjectVotes,
-        said: tuple[Hypothesis, ...],
+        votes: ObjectVotes,
+        hypotheses: tuple[Hypothesis, ...],
         dt: float,
     ) -> ObjectVotes:
         s = self.settings
@@ -275,40 +317,39 @@ class IdentityReasoner:
         hidden = belief.presence is not Presence.SEEN or visible < s.least_visible
         blind = not {"hypothesis", "region"}.isdisjoint(mind.unknown)
         tau = s.tau_hidden_s if hidden or blind else s.tau_s
-        stranger = ballot.stranger * exp(-dt / tau)
-        if hidden or blind or not said:
-            tally = updated_votes(ballot.tally, {}, dt, tau, s.most_candidates)
-            return replace(ballot, tally=tally, stranger=stranger)
-        new = 1.0 if ballot.heard is None else min(1.0, (mind.time - ballot.heard) / s.apart_s)
-        heard = weights(said, s, awaited(mind, belief.id))
+        none = votes.none * exp(-dt / tau)
+        if hidden or blind or not hypotheses:
+            counts = updated_votes(votes.counts, {}, dt, tau, s.most_candidates)
+            return replace(votes, counts=counts, none=none)
+        new = 1.0 if votes.heard is None else min(1.0, (mind.time - votes.heard) / s.apart_s)
+        heard = weights(hypotheses, s, awaited(mind, belief.id))
         # Views that do not hang together over time speak against a name (paper, figure 5).
         likely = {n: w * pose_support(mind, belief.id, n) for n, w in heard.items()}
-        tally = updated_votes(ballot.tally, likely, dt, tau, s.most_candidates, new * visible)
-        stranger += new * visible * _worth(s.stranger, s)
-        return replace(ballot, tally=tally, stranger=stranger, heard=mind.time)
+        counts = updated_votes(votes.counts, likely, dt, tau, s.most_candidates, new * visible)
+        none += new * visible * _worth(s.stranger, s)
+        return replace(votes, counts=counts, none=none, heard=mind.time)
 
-    def _believe(self, mind: Mind, belief: ObjectBelief, ballot: ObjectVotes) -> ObjectBelief:
+    def _believe(self, mind: Mind, belief: ObjectBelief, votes: ObjectVotes) -> ObjectBelief:
         s = self.settings
         answer = mind.answers.get(belief.id)
         if answer == UNKNOWN_OBJECT:
             return replace(belief, candidates=(), unknown=1.0)
         if answer is not None:
             return replace(
-                belief, candidates=(confirmed_candidate(answer, ballot.tally),), unknown=0.0
+                belief, candidates=(confirmed_candidate(answer, votes.counts),), unknown=0.0
             )
         return replace(
             belief,
-            candidates=candidates(ballot.tally, s, ballot.stranger),
-            unknown=unknown_probability(ballot.tally, s, ballot.stranger),
+            candidates=candidates(votes.counts, s, votes.none),
+            unknown=unknown_probability(votes.counts, s, votes.none),
         )
 
-    def _lead(self, ballot: ObjectVotes, named: tuple[Candidate, ...], now: float) -> ObjectVotes:
-        s = self.settings
-        leader = named[0].name if named and named[0].confidence >= s.settle else None
-        since = ballot.leads_since if leader == ballot.leader else now
-        settled = leader is not None and now - since >= s.settle_s - 1e-9
-        told = leader if settled else ballot.told
-        return replace(ballot, leader=leader, leads_since=since, told=told)
+    def _lead(self, votes: ObjectVotes, named: tuple[Candidate, ...], now: float) -> ObjectVotes:
+        """The votes with who leads clearly, and since when."""
+        clear = named and named[0].confidence >= self.settings.settle
+        leader = named[0].name if clear else None
+        since = votes.leads_since if leader == votes.leader else now
+        return replace(votes, leader=leader, leads_since=since)
 
 
 def _identified(

@@ -122,9 +122,7 @@ class TypeChecker:
                 yield rule.span, f"'{word}' is a word of the language", "another name", None
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
-                what = (
-                    f"the sentence of '{rule.name}' mentions '{word}', which is no variable of it"
-                )
+                what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
                 yield rule.span, what, _listed((*rule.variables, "is")), None
 
     def _bounds(self, rule: Rule) -> Iterator[Fault]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from visup.agent import Hypothesis, Mind, ObjectBelief, Observation, Outcome, Pose, Presence
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.orientation import views
 from visup.rules.pose._interpretation_tree_jit import NONE
 from visup.rules.pose.angular_velocity import (
@@ -42,7 +43,6 @@ from visup.rules.pose.rotations import Floats
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 
-POSES = "rules.pose"
 LookSignature = tuple[tuple[str, int, float, float | None], ...]
 """What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
 
@@ -129,14 +129,15 @@ class PoseTrack:
     pose: Pose | None = None
 
 
+POSES: MemoryKey[Mapping[int, PoseTrack]] = MemoryKey("rules.pose", MappingProxyType({}))
+
+
 NO_TRACK = PoseTrack()
-NO_TRACKS: Mapping[int, PoseTrack] = MappingProxyType({})
 
 
 def pose_tracks(mind: Mind) -> Mapping[int, PoseTrack]:
     """Object id -> what is remembered of its views."""
-    found: Mapping[int, PoseTrack] = mind.memory.get(POSES, NO_TRACKS)
-    return found
+    return mind.recall(POSES)
 
 
 def pose_support(mind: Mind, object_id: int, name: str) -> float:

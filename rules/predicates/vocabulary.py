@@ -171,7 +171,7 @@ def first_contact(facts: Snapshot) -> Codes:
 def lost(facts: Snapshot) -> Codes:
     """Whether an object is out of sight and nothing tells why."""
     known = presence_memory(facts.mind).of
-    return facts.among([i for i in facts.ids if i in known and known[i].told == "lost"])
+    return facts.among([i for i in facts.ids if i in known and known[i].lost])
 
 
 def stale(facts: Snapshot, kind: str) -> Codes:

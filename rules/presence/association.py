@@ -1,57 +1,26 @@
-"""What was seen becomes beliefs: regions to objects, health, plug-ins' percepts, what is unknown.
+"""Which region belongs to which object, over time; this alone says so.
 
-A new region becomes an unconfirmed object; whether it is an object at all, or one known before
-that shows itself again, is for `presence.py` to say. Which object owns which region stands in the
-mind's memory, so that an object keeps its id when the tracker gives its region another.
+The segmenter gives its regions ids of its own and may give a body another one, such as after it was hidden.
+Which object owns which region id stands in the mind's memory, so that an object keeps its id:
+`associate` finds the owners of a frame's regions, `reassign_region` changes an owner when an object
+is re-identified (`reidentification.py`), `delete_objects` ends ownership.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from visup.agent import (
-    Hypothesis,
-    Mind,
-    ObjectBelief,
-    Observation,
-    Outcome,
-    Percept,
-    Presence,
-    Region,
-)
+from visup.agent import Hypothesis, Mind, Observation, Region
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 
-OWNERS = "rules.objects"
-KNOWN_KINDS = frozenset({"region", "hypothesis", "depth", "health"})
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectSettings:
-    """How much is remembered, and for how long.
-
-    Attributes:
-        most_objects: Bound on remembered objects; those unseen for longest go first.
-        most_owners: Bound on remembered region ids.
-        forget_unconfirmed_s: A new region unseen for this long was nothing.
-        forget_left_s: An object that left is remembered for this long.
-        forget_hidden_s: A hidden object is remembered for this long.
-        percept_age_s: Percepts of plug-ins' own kinds fade after this.
-    """
-
-    most_objects: int = 64
-    most_owners: int = 256
-    forget_unconfirmed_s: float = 0.5
-    forget_left_s: float = 30.0
-    forget_hidden_s: float = 300.0
-    percept_age_s: float = 2.0
+OWNERS: MemoryKey[Mapping[int, int]] = MemoryKey("rules.objects", MappingProxyType({}))
 
 
 def region_owners(mind: Mind) -> Mapping[int, int]:
     """Region id -> object id, for all regions that are remembered."""
-    found: Mapping[int, int] = mind.memory.get(OWNERS, MappingProxyType({}))
-    return found
+    return mind.recall(OWNERS)
 
 
 def hypotheses_by_object(
@@ -65,6 +34,24 @@ def hypotheses_by_object(
         if object_id is not None:
             said[object_id] = (*said.get(object_id, ()), h)
     return said
+
+
+def associate(mind: Mind, regions: Iterable[Region]) -> tuple[dict[int, Region], dict[int, int]]:
+    """The objects that a frame's regions belong to; a region that none owns is a new object's.
+
+    Returns:
+        Object id -> its region, and the owners of all regions known, those of this frame last.
+    """
+    owners = dict(region_owners(mind))
+    found: dict[int, Region] = {}
+    # A region that an object held last comes first, so that it cannot lose it to an older one.
+    for region in sorted(regions, key=lambda r: not _is_current_region(mind, owners, r)):
+        object_id = owners.pop(region.id, None)
+        if object_id is None or object_id in found:
+            object_id = _free_id(region.id, mind.objects.keys() | found.keys())
+        owners[region.id] = object_id
+        found[object_id] = region
+    return found, owners
 
 
 def reassign_region(mind: Mind, region_id: int, object_id: int) -> Mind:
@@ -84,81 +71,8 @@ def delete_objects(mind: Mind, ids: frozenset[int]) -> Mind:
     return mind.remember(OWNERS, MappingProxyType(left))
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectReasoner:
-    """Reasoner of the update phase: percepts enter the mind.
-
-    When no behaviour looked for regions in this step, nothing is concluded about any object.
-    """
-
-    settings: ObjectSettings = ObjectSettings()
-
-    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
-        """Take in one observation; see `Reasoner`."""
-        mind = replace(
-            mind,
-            time=observation.time,
-            frame_index=observation.frame_index,
-            frame_size=observation.frame_size,
-            unknown=observation.unknown,
-            percepts=self._fresh(mind.percepts, observation),
-        )
-        for health in observation.of("health"):
-            mind = replace(mind, health=health)
-        if observation.observed("region"):
-            mind = self._see(mind, observation)
-        return Outcome(self._forget(mind))
-
-    def _see(self, mind: Mind, observation: Observation) -> Mind:
-        owner = dict(region_owners(mind))
-        beliefs: dict[int, ObjectBelief] = {}
-        # A region that an object held last comes first, so that it cannot lose it to an older one.
-        regions = sorted(
-            observation.of("region"), key=lambda r: not _is_current_region(mind, owner, r)
-        )
-        for region in regions:
-            object_id = owner.get(region.id)
-            if object_id is None or object_id in beliefs:
-                object_id = _free_id(region.id, mind.objects.keys() | beliefs.keys())
-            owner.pop(region.id, None)
-            owner[region.id] = object_id
-            beliefs[object_id] = _sighted(mind.objects.get(object_id), object_id, region, mind.time)
-        newest = list(owner.items())[-self.settings.most_owners :]
-        mind = mind.with_objects(*beliefs.values())
-        return mind.remember(OWNERS, MappingProxyType(dict(newest)))
-
-    def _fresh(
-        self, known: Mapping[str, tuple[Percept, ...]], observation: Observation
-    ) -> Mapping[str, tuple[Percept, ...]]:
-        oldest = observation.time - self.settings.percept_age_s
-        fresh = {
-            k: kept for k, ps in known.items() if (kept := tuple(p for p in ps if p.time >= oldest))
-        }
-        new: dict[str, list[Percept]] = {}
-        for report in observation.reports:
-            for p in report.percepts:
-                if p.kind not in KNOWN_KINDS:
-                    new.setdefault(p.kind, []).append(p)
-        return MappingProxyType({**fresh, **{k: tuple(ps) for k, ps in new.items()}})
-
-    def _forget(self, mind: Mind) -> Mind:
-        gone = {i for i, b in mind.objects.items() if self._stale(b, mind.time)}
-        left = [b for i, b in mind.objects.items() if i not in gone]
-        left.sort(key=lambda b: (b.confirmed, b.last_seen, b.id))
-        gone |= {b.id for b in left[: max(0, len(left) - self.settings.most_objects)]}
-        return delete_objects(mind, frozenset(gone))
-
-    def _stale(self, belief: ObjectBelief, now: float) -> bool:
-        unseen = now - belief.last_seen
-        if not belief.confirmed:
-            return unseen > self.settings.forget_unconfirmed_s
-        if belief.presence is Presence.LEFT:
-            return unseen > self.settings.forget_left_s
-        return belief.presence is Presence.HIDDEN and unseen > self.settings.forget_hidden_s
-
-
-def _is_current_region(mind: Mind, owner: Mapping[int, int], region: Region) -> bool:
-    belief = mind.objects.get(owner.get(region.id, -1))
+def _is_current_region(mind: Mind, owners: Mapping[int, int], region: Region) -> bool:
+    belief = mind.objects.get(owners.get(region.id, -1))
     return belief is not None and belief.region.id == region.id
 
 
@@ -166,9 +80,3 @@ def _free_id(wanted: int, taken: set[int]) -> int:
     while wanted in taken:
         wanted += 1000
     return wanted
-
-
-def _sighted(old: ObjectBelief | None, id_: int, region: Region, now: float) -> ObjectBelief:
-    if old is None:
-        return ObjectBelief(id_, region, Presence.SEEN, first_seen=now, last_seen=now)
-    return replace(old, region=region, last_seen=now)

@@ -3,7 +3,7 @@
 A camera that sees motion now and then cuts a body in two: a shadow falls along an arm, a face of a
 spinning satellite moves unlike the rest of it. What first shows itself at, or within the outline
 of, something larger is therefore doubted until it has been clearly apart from that body for a while.
-Motion alone does not end a doubt: a sliver along an edge seems to slide on it (the aperture
+Motion alone does not end the doubt: a sliver along an edge seems to slide on it (the aperture
 problem), and its outline wanders. The price: of two bodies of unequal size that touch from the
 first sight on, the smaller one is not told before they part.
 
@@ -17,14 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from visup.agent import Mind, ObjectBelief, Presence, Region
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.outlines import outline_gap, prepared_outline
 from visup.rules.geometry.regions import DIRECTIONS, box_intersection, expanded, image_diagonal
 from visup.rules.presence.object_tracks import ObjectTrack, border_sides, predicted_box
-
-FRAGMENTS = "rules.fragments"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,23 +55,28 @@ class FragmentHypothesis:
 
     Attributes:
         body: Id of that object, or None while there is none.
-        over: Whether it has shown to be an object of its own; that is not doubted again.
+        rejected: Whether it has shown to be an object of its own; that is not doubted again.
         apart_since: Seconds since when it is clearly apart from the body, or None.
     """
 
     body: int | None = None
-    over: bool = False
+    rejected: bool = False
     apart_since: float | None = None
 
     @property
     def holds(self) -> bool:
         """Whether the region may be a part of a body now."""
-        return self.body is not None and not self.over
+        return self.body is not None and not self.rejected
+
+
+FRAGMENTS: MemoryKey[Mapping[int, FragmentHypothesis]] = MemoryKey(
+    "rules.fragments", MappingProxyType({})
+)
 
 
 @dataclass(frozen=True, slots=True)
 class FragmentTest:
-    """Keeps the doubts about regions from step to step."""
+    """Judges which new regions may be fragments, from step to step."""
 
     settings: FragmentSettings = FragmentSettings()
 
@@ -86,28 +91,30 @@ class FragmentTest:
         """Judge one step.
 
         Args:
-            before: Doubts of the step before, by object id.
+            before: What the step before found, by object id.
             mind: The mind; its unconfirmed objects are judged.
             of: Tracks by object id.
             starting: Whether the video has only begun.
 
         Returns:
-            A doubt for each unconfirmed object; those out of sight keep theirs.
+            A hypothesis for each unconfirmed object; those out of sight keep theirs.
         """
         bodies = [b for b in mind.objects.values() if b.presence is not Presence.LEFT]
-        doubts = {}
+        fragments = {}
         for new in mind.objects.values():
             if new.confirmed:
                 continue
-            doubt = before.get(new.id)
+            fragment = before.get(new.id)
             if new.last_seen == mind.time:
                 larger = [b for b in bodies if self._may_contain(b, new, of)]
-                if doubt is None:
-                    doubt = self._first(new, larger, mind, starting=starting)
-                doubt = doubt if doubt.over else self._again(doubt, new, larger, mind, of)
-            if doubt is not None:
-                doubts[new.id] = doubt
-        return doubts
+                if fragment is None:
+                    fragment = self._first(new, larger, mind, starting=starting)
+                fragment = (
+                    fragment if fragment.rejected else self._again(fragment, new, larger, mind, of)
+                )
+            if fragment is not None:
+                fragments[new.id] = fragment
+        return fragments
 
     def _first(
         self, new: ObjectBelief, bodies: Iterable[ObjectBelief], mind: Mind, *, starting: bool
@@ -117,28 +124,30 @@ class FragmentTest:
         if starting or not sides:
             return FragmentHypothesis()
         there = [b for b in bodies if sides & border_sides(b.region, mind.frame_size)]
-        return FragmentHypothesis(over=self._body_of(new.region, there, mind) is None)
+        return FragmentHypothesis(rejected=self._body_of(new.region, there, mind) is None)
 
     def _again(
         self,
-        doubt: FragmentHypothesis,
+        fragment: FragmentHypothesis,
         new: ObjectBelief,
         bodies: Iterable[ObjectBelief],
         mind: Mind,
         of: Mapping[int, ObjectTrack],
     ) -> FragmentHypothesis:
         body = self._body_of(new.region, bodies, mind)
-        body = body or mind.objects.get(-1 if doubt.body is None else doubt.body)
+        body = body or mind.objects.get(-1 if fragment.body is None else fragment.body)
         if body is None or body.presence is Presence.LEFT:
             return FragmentHypothesis()
-        if body.id != doubt.body:
-            doubt = FragmentHypothesis(body.id)
+        if body.id != fragment.body:
+            fragment = FragmentHypothesis(body.id)
         apart = self._gap(new.region, body.region, mind) is None and not self._in_place(
             new.region, of.get(body.id), mind
         )
-        since = (mind.time if doubt.apart_since is None else doubt.apart_since) if apart else None
+        since = (
+            (mind.time if fragment.apart_since is None else fragment.apart_since) if apart else None
+        )
         parted = since is not None and mind.time - since >= self.settings.apart_s - 1e-6
-        return replace(doubt, apart_since=since, over=parted)
+        return replace(fragment, apart_since=since, rejected=parted)
 
     def _in_place(self, region: Region, body: ObjectTrack | None, mind: Mind) -> bool:
         """Whether a region is mostly where a body should be, of which little is seen for now."""
@@ -155,7 +164,7 @@ class FragmentTest:
         if body.id == new.id or body.id not in of or body.last_seen < new.first_seen:
             return False
         # A body that has lost a part is judged by what it was.
-        whole = max(body.region.area, of[body.id].reference if body.confirmed else 0.0)
+        whole = max(body.region.area, of[body.id].reference_area if body.confirmed else 0.0)
         return new.region.area <= self.settings.part * whole
 
     def _gap(self, region: Region, body: Region, mind: Mind) -> float | None:
@@ -195,7 +204,7 @@ def in_place_of_hidden(new: ObjectBelief, mind: Mind, of: Mapping[int, ObjectTra
         track = of.get(old.id)
         if not old.confirmed or old.presence is Presence.LEFT or track is None:
             continue
-        if old.presence is Presence.SEEN and track.visible > 0.7:
+        if old.presence is Presence.SEEN and track.visible_share > 0.7:
             continue
         place = expanded(predicted_box(track, mind.time), 6)
         x, y, w, h = new.region.bbox

@@ -2,38 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from visup.agent import ObjectBelief
-from visup.agent.model.fast_replace import replace
 from visup.rules.presence.fragments import in_place_of_hidden
+from visup.rules.presence.lifecycle import confirm
 from visup.rules.presence.object_tracks import at_border
-from visup.rules.presence.reidentification import absorb_parts
+from visup.rules.presence.reidentification import absorb_parts, parts_of
 from visup.rules.presence.step_context import StepContext
+from visup.rules.wording.conditions import Condition, at_least
 
 STATIONARY_S = 1.0
 """What was in view for so long before it was seen to move had come before."""
 
 
-def initiate(work: StepContext, start: float) -> None:
-    """Confirm new objects; `start` is the time of the first observation, seconds."""
-    s = work.settings
-    for belief in work.seen():
-        track = work.of[belief.id]
-        if belief.confirmed or track.sightings < s.least_sightings:
+def confirm_new(context: StepContext) -> None:
+    """Confirm tentative objects that are seen now, unless they are known ones seen whole."""
+    for belief in context.seen():
+        if belief.confirmed or not context.decide("entry", belief.id, _conditions(context, belief)):
             continue
-        if work.doubted(belief) or in_place_of_hidden(belief, work.mind, work.of):
+        parts = parts_of(context, belief)
+        own = Condition("no known object was but a part of it", not parts)
+        if not context.decide("entry", belief.id, (own,)):
+            absorb_parts(context, belief, parts)
             continue
-        if _is_speck(work, belief):
-            continue
-        early = track.coherent_since - start <= s.start_s
-        at_edge = at_border(track.region, work.mind.frame_size)
-        needed = s.entry_s if early or at_edge else s.entry_inside_s
-        if work.now - track.coherent_since < needed - 1e-6:
-            continue
-        if absorb_parts(work, belief):
-            continue
-        work.put(replace(belief, confirmed=True), told="seen")
-        kind, template = _arrival(belief, start, early=early)
-        work.tell(kind, template, belief.id, confidence=_track_confidence(belief.region.confidence))
+        kind, template = _arrival(context, belief)
+        confirm(context, belief, kind, template, _track_confidence(belief.region.confidence))
+
+
+def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
+    """Of the entry of an object: seen often enough, no part of another, no speck, steadily."""
+    s, track = context.settings, context.of[belief.id]
+    yield at_least("sightings", track.sightings, s.least_sightings)
+    yield Condition("no part of another object", not context.may_be_part(belief))
+    hidden = in_place_of_hidden(belief, context.mind, context.of)
+    yield Condition("not in the place of a hidden object", not hidden)
+    if not belief.candidates:
+        width, height = context.mind.frame_size
+        least = s.least_share * width * height
+        text = "area, while nobody says what it is,"
+        yield at_least(text, belief.region.area, least, " px")
+    at_edge = at_border(track.region, context.mind.frame_size)
+    needed = s.entry_s if at_edge or _is_early(context, belief) else s.entry_inside_s
+    steady = context.now - track.coherent_since
+    yield at_least("seen steadily for", steady, needed, " s", slack=1e-6)
+
+
+def _is_early(context: StepContext, belief: ObjectBelief) -> bool:
+    """Whether it was there when the video began."""
+    since = context.of[belief.id].coherent_since
+    return since - context.start <= context.settings.start_s
 
 
 def _track_confidence(confidence: float) -> float:
@@ -44,22 +62,13 @@ def _track_confidence(confidence: float) -> float:
     return 1.0 - (1.0 - confidence) ** 2
 
 
-def _arrival(belief: ObjectBelief, start: float, *, early: bool) -> tuple[str, str]:
+def _arrival(context: StepContext, belief: ObjectBelief) -> tuple[str, str]:
     """Kind and sentence of the event: what rested in view before it moved does not enter."""
     since = belief.region.visible_since
-    if early:
+    if _is_early(context, belief):
         return "entry", "{0} {is} in view."
     if since is None or belief.first_seen - since < STATIONARY_S:
         return "entry", "{0} {enters} the field of view."
-    if since - start < STATIONARY_S:
+    if since - context.start < STATIONARY_S:
         return "noticed", "{0}, in view from the start, {begins} to move."
-    return "noticed", "{0}, in view since SINCE, {begins} to move.".replace(
-        "SINCE", f"{since:.1f} s"
-    )
-
-
-def _is_speck(work: StepContext, belief: ObjectBelief) -> bool:
-    """Whether a region is a speck, of which nobody says what it is."""
-    width, height = work.mind.frame_size
-    least = work.settings.least_share * width * height
-    return not belief.candidates and belief.region.area < least
+    return "noticed", f"{{0}}, in view since {since:.1f} s, {{begins}} to move."

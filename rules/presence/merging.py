@@ -1,4 +1,4 @@
-"""An object may go up in the region of another: two bodies that meet are soon seen as one."""
+"""An object may merge with another: two bodies that meet are soon seen as one region."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from visup.rules.presence.object_tracks import ObjectTrack
 from visup.rules.presence.step_context import StepContext
 
 
-def merge(work: StepContext) -> None:
-    """Find objects that went up in a region grown into the union of two."""
-    for gone in work.missing():
-        track = work.of.get(gone.id)
-        if track is None or track.told != "seen":
+def merge(context: StepContext) -> None:
+    """Find objects that merged with another one, whose region grew into the union of the two."""
+    for gone in context.missing():
+        track = context.of.get(gone.id)
+        if track is None or gone.presence is not Presence.SEEN:
             continue
         if track.merged_with is not None:
-            _stay_merged(work, gone, track)
+            _stay_merged(context, gone, track)
             continue
-        host = next((b for b in work.seen() if _has_absorbed(work, b, track)), None)
+        host = next((b for b in context.seen() if _has_absorbed(context, b, track)), None)
         if host is not None:
-            again = track.parted_at is not None and work.now - track.parted_at < 0.5
-            since = track.merged_since if again else work.now
-            work.put(gone, merged_with=host.id, merged_since=since)
+            again = track.parted_at is not None and context.now - track.parted_at < 0.5
+            since = track.merged_since if again else context.now
+            context.put(gone, merged_with=host.id, merged_since=since)
 
 
-def _stay_merged(work: StepContext, gone: ObjectBelief, track: ObjectTrack) -> None:
-    host = work.mind.objects.get(track.merged_with or -1)
+def _stay_merged(context: StepContext, gone: ObjectBelief, track: ObjectTrack) -> None:
+    host = context.mind.objects.get(track.merged_with or -1)
     if host is None or host.presence is not Presence.SEEN:
-        work.put(gone, merged_with=None, parted_at=work.now)
+        context.put(gone, merged_with=None, parted_at=context.now)
         return
-    before = work.of[host.id].region
-    if host.last_seen == work.now and host.region.area < 0.75 * before.area:
+    before = context.of[host.id].region
+    if host.last_seen == context.now and host.region.area < 0.75 * before.area:
         # The host's region is its own again; where the other one is shows in the next frames.
-        work.put(gone, merged_with=None, parted_at=work.now, seen_at=work.now)
+        context.put(gone, merged_with=None, parted_at=context.now, seen_at=context.now)
         return
     dx = host.region.centroid[0] - before.centroid[0]
     dy = host.region.centroid[1] - before.centroid[1]
-    work.put(replace(gone, region=shifted_region(gone.region, dx, dy)), seen_at=work.now)
+    context.put(replace(gone, region=shifted_region(gone.region, dx, dy)), seen_at=context.now)
 
 
-def _has_absorbed(work: StepContext, host: ObjectBelief, gone: ObjectTrack) -> bool:
-    before = work.of.get(host.id)
-    if before is None or not host.confirmed or gone.visible < work.settings.whole_share:
+def _has_absorbed(context: StepContext, host: ObjectBelief, gone: ObjectTrack) -> bool:
+    before = context.of.get(host.id)
+    if before is None or not host.confirmed or gone.visible_share < context.settings.whole_share:
         return False
     # The host's track stands still since its last sight: both were seen until much the same time.
-    if before.seen_at - gone.seen_at > work.settings.settle_s:
+    if before.seen_at - gone.seen_at > context.settings.settle_s:
         return False
     parts = gone.region.area + before.region.area
     if host.region.area < before.region.area + 0.5 * gone.region.area:

@@ -13,9 +13,9 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Region
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.regions import Box, box_intersection, expanded, shared_pixels, shifted
 
-TRACKS = "rules.presence"
 EXIT_HORIZON_S = 6.0
 """What is leaving is out of sight after so long, seconds."""
 
@@ -32,12 +32,12 @@ class ObjectTrack:
         seen_at: Seconds of that.
         coherent_since: Seconds since when sightings followed each other without a jump.
         sightings: How many since then.
-        fixes: Centroids of the last second in which it was in the clear; at most 16.
-        whole: Its box when last seen whole.
+        centroids: Those of the last second in which it was in the clear; at most 16.
+        whole_box: Its box when last seen whole.
         whole_at: Seconds of that.
-        drift: (vx, vy) when last in the clear, pixels per second.
-        reference: Area of the whole object, pixels.
-        visible: Share of the reference in sight, 0 to 1.
+        velocity: (vx, vy) when last in the clear, pixels per second.
+        reference_area: Area of the whole object, pixels.
+        visible_share: Share of the reference area in sight, 0 to 1.
         partial_since: Seconds since when only a small part shows, or None.
         clear_since: Seconds since when most of it shows again, or None.
         merged_with: The object in whose region it went up, or None.
@@ -45,28 +45,28 @@ class ObjectTrack:
         parted_at: Seconds when it last had a region of its own again, or None.
         changed_at: Seconds when it was given another region; shapes of the older one cannot be
             compared with those of the new one.
-        told: What was told last: '', 'seen', 'occluded', 'lost' or 'left'.
-        first: Its box when first seen.
+        lost: Whether it is hidden though nothing tells why.
+        first_box: Its box when first seen.
     """
 
     region: Region
     seen_at: float
     coherent_since: float
     sightings: int = 1
-    fixes: tuple[TimedCentroid, ...] = ()
-    whole: Box = (0, 0, 0, 0)
+    centroids: tuple[TimedCentroid, ...] = ()
+    whole_box: Box = (0, 0, 0, 0)
     whole_at: float = 0.0
-    drift: tuple[float, float] = (0.0, 0.0)
-    reference: float = 0.0
-    visible: float = 1.0
+    velocity: tuple[float, float] = (0.0, 0.0)
+    reference_area: float = 0.0
+    visible_share: float = 1.0
     partial_since: float | None = None
     clear_since: float | None = None
     merged_with: int | None = None
     merged_since: float = 0.0
     parted_at: float | None = None
     changed_at: float = -1.0
-    told: str = ""
-    first: Box = (0, 0, 0, 0)
+    lost: bool = False
+    first_box: Box = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +82,12 @@ class PresenceMemory:
     of: Mapping[int, ObjectTrack] = field(default_factory=lambda: MappingProxyType({}))
 
 
-EMPTY_MEMORY = PresenceMemory()
+TRACKS = MemoryKey("rules.presence", PresenceMemory())
 
 
 def presence_memory(mind: Mind) -> PresenceMemory:
     """The tracks that the mind remembers."""
-    found: PresenceMemory = mind.memory.get(TRACKS, EMPTY_MEMORY)
-    return found
+    return mind.recall(TRACKS)
 
 
 def merged_pairs(mind: Mind) -> tuple[tuple[int, int], ...]:
@@ -106,22 +105,22 @@ def visible_share(mind: Mind, object_id: int) -> float:
     if track is None:
         return 1.0
     merged = track.merged_with is not None or any(t.merged_with == object_id for t in of.values())
-    return 0.0 if merged else track.visible
+    return 0.0 if merged else track.visible_share
 
 
 def new_track(region: Region, now: float) -> ObjectTrack:
     """The track of an object seen for the first time."""
-    fix = (now, *region.centroid)
+    centroid = (now, *region.centroid)
     return ObjectTrack(
         region,
         now,
         now,
-        fixes=(fix,),
-        whole=region.bbox,
+        centroids=(centroid,),
+        whole_box=region.bbox,
         whole_at=now,
-        reference=region.area,
+        reference_area=region.area,
         changed_at=now,
-        first=region.bbox,
+        first_box=region.bbox,
     )
 
 
@@ -146,31 +145,33 @@ def update_track(
     reference = _reference_area(track, region, dt, crowded)
     visible = min(1.0, region.area / max(reference, 1.0))
     clear = not crowded and visible > 0.7
-    fixes = _recent_centroids(track.fixes, (now, *region.centroid)) if clear else track.fixes
+    centroids = (
+        _recent_centroids(track.centroids, (now, *region.centroid)) if clear else track.centroids
+    )
     return replace(
         track,
         region=region,
         seen_at=now,
         coherent_since=track.coherent_since if smooth else now,
         sightings=track.sightings + 1 if smooth else 1,
-        fixes=fixes,
-        whole=region.bbox if clear else track.whole,
+        centroids=centroids,
+        whole_box=region.bbox if clear else track.whole_box,
         whole_at=now if clear else track.whole_at,
-        drift=_velocity(track, region, fixes, dt) if clear else track.drift,
-        reference=reference,
-        visible=visible,
+        velocity=_velocity(track, region, centroids, dt) if clear else track.velocity,
+        reference_area=reference,
+        visible_share=visible,
     )
 
 
 def predicted_box(track: ObjectTrack, now: float) -> Box:
     """Where the whole object should be now, from where it was and how it drifted; 3 s ahead at most."""
     ahead = min(now - track.whole_at, 3.0)
-    return shifted(track.whole, track.drift[0] * ahead, track.drift[1] * ahead)
+    return shifted(track.whole_box, track.velocity[0] * ahead, track.velocity[1] * ahead)
 
 
 def predicted_share_outside(track: ObjectTrack, now: float, frame_size: tuple[int, int]) -> float:
     """Share of the object's last box that should have left the image by now, 0 to 1."""
-    vx, vy = track.drift
+    vx, vy = track.velocity
     ahead = now - track.seen_at
     box = shifted(track.region.bbox, vx * ahead, vy * ahead)
     inside = box_intersection(box, (0, 0, *frame_size))
@@ -184,7 +185,7 @@ def heading_out(track: ObjectTrack, frame_size: tuple[int, int], margin: int = 3
     the image and whose drift is noise, is not leaving whatever happens to it.
     """
     x, y, w, h = track.region.bbox
-    vx, vy = track.drift
+    vx, vy = track.velocity
     width, height = frame_size
     # For each edge: how near it the box is, its pace towards it, and the way to go until it is out.
     edges = (
@@ -232,23 +233,23 @@ def _coherent(before: Region, after: Region) -> bool:
 
 def _reference_area(track: ObjectTrack, region: Region, dt: float, crowded: bool) -> float:
     if crowded:
-        return track.reference
+        return track.reference_area
     if region.cut:
-        return max(region.area, track.reference * exp(-dt / 8.0))
-    return track.reference + (region.area - track.reference) * (1.0 - exp(-dt / 0.5))
+        return max(region.area, track.reference_area * exp(-dt / 8.0))
+    return track.reference_area + (region.area - track.reference_area) * (1.0 - exp(-dt / 0.5))
 
 
 def _recent_centroids(
-    fixes: tuple[TimedCentroid, ...], fix: TimedCentroid
+    centroids: tuple[TimedCentroid, ...], new: TimedCentroid
 ) -> tuple[TimedCentroid, ...]:
-    if fixes and fix[0] - fixes[-1][0] < 1.0 / 16.0:
-        return fixes
-    since = fix[0] - 1.0
-    return (*[f for f in fixes if f[0] > since], fix)[-16:]
+    if centroids and new[0] - centroids[-1][0] < 1.0 / 16.0:
+        return centroids
+    since = new[0] - 1.0
+    return (*[c for c in centroids if c[0] > since], new)[-16:]
 
 
 def _velocity(
-    track: ObjectTrack, region: Region, fixes: tuple[TimedCentroid, ...], dt: float
+    track: ObjectTrack, region: Region, centroids: tuple[TimedCentroid, ...], dt: float
 ) -> tuple[float, float]:
     """How it moves: by image motion where that is known, else by how its centroid moved.
 
@@ -256,13 +257,13 @@ def _velocity(
     """
     if region.velocity_sigma > 0.0:
         share = max(1.0 - exp(-dt / 0.4), 1.0 / track.sightings)
-        old, new = track.drift, region.velocity
+        old, new = track.velocity, region.velocity
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
-    if len(fixes) < 3:
+    if len(centroids) < 3:
         # Too few places tell nothing: what is known stays.
-        return track.drift
-    middle = sum([t for t, _, _ in fixes]) / len(fixes)
-    lever = sum([(t - middle) ** 2 for t, _, _ in fixes])
-    along = sum([(t - middle) * x for t, x, _ in fixes])
-    down = sum([(t - middle) * y for t, _, y in fixes])
+        return track.velocity
+    middle = sum([t for t, _, _ in centroids]) / len(centroids)
+    lever = sum([(t - middle) ** 2 for t, _, _ in centroids])
+    along = sum([(t - middle) * x for t, x, _ in centroids])
+    down = sum([(t - middle) * y for t, _, y in centroids])
     return along / lever, down / lever

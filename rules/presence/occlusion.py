@@ -1,10 +1,17 @@
-"""Who goes, hides and comes back: a little of an object shows, most of it again, or nothing."""
+"""Who hides, goes and comes back: a little of an object shows, most of it again, or nothing.
+
+The gate that decides that an object has left stands here too (`_exit_conditions` for one of which a
+little still shows, `_missing_exit_conditions` for one of which nothing does): what goes over the border
+and what something hides are told from each other by the same evidence.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from visup.agent import ObjectBelief, Presence
-from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import expanded, pixels_in, shared_pixels
+from visup.rules.presence.lifecycle import leave, lose, occlude, reappear
 from visup.rules.presence.object_tracks import (
     ObjectTrack,
     at_border,
@@ -13,135 +20,184 @@ from visup.rules.presence.object_tracks import (
     predicted_share_outside,
 )
 from visup.rules.presence.step_context import StepContext
+from visup.rules.wording.conditions import Condition, at_least, less_than, more_than
+
+PARTLY_OUT = 0.35
+"""What showed less than this share of itself when last seen was on its way out."""
 
 
-def update_visible(work: StepContext) -> None:
+def update_visible(context: StepContext) -> None:
     """Confirmed objects that are seen now: do they hide, leave, come back?"""
-    for belief in work.seen():
-        track = work.of[belief.id]
+    for belief in context.seen():
         if not belief.confirmed:
             continue
         if belief.presence is Presence.SEEN:
-            _check_hiding(work, belief, track)
+            _check_hiding(context, belief)
         else:
-            _check_reappearance(work, belief, track)
+            _check_reappearance(context, belief)
 
 
-def _check_hiding(work: StepContext, belief: ObjectBelief, track: ObjectTrack) -> None:
-    s = work.settings
-    leaving = (
-        track.visible < s.leaving_share
-        and at_border(track.region, work.mind.frame_size)
-        and heading_out(track, work.mind.frame_size)
-    )
-    hiding = track.visible < s.hidden_share and _occluder(work, belief) is not None
-    if not (leaving or hiding):
-        work.put(belief, partial_since=None)
+def _check_hiding(context: StepContext, belief: ObjectBelief) -> None:
+    track = context.of[belief.id]
+    hiding = context.decide("occlusion", belief.id, _occlusion_conditions(context, belief))
+    leaving = context.decide("exit", belief.id, _exit_conditions(context, track, hiding))
+    if not (hiding or leaving):
+        context.put(belief, partial_since=None)
         return
-    since = work.now if track.partial_since is None else track.partial_since
-    work.put(belief, partial_since=since)
-    if work.now - since < s.partial_s - 1e-6:
+    since = context.now if track.partial_since is None else track.partial_since
+    context.put(belief, partial_since=since)
+    lasted = at_least(
+        "that lasts for", context.now - since, context.settings.partial_s, " s", slack=1e-6
+    )
+    if not context.decide("occlusion" if hiding else "exit", belief.id, (lasted,)):
         return
     if hiding:
-        _hide(work, belief)
+        occlude(context, belief, _occluder(context, belief))
     else:
-        _leave(work, belief, 0.9)
+        leave(context, belief)
 
 
-def _check_reappearance(work: StepContext, belief: ObjectBelief, track: ObjectTrack) -> None:
-    s = work.settings
-    crowded = _occluder(work, belief) is not None
-    shows = track.visible > s.shown_share and (
-        belief.presence is Presence.HIDDEN or track.visible > 2 * s.leaving_share
+def _occlusion_conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Condition]:
+    """Of an object being hidden of which a little shows."""
+    visible, s = context.of[belief.id].visible_share, context.settings
+    yield less_than("share of it that shows", visible, s.hidden_share)
+    yield Condition("another object covers it", _occluder(context, belief) is not None)
+
+
+def _exit_conditions(context: StepContext, track: ObjectTrack, hiding: bool) -> Iterator[Condition]:
+    """Of an object having left of which a little shows."""
+    size = context.mind.frame_size
+    yield less_than("share of it that shows", track.visible_share, context.settings.leaving_share)
+    yield Condition("it is at the border of the image", at_border(track.region, size))
+    yield Condition("it is moving over the border", heading_out(track, size))
+    yield Condition("no other object hides it", not hiding)
+
+
+def _check_reappearance(context: StepContext, belief: ObjectBelief) -> None:
+    track = context.of[belief.id]
+    if not context.decide(
+        "reappearance", belief.id, _reappearance_conditions(context, belief, track)
+    ):
+        context.put(belief, clear_since=None)
+        return
+    since = context.now if track.clear_since is None else track.clear_since
+    context.put(belief, clear_since=since)
+    lasted = at_least(
+        "that lasts for", context.now - since, context.settings.shown_s, " s", slack=1e-6
     )
-    clear = belief.presence is Presence.HIDDEN and not crowded and track.visible > s.hidden_share
-    if not (shows or clear):
-        work.put(belief, clear_since=None)
-        return
-    since = work.now if track.clear_since is None else track.clear_since
-    work.put(belief, clear_since=since)
-    if work.now - since < s.shown_s - 1e-6:
-        return
-    shown = replace(belief, presence=Presence.SEEN)
-    told = track.told
-    work.put(shown, told="seen", clear_since=None, partial_since=None)
-    if told == "left":
-        work.tell("entry", "{0} {comes} back into the field of view.", belief.id)
-    elif told == "lost":
-        work.tell("found", "{0} {is} seen again.", belief.id)
+    if context.decide("reappearance", belief.id, (lasted,)):
+        reappear(context, belief)
+
+
+def _reappearance_conditions(
+    context: StepContext, belief: ObjectBelief, track: ObjectTrack
+) -> Iterator[Condition]:
+    """Most of it must show; of one that was hidden, less is enough once nothing covers it."""
+    s = context.settings
+    if belief.presence is Presence.LEFT:
+        needed = max(s.shown_share, 2 * s.leaving_share)
     else:
-        work.tell("reappearance", "{0} {reappears}.", belief.id)
+        needed = s.shown_share
+        if _occluder(context, belief) is None:
+            needed = min(s.shown_share, s.hidden_share)
+    yield more_than("share of it that shows", track.visible_share, needed)
 
 
-def update_missing(work: StepContext) -> None:
+def update_missing(context: StepContext) -> None:
     """Confirmed objects without a region: hidden, gone, or lost?"""
-    s = work.settings
-    for belief in work.missing():
-        track = work.of.get(belief.id)
+    for belief in context.missing():
+        track = context.of.get(belief.id)
         if track is None or belief.presence is not Presence.SEEN:
             continue
-        if track.merged_with is not None or work.now - track.seen_at < s.settle_s - 1e-6:
+        gate = tuple(_missing_conditions(context, track))
+        for kind in ("exit", "occlusion", "loss"):
+            context.decide(kind, belief.id, gate)
+        if not all(c.met for c in gate):
             continue
-        cover = _occluder(work, belief)
-        out = heading_out(track, work.mind.frame_size) and (
-            track.visible < 0.35
-            or predicted_share_outside(track, work.now, work.mind.frame_size) > 0.5
+        occluder = _occluder(context, belief)
+        leaving = context.decide(
+            "exit", belief.id, _missing_exit_conditions(context, track, occluder)
         )
-        if out and (cover is None or track.visible > s.hidden_share):
-            _leave(work, belief, 0.9)
-        elif cover is not None and _is_hidden_by(work, track, cover):
-            _hide(work, belief, cover)
-        elif work.now - track.seen_at >= s.lost_s - 1e-6:
-            work.put(replace(belief, presence=Presence.HIDDEN), told="lost", clear_since=None)
-            work.tell(
-                "lost", "{0} {is} lost: it is no longer seen, and nothing tells why.", belief.id
-            )
+        hidden = context.decide(
+            "occlusion", belief.id, _missing_occlusion_conditions(context, track, occluder, leaving)
+        )
+        lost = context.decide(
+            "loss", belief.id, _loss_conditions(context, track, leaving or hidden)
+        )
+        if leaving:
+            leave(context, belief)
+        elif hidden:
+            occlude(context, belief, occluder)
+        elif lost:
+            lose(context, belief)
 
 
-def _is_hidden_by(work: StepContext, track: ObjectTrack, cover: ObjectBelief) -> bool:
-    """Whether so little of a missing object would show beside its cover that it is not just missed."""
-    s = work.settings
-    covered = shared_pixels(cover.region, track.region) / max(1.0, track.region.area)
-    showing = track.visible * (1.0 - covered)
-    return showing < s.hidden_share or work.now - track.seen_at >= s.missed_s - 1e-6
+def _missing_conditions(context: StepContext, track: ObjectTrack) -> Iterator[Condition]:
+    """Of anything being concluded from an object's being missing."""
+    yield Condition("it has not merged with another object", track.merged_with is None)
+    missing = context.now - track.seen_at
+    yield at_least("missing for", missing, context.settings.settle_s, " s", slack=1e-6)
 
 
-def _occluder(work: StepContext, belief: ObjectBelief) -> ObjectBelief | None:
+def _missing_exit_conditions(
+    context: StepContext, track: ObjectTrack, occluder: ObjectBelief | None
+) -> Iterator[Condition]:
+    size = context.mind.frame_size
+    yield Condition("it was moving over the border", heading_out(track, size))
+    out = (
+        track.visible_share < PARTLY_OUT or predicted_share_outside(track, context.now, size) > 0.5
+    )
+    yield Condition("most of it should be outside by now", out)
+    apart = occluder is None or track.visible_share > context.settings.hidden_share
+    yield Condition("no other object hides it", apart)
+
+
+def _missing_occlusion_conditions(
+    context: StepContext, track: ObjectTrack, occluder: ObjectBelief | None, leaving: bool
+) -> Iterator[Condition]:
+    """It is not just missed when little of it would show, or when it is missing for long."""
+    s = context.settings
+    yield Condition("it has not left", not leaving)
+    yield Condition("another object covers its place", occluder is not None)
+    if occluder is None:
+        return
+    covered = shared_pixels(occluder.region, track.region) / max(1.0, track.region.area)
+    showing = track.visible_share * (1.0 - covered)
+    if showing < s.hidden_share:
+        yield less_than("share of it that would show", showing, s.hidden_share)
+    else:
+        text = "missing, though much of it would show, for"
+        yield at_least(text, context.now - track.seen_at, s.missed_s, " s", slack=1e-6)
+
+
+def _loss_conditions(
+    context: StepContext, track: ObjectTrack, explained: bool
+) -> Iterator[Condition]:
+    yield Condition("nothing tells why", not explained)
+    missing = context.now - track.seen_at
+    yield at_least("missing for no reason for", missing, context.settings.lost_s, " s", slack=1e-6)
+
+
+def _occluder(context: StepContext, belief: ObjectBelief) -> ObjectBelief | None:
     """The object whose region stands where this one should be, or beside what is left of it."""
-    track, s = work.of[belief.id], work.settings
-    place = predicted_box(track, work.now)
     best: tuple[float, ObjectBelief] | None = None
-    for other in work.seen():
-        if other.id == belief.id or work.doubted(other, belief):
+    for other in context.seen():
+        if other.id == belief.id or context.may_be_part(other, belief):
             continue
-        if belief.last_seen == work.now and work.near(belief.region, other.region):
+        if belief.last_seen == context.now and context.near(belief.region, other.region):
             return other
-        # What stands on the very pixels where it was last seen has moved there since.
-        share = shared_pixels(other.region, track.region) / max(1.0, track.region.area)
-        if track.visible < s.whole_share:
-            # Of one that was going out of sight already, the rest may be anywhere in its place.
-            spot = expanded(track.region.bbox, 6)
-            share = max(
-                share,
-                pixels_in(other.region, place) / max(1, place[2] * place[3]),
-                pixels_in(other.region, spot) / max(1, spot[2] * spot[3]),
-            )
+        share = _covered_share(context, context.of[belief.id], other)
         if share > 0.3 and (best is None or share > best[0]):
             best = (share, other)
     return best[1] if best else None
 
 
-def _hide(work: StepContext, belief: ObjectBelief, cover: ObjectBelief | None = None) -> None:
-    cover = cover or _occluder(work, belief)
-    hidden = replace(belief, presence=Presence.HIDDEN)
-    work.put(hidden, told="occluded", partial_since=None, clear_since=None)
-    if cover is not None and cover.confirmed:
-        work.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, cover.id)
-    else:
-        work.tell("occlusion", "{0} {is} hidden.", belief.id)
-
-
-def _leave(work: StepContext, belief: ObjectBelief, confidence: float) -> None:
-    gone = replace(belief, presence=Presence.LEFT)
-    work.put(gone, told="left", partial_since=None, clear_since=None)
-    work.tell("exit", "{0} {leaves} the field of view.", belief.id, confidence=confidence)
+def _covered_share(context: StepContext, track: ObjectTrack, other: ObjectBelief) -> float:
+    """Share of the place of an object that another one's region takes."""
+    # What stands on the very pixels where it was last seen has moved there since.
+    share = shared_pixels(other.region, track.region) / max(1.0, track.region.area)
+    if track.visible_share >= context.settings.whole_share:
+        return share
+    # Of one that was going out of sight already, the rest may be anywhere in its place.
+    places = predicted_box(track, context.now), expanded(track.region.bbox, 6)
+    return max(share, *(pixels_in(other.region, p) / max(1, p[2] * p[3]) for p in places))

@@ -1,30 +1,22 @@
 """Who is there: entry, exit, occlusion, reappearance (paper, section 5).
 
-An entry is told when a region has been seen steadily; a region that vanished was hidden when
-another one stands where it should be, left when it was going over the image border, went up in
+An entry is reported when a region has been seen steadily; an object without a region was hidden when
+another one stands where it should be, left when it was going over the image border, merged with
 another when that grew into the union of the two, and is lost when none of that explains it: a
 camera that sees motion loses what stops. A decision waits over several frames. A new region near
 the place where a missing object should be is that object, which keeps its id; one at another
 object may be a part of it and has to show that it is not.
-
-Each of these stands in a file of its own, in the order in which `PresenceReasoner` runs them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Mind, ObjectBelief, Observation, Outcome
-from visup.agent.model.fast_replace import replace
-from visup.rules.presence.fragments import (
-    FRAGMENTS,
-    FragmentHypothesis,
-    FragmentSettings,
-    FragmentTest,
-)
-from visup.rules.presence.initiation import initiate
+from visup.agent import Mind, ObjectBelief, Observation, Outcome, Presence
+from visup.rules.presence.fragments import FRAGMENTS, FragmentSettings, FragmentTest
+from visup.rules.presence.initiation import confirm_new
 from visup.rules.presence.merging import merge
 from visup.rules.presence.object_tracks import (
     TRACKS,
@@ -36,14 +28,16 @@ from visup.rules.presence.object_tracks import (
 )
 from visup.rules.presence.occlusion import update_missing, update_visible
 from visup.rules.presence.reidentification import reidentify
-from visup.rules.presence.step_context import PresenceSettings, StepContext
+from visup.rules.presence.settings import PresenceSettings
+from visup.rules.presence.step_context import StepContext
+from visup.rules.wording.conditions import Condition, DecisionLog
 
 __all__ = ["PresenceReasoner", "PresenceSettings", "visible_share"]
 
 
 @dataclass(frozen=True, slots=True)
 class PresenceReasoner:
-    """Reasoner of the cogitate phase: keeps who is there, tells who comes, goes, hides and shows.
+    """Reasoner of the cogitate phase: who is there; reports who comes, goes, hides and shows.
 
     When no behaviour looked for regions in this step, nothing is concluded.
     """
@@ -53,54 +47,104 @@ class PresenceReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
+        return self._judged(mind, observation, None)
+
+    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:
+        """What the decisions of a step hang on: 'entry', 'exit', 'occlusion', 'loss', 'reappearance'.
+
+        Args:
+            mind: As this reasoner got it in that step.
+            observation: What was perceived.
+        """
+        log = DecisionLog()
+        after = self._judged(mind, observation, log).mind.objects
+        for i, belief in mind.objects.items():
+            for kind in DECISIONS:
+                if (kind, (i,)) not in log:
+                    found = _not_considered(kind, belief, after.get(i), observation)
+                    log[kind, (i,)] = tuple(found)
+        return log
+
+    def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
         if not observation.observed("region"):
             return Outcome(mind)
+        context = self._context(mind, observation, log)
+        reidentify(context)
+        merge(context)
+        _update_tracks(context)
+        starting = context.now - context.start <= self.settings.start_s
+        test = FragmentTest(self.fragments)
+        context.fragments = test(context.fragments, context.mind, context.of, starting=starting)
+        confirm_new(context)
+        update_visible(context)
+        update_missing(context)
+        return Outcome(_remembered(context), tuple(context.events))
+
+    def _context(
+        self, mind: Mind, observation: Observation, log: DecisionLog | None
+    ) -> StepContext:
         old = presence_memory(mind)
-        start = observation.time if old.start is None else old.start
         known = {i: t for i, t in old.of.items() if i in mind.objects}
-        doubts: Mapping[int, FragmentHypothesis] = mind.memory.get(FRAGMENTS, MappingProxyType({}))
-        work = StepContext(mind, observation, known, doubts, self.settings)
-        reidentify(work)
-        merge(work)
-        _update_tracks(work)
-        starting = work.now - start <= self.settings.start_s
-        work.doubts = FragmentTest(self.fragments)(doubts, work.mind, work.of, starting=starting)
-        initiate(work, start)
-        update_visible(work)
-        update_missing(work)
-        kept = {i: t for i, t in work.of.items() if i in work.mind.objects}
-        told = {
-            TRACKS: PresenceMemory(start, MappingProxyType(kept)),
-            FRAGMENTS: MappingProxyType(dict(work.doubts)),
-        }
-        memory = MappingProxyType({**work.mind.memory, **told})
-        return Outcome(replace(work.mind, memory=memory), tuple(work.events))
+        fragments = mind.recall(FRAGMENTS)
+        start = observation.time if old.start is None else old.start
+        return StepContext(mind, observation, known, fragments, self.settings, start, log)
 
 
-def _update_tracks(work: StepContext) -> None:
-    seen = work.seen()
-    around = _recently_seen(work)
-    hosts = {t.merged_with for t in work.of.values()}
+DECISIONS = ("entry", "exit", "occlusion", "loss", "reappearance")
+
+
+def _not_considered(
+    kind: str, belief: ObjectBelief, after: ObjectBelief | None, observation: Observation
+) -> Iterator[Condition]:
+    """What must be so before anything is decided about an object, by what was believed of it."""
+    yield Condition("somebody looked for regions", observation.observed("region"))
+    yield Condition("it is no known object seen again", after is not None)
+    seen = after is not None and after.last_seen == observation.time
+    if kind == "entry":
+        yield Condition("it has not entered before", not belief.confirmed)
+        yield Condition("it is seen", seen)
+        return
+    yield Condition("it has entered", after is not None and after.confirmed)
+    if kind == "reappearance":
+        yield Condition("it is hidden or has left", belief.presence is not Presence.SEEN)
+        yield Condition("it is seen", seen)
+        return
+    yield Condition("it was not hidden or gone before", belief.presence is Presence.SEEN)
+    if kind == "loss":
+        yield Condition("it is not seen", not seen)
+
+
+def _remembered(context: StepContext) -> Mind:
+    """The mind with what is remembered of objects that are still known."""
+    kept = {i: t for i, t in context.of.items() if i in context.mind.objects}
+    mind = context.mind.remember(TRACKS, PresenceMemory(context.start, MappingProxyType(kept)))
+    return mind.remember(FRAGMENTS, MappingProxyType(dict(context.fragments)))
+
+
+def _update_tracks(context: StepContext) -> None:
+    seen = context.seen()
+    around = _recently_seen(context)
+    hosts = {t.merged_with for t in context.of.values()}
     for belief in seen:
-        track = work.of.get(belief.id)
+        track = context.of.get(belief.id)
         if track is None:
-            work.of[belief.id] = new_track(belief.region, work.now)
+            context.of[belief.id] = new_track(belief.region, context.now)
             continue
         if track.merged_with is not None:
             # It has a region of its own again.
-            work.put(belief, merged_with=None, parted_at=work.now)
-            track = work.of[belief.id]
+            context.put(belief, merged_with=None, parted_at=context.now)
+            track = context.of[belief.id]
         crowded = belief.id in hosts or any(
-            work.near(belief.region, other.region)
+            context.near(belief.region, other.region)
             for other in around
-            if other.id != belief.id and not work.doubted(other, belief)
+            if other.id != belief.id and not context.may_be_part(other, belief)
         )
-        work.of[belief.id] = update_track(
-            track, belief.region, work.now, crowded, work.settings.allowed_gap_s
+        context.of[belief.id] = update_track(
+            track, belief.region, context.now, crowded, context.settings.allowed_gap_s
         )
 
 
-def _recently_seen(work: StepContext) -> list[ObjectBelief]:
+def _recently_seen(context: StepContext) -> list[ObjectBelief]:
     """Objects that are seen, or were a flicker ago: all that may hide a part of another."""
-    since = work.now - work.settings.allowed_gap_s
-    return [b for b in work.mind.objects.values() if b.last_seen >= since]
+    since = context.now - context.settings.allowed_gap_s
+    return [b for b in context.mind.objects.values() if b.last_seen >= since]

@@ -13,6 +13,7 @@ from visup.agent import ObjectBelief, Presence
 from visup.rules.geometry.regions import box_intersection, box_iou, expanded
 from visup.rules.presence.association import delete_objects, reassign_region
 from visup.rules.presence.fragments import share_within
+from visup.rules.presence.lifecycle import demote
 from visup.rules.presence.object_tracks import border_sides, new_track, predicted_box, sides_of
 from visup.rules.presence.step_context import StepContext
 
@@ -23,74 +24,83 @@ WITHIN = 0.5
 """Share of the object's outline inside the hull of the region by which it is within it."""
 
 
-def reidentify(work: StepContext) -> None:
+def reidentify(context: StepContext) -> None:
     """Give new regions to the missing objects that they show."""
-    for new in work.seen():
+    for new in context.seen():
         if new.confirmed:
             continue
-        scored = [(_match_score(work, new, b), b) for b in work.missing() if b.id in work.of]
+        scored = [
+            (_match_score(context, new, b), b) for b in context.missing() if b.id in context.of
+        ]
         score, old = max(scored, key=lambda s: (s[0], -s[1].id), default=(0.0, new))
         if score <= 0.0:
             continue
-        work.mind = delete_objects(work.mind, frozenset({new.id}))
-        work.mind = reassign_region(work.mind, new.region.id, old.id)
-        taken = replace(old, region=new.region, last_seen=work.now)
-        work.put(taken, merged_with=None, changed_at=work.now)
+        _take_region(context, new, old)
+        taken = replace(old, region=new.region, last_seen=context.now)
+        context.put(taken, merged_with=None, changed_at=context.now)
 
 
-def absorb_parts(work: StepContext, whole: ObjectBelief) -> bool:
-    """Whether known objects were parts of a new region; the oldest of them then becomes it.
+def parts_of(context: StepContext, whole: ObjectBelief) -> list[ObjectBelief]:
+    """Known objects that were but parts of a new region, by id."""
+    return [b for b in context.seen() if b.confirmed and _was_part(context, b, whole)]
+
+
+def absorb_parts(context: StepContext, whole: ObjectBelief, parts: list[ObjectBelief]) -> None:
+    """The oldest of some objects that were parts of a new region becomes it.
 
     The others count as parts from now on: they have to show that they are more, as any fragment.
     """
-    parts = [b for b in work.seen() if b.confirmed and _was_part(work, b, whole)]
-    if not parts:
-        return False
-    work.mind = delete_objects(work.mind, frozenset({whole.id}))
-    work.mind = reassign_region(work.mind, whole.region.id, parts[0].id)
-    work.of[parts[0].id] = replace(new_track(whole.region, work.now), told="seen")
-    work.mind = work.mind.with_objects(replace(parts[0], region=whole.region))
+    oldest = parts[0]
+    _take_region(context, whole, oldest)
+    context.of[oldest.id] = new_track(whole.region, context.now)
+    context.mind = context.mind.with_objects(replace(oldest, region=whole.region))
     for other in parts[1:]:
-        work.put(replace(other, confirmed=False), told="")
-    return True
+        demote(context, other)
 
 
-def _was_part(work: StepContext, part: ObjectBelief, whole: ObjectBelief) -> bool:
-    track, size = work.of[part.id], work.mind.frame_size
-    if part.region.area > PART * whole.region.area or sides_of(track.first, size):
+def _take_region(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> None:
+    """The region of a new object belongs to an old one from now on; the new one is deleted."""
+    mind = delete_objects(context.mind, frozenset({new.id}))
+    context.mind = reassign_region(mind, new.region.id, old.id)
+
+
+def _was_part(context: StepContext, part: ObjectBelief, whole: ObjectBelief) -> bool:
+    track, size = context.of[part.id], context.mind.frame_size
+    if part.region.area > PART * whole.region.area or sides_of(track.first_box, size):
         return False
-    width, height = track.first[2:]
-    x, y, w, h = expanded(track.first, round(max(width, height) / 2))
+    width, height = track.first_box[2:]
+    x, y, w, h = expanded(track.first_box, round(max(width, height) / 2))
     stayed = x <= part.region.centroid[0] < x + w and y <= part.region.centroid[1] < y + h
     return stayed and share_within(part.region, whole.region) >= WITHIN
 
 
-def _match_score(work: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
+def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
     """How well a new region suits a missing object; 0 when it does not."""
-    track = work.of[old.id]
+    track = context.of[old.id]
     if track.merged_with is not None:
         iou = box_iou(new.region.bbox, old.region.bbox)
         return iou if iou > 0.3 else 0.0
-    if old.presence is Presence.HIDDEN and work.now - new.first_seen < work.settings.adopt_s:
+    if (
+        old.presence is Presence.HIDDEN
+        and context.now - new.first_seen < context.settings.reidentify_s
+    ):
         return 0.0
-    coming = _share_border_side(work, new, old)
-    ratio = new.region.area / max(track.reference, 1.0)
-    if (ratio > 1.8 and not coming) or (track.told == "seen" and ratio < 0.3):
+    coming = _share_border_side(context, new, old)
+    ratio = new.region.area / max(track.reference_area, 1.0)
+    if (ratio > 1.8 and not coming) or (old.presence is Presence.SEEN and ratio < 0.3):
         return 0.0
     # The longer it was out of sight, the less is known of where it is.
-    away = min(work.now - track.whole_at, 3.0)
-    place = expanded(predicted_box(track, work.now), round(4 + 8 * away))
+    away = min(context.now - track.whole_at, 3.0)
+    place = expanded(predicted_box(track, context.now), round(4 + 8 * away))
     area = new.region.bbox[2] * new.region.bbox[3]
     area = min(area, place[2] * place[3]) if coming else area
     within = box_intersection(new.region.bbox, place) / max(1, area)
-    if within < 0.5 or not _names_agree(new, old):
-        return 0.0
-    return min(within, 1.0)
+    return min(within, 1.0) if within >= 0.5 and _names_agree(new, old) else 0.0
 
 
-def _share_border_side(work: StepContext, new: ObjectBelief, old: ObjectBelief) -> bool:
+def _share_border_side(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> bool:
     """Whether both are cut by one side of the image: of what comes in, ever more shows."""
-    size = work.mind.frame_size
+    size = context.mind.frame_size
     return bool(border_sides(new.region, size) & border_sides(old.region, size))
 
 

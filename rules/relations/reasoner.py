@@ -41,6 +41,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import ColumnLayout, RelationBlock
 from visup.rules.geometry._fit_jit import binned_trends
 from visup.rules.geometry.ema import new_share
@@ -77,7 +78,6 @@ from visup.rules.relations.samples import SampleWindow, covers_window, sampled
 from visup.rules.relations.thresholds import AWAY, BOX_ROWS, ORDER, SIDE, least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 
-RELATIONS = "rules.relations"
 DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
 TOWARDS_NAMES = ("moving_towards", "steady_to", "moving_away_from")
 SIDE_NAMES = ("moving_left_of", "", "moving_right_of")
@@ -164,12 +164,12 @@ class RelationMemory:
     smooth: SmoothedGeometry = field(default_factory=lambda: _no_smooth())
 
 
-EMPTY_MEMORY = RelationMemory()
+RELATIONS = MemoryKey("rules.relations", RelationMemory())
 
 
 def kinematics(mind: Mind) -> Kinematics:
     """The quantities of the last step, as `RelationReasoner` left them in the mind."""
-    kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
+    kept = mind.recall(RELATIONS)
     return kept.measured
 
 
@@ -193,7 +193,7 @@ def related(mind: Mind, name: str, a: int, b: int) -> Truth:
 
 def qtc(mind: Mind, a: int, b: int) -> str | None:
     """QTC-C of two objects, such as '-0+0', or None while unknown; see `qtc.py`."""
-    kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
+    kept = mind.recall(RELATIONS)
     k, turned = RelationTable(kept.history.ids).pair(a, b)
     if k < 0:
         return None
@@ -215,7 +215,7 @@ class RelationReasoner:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
         s = self.settings
-        kept: RelationMemory = mind.memory.get(RELATIONS, EMPTY_MEMORY)
+        kept = mind.recall(RELATIONS)
         objects = mind.present()
         before = _reindexed_memory(kept, tuple(b.id for b in objects), mind.time)
         history = sampled(kept.history, objects, mind, observation, s.window_s, s.samples)

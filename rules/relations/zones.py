@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome, Relation, Truth, Zone
+from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.ema import exponential_mean
 from visup.rules.geometry.hysteresis import (
     ABOVE,
@@ -37,7 +38,6 @@ from visup.rules.geometry.hysteresis import (
 )
 from visup.rules.geometry.regions import Floats, densified, image_diagonal, outline
 
-ZONES = "rules.zones"
 QUESTIONS = ("inside", "reaching", "wholly_inside")
 
 
@@ -82,6 +82,9 @@ class ZoneMemory:
     time: float = 0.0
 
 
+ZONES = MemoryKey("rules.zones", ZoneMemory())
+
+
 @dataclass(frozen=True, slots=True)
 class ZoneReasoner:
     """Reasoner of the cogitate phase: which objects are inside which zones of the mind."""
@@ -93,7 +96,7 @@ class ZoneReasoner:
         if not mind.zones:
             return Outcome(mind)
         s, objects = self.settings, mind.present()
-        old: ZoneMemory = mind.memory.get(ZONES, ZoneMemory())
+        old = mind.recall(ZONES)
         ids, names = tuple(b.id for b in objects), tuple(z.name for z in mind.zones)
         latch, smooth = self._before(old, ids, names, mind.time)
         apart = np.array([[self._apart(z, b, mind) for b in objects] for z in mind.zones])
@@ -205,7 +208,7 @@ def wholly_inside(mind: Mind, object_id: int, zone: str) -> Truth:
 
 def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
     """Pixels from an object's centre to the edge of a zone's polygon, negative inside; NaN unknown."""
-    kept: ZoneMemory = mind.memory.get(ZONES, ZoneMemory())
+    kept = mind.recall(ZONES)
     if zone not in kept.names or object_id not in kept.ids:
         return float("nan")
     return float(kept.outside[kept.names.index(zone), kept.ids.index(object_id)])
@@ -213,7 +216,7 @@ def distance_outside(mind: Mind, object_id: int, zone: str) -> float:
 
 def zone_truth(mind: Mind, question: str, object_id: int, zone: str) -> Truth:
     """One of `QUESTIONS` about an object and a zone; unknown for what is not judged."""
-    kept: ZoneMemory = mind.memory.get(ZONES, ZoneMemory())
+    kept = mind.recall(ZONES)
     if zone not in kept.names or object_id not in kept.ids:
         return Truth.UNKNOWN
     return _relation(kept, question, object_id, zone).truth

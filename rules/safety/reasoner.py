@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Mind, Observation, Outcome, TaskBelief
+from visup.agent.model.memory import MemoryKey
 from visup.rules.formula.nodes import Rule
 from visup.rules.formula.units import ticks
 from visup.rules.monitoring.operators import MIN_SPACING
@@ -15,8 +16,6 @@ from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.alarm_condition import ActiveCondition, update
 from visup.rules.safety.compiled_rules import AlarmKey, CompiledRules, compile_rules
 from visup.rules.safety.verdicts import Evaluation, remapped
-
-SAFETY = "rules.safety"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,14 +47,22 @@ class RuleMemory:
     cooling: Mapping[AlarmKey, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
+SAFETY = MemoryKey("rules.safety", RuleMemory())
+
+
 @dataclass(frozen=True, slots=True)
 class RuleReasoner:
     """Reasoner of the cogitate phase, after relations and couplings.
 
     It sees the tasks as they stood after the step before, since tasks are matched later.
+
+    Attributes:
+        rules: What is watched.
+        memory: Its key; another reasoner of rules in the same agent needs one of its own.
     """
 
     rules: tuple[Rule, ...]
+    memory: MemoryKey[RuleMemory] = SAFETY
     _prepared: CompiledRules = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -64,7 +71,7 @@ class RuleReasoner:
 
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """Judge one step; see `Reasoner`."""
-        old, now = rule_memory(mind), ticks(mind.time)
+        old, now = mind.recall(self.memory), ticks(mind.time)
         # To compare the trees costs more than all that is done with them.
         same = old.rules is self.rules or old.rules == self.rules
         if not same or (old.now is not None and now < old.now):
@@ -78,7 +85,7 @@ class RuleReasoner:
         values = Evaluation(prepared, facts, now, before)
         held, cooling = update(values, old.held, old.cooling, old.time)
         mind = mind.remember(
-            SAFETY,
+            self.memory,
             RuleMemory(
                 self.rules,
                 now,
@@ -96,5 +103,4 @@ class RuleReasoner:
 
 def rule_memory(mind: Mind) -> RuleMemory:
     """What rules remember in a mind."""
-    found: RuleMemory = mind.memory.get(SAFETY, RuleMemory())
-    return found
+    return mind.recall(SAFETY)

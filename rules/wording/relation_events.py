@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from visup.agent import Event, Mind, Observation, Outcome, Relation
+from visup.agent.model.memory import MemoryKey
 from visup.rules.wording.sentences import sentence
 
-RELATION_EVENTS = "rules.narrative"
 TEMPLATES = {
     "converging": "{0} and {1} {are} converging.",
     "diverging": "{0} and {1} {are} moving apart.",
     "keeping_distance": "{0} and {1} {are} keeping their distance.",
 }
 Told = tuple[str, float]
+RELATION_EVENTS: MemoryKey[Mapping[tuple[int, ...], Told]] = MemoryKey(
+    "rules.narrative", MappingProxyType({})
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,7 @@ class RelationEventReasoner:
         return Outcome(mind.remember(RELATION_EVENTS, MappingProxyType(told)), tuple(events))
 
     def _memory(self, mind: Mind) -> Mapping[tuple[int, ...], Told]:
-        old: Mapping[tuple[int, ...], Told] = mind.memory.get(RELATION_EVENTS, MappingProxyType({}))
+        old = mind.recall(RELATION_EVENTS)
         return {pair: t for pair, t in old.items() if all(i in mind.objects for i in pair)}
 
     def _new(self, name: str, last: Told | None, mind: Mind) -> bool:

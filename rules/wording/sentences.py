@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from visup.agent.model.mind import UNKNOWN_OBJECT, Mind
+from visup.agent.model.mind import Mind
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
 ORDINALS = ("an", "a second", "a third", "a fourth", "a fifth", "a sixth", "a seventh", "an eighth")
 SURE, LIKELY = 0.95, 0.5

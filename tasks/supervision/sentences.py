@@ -37,13 +37,13 @@ def evidence(
             what = _say(monitor.contrary, actions)
             return (
                 f"{who} {have} been {what} since {monitor.contrary_since:.1f} s; "
-                f"`{step.stage}` asks for {step.action}"
+                f"stage `{step.stage}` requires `{step.action}`"
             )
         case Status.FAILING | Status.FAILED if monitor.fault is not None:
             was, what = ("was" if have == "has" else "were"), _say(monitor.fault, actions)
             return (
                 f"{who} {was} {what} at {monitor.fault_since:.1f} s and {have} not recovered; "
-                f"`{step.stage}` asks for {step.action}"
+                f"stage `{step.stage}` requires `{step.action}`"
             )
         case Status.PROGRESSING if monitor.helped_since is not None:
             what = _say(monitor.helped_by or "", actions)

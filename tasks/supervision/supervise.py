@@ -25,6 +25,7 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
 from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, revisions
@@ -51,7 +52,7 @@ from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
 from visup.tasks.verification.step_monitor import BAD
 
-MEMORY = "tasks"
+MEMORY: MemoryKey[tuple[TaskMemory, ...]] = MemoryKey("tasks", ())
 OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
 LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
@@ -73,7 +74,7 @@ def task_reasoner(
 
     Returns:
         A pure function of mind and observation. It renews `Mind.tasks`, one belief for each task
-        in order, keeps its memory in `Mind.memory['tasks']`, and gives events 'stage_started',
+        in order, keeps its memory under `MEMORY`, and gives events 'stage_started',
         'stage_progressing', 'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
         'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
         'verdict', and concerns 'stage_failing' and 'invariant_broken'.
@@ -118,9 +119,9 @@ def _follower(
 
 
 def _recall(mind: Mind, trackers: tuple[HypothesisTracker, ...]) -> tuple[TaskMemory, ...]:
-    kept = mind.memory.get(MEMORY, ())
+    kept = mind.recall(MEMORY)
     if [m.belief.task for m in kept] == [f.task.name for f in trackers]:
-        return tuple(kept)
+        return kept
     activity = ALONE if len(trackers) == 1 else TaskActivity()
     return tuple(_blank(f, mind.time, activity) for f in trackers)
 

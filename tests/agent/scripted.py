@@ -12,6 +12,7 @@ from visup.agent import (
     Directive,
     Event,
     Frame,
+    MemoryKey,
     Mind,
     Observation,
     Outcome,
@@ -48,11 +49,15 @@ class Scripted:
         return [Percept(self.contract.gives[0], value, frame.time, self.contract.name)]
 
 
+COUNTING = MemoryKey("counting", 0)
+EXPLODING = MemoryKey("exploding", -1)
+
+
 def counting(mind: Mind, observation: Observation) -> Outcome:
     """Remembers how often it thought and tells an event each time."""
-    count = mind.memory.get("counting", 0) + 1
+    count = mind.recall(COUNTING) + 1
     event = Event("counted", observation.time, observation.frame_index, f"I counted {count}.")
-    return Outcome(mind.remember("counting", count), (event,))
+    return Outcome(mind.remember(COUNTING, count), (event,))
 
 
 def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation], Outcome]:
@@ -71,6 +76,6 @@ def exploding_at(index: int) -> Callable[[Mind, Observation], Outcome]:
     def think(mind: Mind, observation: Observation) -> Outcome:
         if observation.frame_index == index:
             raise RuntimeError("the fuse blew")
-        return Outcome(mind.remember("exploding", observation.frame_index))
+        return Outcome(mind.remember(EXPLODING, observation.frame_index))
 
     return think

@@ -47,7 +47,7 @@ def test_nothing_is_written_over(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["two words", "class", "1st", ""])
 def test_what_is_no_name_is_refused(name: str, tmp_path: Path) -> None:
     code, told = visup("behaviours", "new", name, "--out", tmp_path)
-    assert (code, "no name for a behaviour" in told) == (2, True)
+    assert (code, "not a valid name for a behaviour" in told) == (2, True)
 
 
 def test_check_says_what_it_found_and_exits_accordingly(tmp_path: Path) -> None:
@@ -135,6 +135,6 @@ def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(tmp_path:
     )
     assert done.returncode == 1, done.stderr
     assert done.stderr == ""
-    assert "The behaviour 'mine' failed; what it gives is unknown." in done.stdout
+    assert "The behaviour 'mine' failed; its output is unavailable." in done.stdout
     assert "its process ended with exit code 7" in done.stdout
     assert '"frames": 12' in done.stdout

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sqlite3
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.clips import moving_disc, write_clip
+from tests.paths import ROOT
 from visup.cli import main
+from visup.commands.doctor import EXTRAS, LIBRARIES
 
 MISTAKES = """\
 <dock> ::= <approach> <captured>
@@ -248,3 +252,18 @@ def test_the_doctor_finds_nothing_broken(visup: Call) -> None:
     result = visup("doctor")
     assert result.code == 0, result.out
     assert "broken" not in result.out
+
+
+def test_the_doctor_knows_what_visup_depends_on() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    own = project["optional-dependencies"]
+    bundles = {"all", "dev"}
+    assert list(LIBRARIES) == [bare(name) for name in project["dependencies"]]
+    assert {extra: names for extra, (_, names) in EXTRAS.items()} == {
+        extra: tuple(map(bare, names)) for extra, names in own.items() if extra not in bundles
+    }
+
+
+def bare(requirement: str) -> str:
+    """The name of a library, without its version and extras."""
+    return re.split(r"[\[>=]", requirement)[0]

@@ -28,7 +28,7 @@ def test_a_replay_tells_the_story_again_without_the_video(visup: Call, run: Path
     told = visup("replay", run)
     assert told.code == 0
     assert "in view" in told.out
-    assert "30 frames reasoned about again" in told.out
+    assert "30 frames replayed in" in told.out
     assert "Verdict" in told.out
 
 

@@ -122,6 +122,21 @@ def test_every_link_leads_somewhere() -> None:
     assert all(link and link.startswith("#") and link[1:] in ids for link in links)
 
 
+def test_the_annotated_videos_beside_the_page_are_linked() -> None:
+    names = ("annotated.webm", "annotated-2.webm")
+    linked = Page(report_page(replace(data(), videos=names)))
+    links = [a["href"] for t, a in linked.tags if t == "a" and str(a["href"]).endswith(".webm")]
+    assert links == list(names)
+    assert "Annotated video, part 2" in " ".join(linked.words)
+
+
+def test_names_in_prose_stand_in_quotes() -> None:
+    told = Event("stage_done", 1.0, 1, "Stage `captured` is complete.")
+    words = " ".join(Page(report_page(replace(data(), events=(told,)))).words)
+    assert "Stage 'captured' is complete." in words
+    assert "`" not in words
+
+
 def test_the_page_asks_nothing_of_the_network() -> None:
     for value in page().values("src", "href", "action", "data", "poster", "srcset"):
         assert value.startswith(("data:image/jpeg;base64,", "#"))

@@ -14,7 +14,7 @@ from visup.rules.monitoring.operators import MIN_SPACING, SAMPLE_HOLD
 from visup.rules.predicates.snapshot import SIGMAS
 from visup.rules.predicates.vocabulary import IMPLIED, KEEP_OUT, PREDICATES, QUANTITIES
 from visup.rules.presence.fragments import FragmentSettings
-from visup.rules.presence.step_context import PresenceSettings
+from visup.rules.presence.settings import PresenceSettings
 from visup.rules.reasoners import ReasonerSettings
 from visup.rules.relations.kinematics import RelationSettings
 

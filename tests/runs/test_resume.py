@@ -83,7 +83,7 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     assert (past.state is not None) == (state == "kept")
     result = supervise(past.settings, parts, options=options, past=past)
     assert outcome(parts) == outcome(whole)
-    assert any("looked at again" in n for n in result.notes) == (state != "kept")
+    assert any("perceived again" in n for n in result.notes) == (state != "kept")
     assert any("check sum" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is over"):
         interrupted_run(parts)
@@ -287,7 +287,7 @@ def test_a_camera_run_goes_on_with_new_numbers_and_later_times(
     assert before_ids
     assert after_ids
     assert min(after_ids) > max(before_ids)
-    assert any("not seen" in n for n in result.notes)
+    assert any("Nothing was seen in between" in n for n in result.notes)
 
 
 def times(*given: float) -> Iterator[Frame]:

@@ -202,9 +202,9 @@ BAD = {
     "when gap(1, 2) < 3 s": "a length is compared with a time",
     "when foo(1)": "foo",
     "when gap(1,": "ends too early",
-    "object one": "is no number",
-    "frame x": "is no number",
-    "two words": "nothing is meant",
+    "object one": "is not a number",
+    "frame x": "is not a number",
+    "two words": "is not known",
 }
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.agent.scripted import Scripted, counting, exploding_at, frames
+from tests.agent.scripted import COUNTING, Scripted, counting, exploding_at, frames
 from tests.stepping.timelines import (
     COUNT,
     plain_agent,
@@ -136,9 +136,9 @@ def test_a_half_made_step_can_be_looked_at_finished_and_left(phase: Phase) -> No
     assert it.at == 3
     assert it.paused is not None
     assert it.paused.phase is phase
-    counted = it.mind.memory["counting"]
+    counted = it.mind.recall(COUNTING)
     assert counted == (3 if phase is Phase.PERCEIVE else 4)
-    assert it.agent.mind.memory["counting"] == 3
+    assert it.agent.mind.recall(COUNTING) == 3
     assert told(it.step().step) == plain_course()[3]
     it.step(until=phase)
     assert told(it.back()) == plain_course()[3]
@@ -189,7 +189,7 @@ def test_an_answer_stays_when_going_back_over_it() -> None:
 def test_a_snapshot_belongs_to_its_course() -> None:
     it = plain_stepper()
     it.step(5)
-    with pytest.raises(SettingsError, match="another course"):
+    with pytest.raises(SettingsError, match="another timeline"):
         it.branch().restore(it.snapshot())
 
 

@@ -119,7 +119,7 @@ def test_an_answer_in_the_past_is_given_on_a_branch() -> None:
     assert next(e["kind"] for e in changed.new) == "answer"
     assert branch.mind.objects[2].name == "arm"
     assert it.mind_at(40).objects[2].name == "hubble"
-    with pytest.raises(SettingsError, match="this is no branch"):
+    with pytest.raises(SettingsError, match="this is not a branch"):
         it.compare()
 
 
@@ -154,14 +154,14 @@ def test_beliefs_can_be_told_in_words(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "nothing is supposed"),
+        ("", "no assumption is given"),
         ("touchin 1 2", "did you mean 'touching'"),
         ("touching 1", "no relation of two objects"),
         ("touching 1 2 maybe", "no relation of two objects"),
         ("touching 1 9", "there is no object 9"),
         ("object 9 arm", "there is no object 9"),
-        ("object arm", "what of which object"),
-        ("object 1", "what of which object"),
+        ("object arm", "which object"),
+        ("object 1", "which object"),
         ("object 1 arn", "did you mean 'arm'"),
     ],
 )

@@ -19,8 +19,8 @@ from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.runs.wiring import reasoning_agent
 from visup.stepping import ScriptedObservations
 from visup.terminal.prompt import completions, toolbar
-from visup.terminal.session import HELP, Session
-from visup.terminal.session_commands import COMMANDS
+from visup.terminal.session import Session
+from visup.terminal.session_commands import COMMANDS, HELP
 
 
 def session(count: int = 30) -> tuple[Session, io.StringIO]:

@@ -65,7 +65,7 @@ CHEATS: dict[str, tuple[type, str]] = {
     "keeps": (plug(keep), "percepts of earlier frames changed later"),
     "chance": (plug(lambda s, f, seen: next(TICKET)), "is deterministic: a second run"),
     "slow": (plug(lambda s, f, seen: time.sleep(0.01), cost_ms=5), "keeps its budget: "),
-    "unknown need": (plug(lambda s, f, seen: 0, needs=("smell",)), "know nothing of 'smell'"),
+    "unknown need": (plug(lambda s, f, seen: 0, needs=("smell",)), "have no 'smell'"),
 }
 
 

@@ -11,9 +11,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from visup.agent.model.mind import Verdict
-from visup.agent.model.records import Event
+from visup.agent.model.events import Event
 from visup.agent.model.step import Step
+from visup.agent.model.task_beliefs import Verdict
 from visup.report.pictures import html_picture, text_picture
 from visup.terminal.display import html_of
 from visup.terminal.narrator import event_row, verdict_line

@@ -13,8 +13,9 @@ from rich.console import RenderableType
 
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import OutputError, SettingsError
-from visup.agent.model.mind import UNKNOWN_OBJECT, Verdict
-from visup.agent.model.records import Alert, Event, Severity
+from visup.agent.model.events import Alert, Event, Severity
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
+from visup.agent.model.task_beliefs import Verdict
 from visup.agent.storage.journal_reader import Recording
 from visup.api.display import story
 from visup.api.records import Records

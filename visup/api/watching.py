@@ -13,10 +13,11 @@ from typing import Self, Unpack
 from rich.console import RenderableType
 
 from visup.agent.model.errors import SettingsError
+from visup.agent.model.events import Alert, Event, Severity
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.mind import Verdict
-from visup.agent.model.records import Alert, Event, Frame, Severity
+from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
+from visup.agent.model.task_beliefs import Verdict
 from visup.api.display import html_with_picture, story, with_picture
 from visup.api.options import TaskLike, WatchOptions, settings_from
 from visup.api.records import Records

@@ -109,7 +109,7 @@ def new(
 
     if not name.isidentifier() or iskeyword(name):
         raise SettingsError(
-            f"'{name}' is no name for a behaviour",
+            f"'{name}' is not a valid name for a behaviour",
             expected="a word of letters, digits and underscores, such as lamp",
         )
     path = out / f"{name}.py"

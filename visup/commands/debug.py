@@ -30,7 +30,7 @@ def motion(
         typer.Option(metavar="FILE", help="Video to write (default: NAME-motion.webm)."),
     ] = None,
     every: Annotated[int, typer.Option(help="Use every n-th frame.")] = 1,
-    limit: Annotated[int | None, typer.Option(min=1, help="Most frames to use.")] = None,
+    limit: Annotated[int | None, typer.Option(min=1, help="Use at most this many frames.")] = None,
     fps: Annotated[
         float | None, typer.Option(help="Frame rate, where the source has none.")
     ] = None,
@@ -97,7 +97,7 @@ def checked_target(path: Path) -> Path:
 
     if path.suffix != ".webm":
         raise SettingsError(
-            f"a video of the kind {path.suffix or path.name!r} is not written here",
+            f"videos of the kind {path.suffix or path.name!r} cannot be written here",
             where=str(path),
             expected="a name that ends in .webm",
         )

@@ -7,24 +7,40 @@ from dataclasses import dataclass
 
 import typer
 
-CORE = (
-    "numpy",
-    "scipy",
-    "opencv-python-headless",
-    "scikit-image",
-    "networkx",
-    "lark",
-    "pydantic",
-    "rich",
-    "typer",
-    "prompt_toolkit",
-)
-EXTRAS = {
-    "report": ("plotly",),
-    "render": ("trimesh", "embreex"),
-    "eval": ("motmetrics", "mahotas", "pyefd"),
-    "onnx": ("onnxruntime",),
+LIBRARIES = {
+    "numpy": "arrays",
+    "numba": "compiled loops",
+    "scipy": "assignment, sparse systems, distances",
+    "opencv-python-headless": "reading video, image processing",
+    "networkx": "task graphs and shock graphs",
+    "pillow": "pictures with text",
+    "lark": "grammars of tasks and rules",
+    "pydantic": "settings and records at the edge",
+    "rich": "the terminal",
+    "typer": "the command line",
+    "prompt_toolkit": "the prompt of visup step",
 }
+"""What visup depends on, and what for; the same as `dependencies` in pyproject.toml."""
+
+EXTRAS = {
+    "report": ("the report of a run", ("plotly",)),
+    "onnx": ("detectors of your own as ONNX files", ("onnxruntime",)),
+    "render": ("visup render, models from meshes", ("trimesh", "embreex")),
+    "lsp": ("visup task lsp: task files in editors", ("pygls",)),
+    "eval": (
+        "comparisons with other programs in visup eval",
+        ("motmetrics", "mahotas", "pyefd", "rtamt"),
+    ),
+    "mqtt": ("alerts to an MQTT broker", ("paho-mqtt",)),
+    "otel": (
+        "traces and metrics for OpenTelemetry",
+        ("opentelemetry-sdk", "opentelemetry-exporter-otlp-proto-http"),
+    ),
+    "rerun": ("the Rerun viewer", ("rerun-sdk",)),
+    "tables": ("runs as pandas and Arrow tables", ("pandas", "pyarrow")),
+    "docs": ("building the documentation", ("mkdocs-material", "mkdocstrings")),
+}
+"""What each extra brings, and its libraries; the same as `optional-dependencies` in pyproject.toml."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,25 +51,31 @@ class CheckedPart:
         what: What was looked at.
         state: 'ok', 'missing' (of an extra: no fault) or 'broken'.
         detail: A version, or what to do.
+        purpose: What it is for, where that is not plain.
     """
 
     what: str
     state: str
     detail: str
+    purpose: str = ""
 
 
 def doctor() -> None:
     """Show what is installed, what is missing, and versions. Exit code 2 when the core is broken."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    findings = list(examine())
-    table = Table("part", "state", "detail", title="visup doctor", title_justify="left")
+    parts = list(examine())
+    table = Table(title="visup doctor", title_justify="left")
+    for heading in ("part", "state", "detail", "for"):
+        table.add_column(heading, overflow="fold")
     styles = {"ok": "green", "missing": "yellow", "broken": "bold red"}
-    for f in findings:
-        table.add_row(f.what, f"[{styles[f.state]}]{f.state}[/]", f.detail)
+    for p in parts:
+        state = Text(p.state, styles[p.state])
+        table.add_row(Text(p.what), state, Text(p.detail), Text(p.purpose))
     Console().print(table)
-    if any(f.state == "broken" for f in findings):
+    if any(p.state == "broken" for p in parts):
         raise typer.Exit(2)
 
 
@@ -65,27 +87,39 @@ def examine() -> Iterator[CheckedPart]:
 
     yield CheckedPart("visup", "ok", __version__)
     yield CheckedPart("Python", "ok", platform.python_version())
-    for name in CORE:
-        yield _library(name, None)
-    for extra, names in EXTRAS.items():
-        for name in names:
-            yield _library(name, extra)
+    for name, purpose in LIBRARIES.items():
+        yield _library(name, purpose)
+    for extra, (purpose, names) in EXTRAS.items():
+        yield _extra(extra, purpose, names)
     yield _tried("video codecs", _codecs)
     yield _tried("behaviours", _behaviours)
     yield _tried("shipped tasks", _tasks)
     yield _tried("demo clip", _demo)
 
 
-def _library(name: str, extra: str | None) -> CheckedPart:
+def _library(name: str, purpose: str) -> CheckedPart:
+    found = _version(name)
+    if found is None:
+        return CheckedPart(name, "broken", f"pip install {name}", purpose)
+    return CheckedPart(name, "ok", found, purpose)
+
+
+def _extra(extra: str, purpose: str, names: tuple[str, ...]) -> CheckedPart:
+    """An extra is there when all its libraries are."""
+    found = {name: _version(name) for name in names}
+    label = f"visup[{extra}]"
+    if None in found.values():
+        return CheckedPart(label, "missing", f"pip install '{label}'", purpose)
+    return CheckedPart(label, "ok", ", ".join(f"{n} {v}" for n, v in found.items()), purpose)
+
+
+def _version(name: str) -> str | None:
     from importlib.metadata import PackageNotFoundError, version
 
-    label = f"{name} ({extra})" if extra else name
     try:
-        return CheckedPart(label, "ok", version(name))
+        return version(name)
     except PackageNotFoundError:
-        if extra:
-            return CheckedPart(label, "missing", f"pip install 'visup[{extra}]'")
-        return CheckedPart(label, "broken", f"pip install {name}")
+        return None
 
 
 def _tried(what: str, look: Callable[[], str]) -> CheckedPart:

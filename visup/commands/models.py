@@ -29,7 +29,7 @@ def build(
     views: Annotated[
         int, typer.Option(help="Views of each mesh, spread evenly over the sphere.")
     ] = 32,
-    seed: Annotated[int, typer.Option(help="Turns the directions of the views.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the rotation of the views' directions.")] = 0,
     jobs: Annotated[int, typer.Option(help="Processes; 0 for one on each core.")] = 0,
 ) -> None:
     """Build a database from meshes. Each model is called as its file, without the ending.
@@ -67,7 +67,9 @@ def add(
     label: Annotated[
         int | None, typer.Option(min=1, max=255, help="The object's value in --masks; any if none.")
     ] = None,
-    clusters: Annotated[int, typer.Option(help="Exemplars that stand for all pictures.")] = 8,
+    clusters: Annotated[
+        int, typer.Option(help="Number of exemplars that represent all pictures.")
+    ] = 8,
 ) -> None:
     """Add exemplars of silhouettes, or of an object's masks in a video.
 
@@ -83,7 +85,7 @@ def add(
             expected="a name, and at least 1 exemplar",
         )
     if label is not None and masks is None:
-        raise SettingsError("--label tells of --masks, which is not given")
+        raise SettingsError("--label needs --masks, which is not given")
     database = ModelDatabase.open(db)
     if silhouettes is not None and masks is None:
         seen = read_silhouettes(silhouettes)
@@ -91,7 +93,7 @@ def add(
         seen = read_masks(masks, label)
     else:
         raise SettingsError(
-            "nothing to add, or two things at once",
+            "either --silhouettes or --masks is needed, not both",
             expected="--silhouettes DIR or --masks DIR",
         )
     _tell_size(database.add(silhouette_views(name, seen, clusters)))
@@ -157,7 +159,7 @@ def match_picture(
 def show(
     db: Db,
     out: Annotated[
-        Path | None, typer.Option(help="Picture to write (PNG); beside the database if none.")
+        Path | None, typer.Option(help="Picture to write (PNG; default: beside the database).")
     ] = None,
 ) -> None:
     """Draw a contact sheet: a row for each model, its views with their shock graphs."""

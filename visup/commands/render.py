@@ -72,5 +72,5 @@ def parse_size(text: str) -> tuple[int, int]:
         if all(16 <= side <= 8192 for side in size):
             return size
     raise SettingsError(
-        f"the size {text!r} is not one of an image", expected=f"{SIZE_FORM}, from 16 to 8192 pixels"
+        f"{text!r} is not an image size", expected=f"{SIZE_FORM}, from 16 to 8192 pixels"
     )

@@ -28,7 +28,7 @@ class Comparison:
     against: Annotated[
         Path | None, Option("Show what changes against this other run.", metavar="RUN")
     ] = None
-    quiet: Annotated[bool, Option("Only the last lines.", "--quiet")] = False
+    quiet: Annotated[bool, Option("Print only the last lines.", "--quiet")] = False
 
     def other(self, recording: Recording) -> Recording | None:
         """The run that the replay of a recording is compared with, or None."""
@@ -99,7 +99,7 @@ def _print_changes(console: Console, other: Recording, told: Transcript, quiet: 
 
 def _speed(told: Transcript) -> str:
     rate = told.steps / told.seconds if told.seconds else 0.0
-    return f"{told.steps} frames reasoned about again in {told.seconds:.1f} s ({rate:.0f} a second)"
+    return f"{told.steps} frames replayed in {told.seconds:.1f} s ({rate:.0f} a second)"
 
 
 def _lines(changed: TranscriptDiff, quiet: bool) -> Iterator[str]:

@@ -25,7 +25,7 @@ EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical
 
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
-    """Tell every mistake of some rule files, and what each rule costs; exit code 2 at a mistake."""
+    """Report every mistake in rule files, and what each rule costs; exit code 2 if there is a mistake."""
     from visup.agent.model.errors import ErrorGroup, VisupError
     from visup.rules.language.parser import load_rules, raise_all
 
@@ -125,5 +125,5 @@ def _cost(rule: Rule) -> str:
     from visup.rules.language.cost import cost_of
 
     cost = cost_of(rule)
-    late = f"told {cost.delay_s:g} s late" if cost.delay_s else "told at once"
+    late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported at once"
     return f"{late}, at most {cost.bytes / 1024:,.1f} kB for each choice of objects"

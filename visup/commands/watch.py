@@ -34,14 +34,14 @@ class Presentation:
     """What `visup watch` shows of a run, and what its operator said beforehand."""
 
     out: Annotated[Path | None, Option("Run folder (default: runs/NAME).", metavar="DIR")] = None
-    quiet: Annotated[bool, Option("Only the verdict.", "--quiet")] = False
-    as_json: Annotated[bool, Option("Events as JSON, one a line.", "--json")] = False
+    quiet: Annotated[bool, Option("Print only the verdict.", "--quiet")] = False
+    as_json: Annotated[bool, Option("Print events as JSON, one per line.", "--json")] = False
     answers: Annotated[
         Mapping[int, str],
-        Option("Who an object is, such as 2=arm.", "--answer", "ID=NAME", _parse_answers),
+        Option("The identity of an object, such as 2=arm.", "--answer", "ID=NAME", _parse_answers),
     ] = field(default_factory=dict)
     answers_file: Annotated[
-        Path | None, Option("Such answers, one a line.", "--answers", "FILE")
+        Path | None, Option("File of such answers, one per line.", "--answers", "FILE")
     ] = None
 
     def all_answers(self) -> dict[int, str]:
@@ -66,7 +66,7 @@ def watch(
     settings_file: SettingsFile = None,
     resume: Annotated[
         Path | None,
-        typer.Option(metavar="RUN", help="Go on with this run, which was stopped or killed."),
+        typer.Option(metavar="RUN", help="Resume this run, which was stopped or killed."),
     ] = None,
 ) -> None:
     """Watch a video and say whether the work goes well.
@@ -106,7 +106,7 @@ def _interrupted(run: Path, *given: Any) -> InterruptedRun:
 
     if any(given):
         raise SettingsError(
-            "a run goes on as it was begun: --resume takes no source, task or other settings",
+            "a resumed run keeps its settings: --resume takes no source, task or other settings",
             hint=f"visup watch --resume {run}",
         )
     return interrupted_run(run)

@@ -15,6 +15,7 @@ from visup.report.figures import Figure, presence_figure, stage_figure, vote_fig
 from visup.report.records import RunData
 from visup.report.summary import title_of, verdict_words
 from visup.report.task_trees import courses
+from visup.wording import prose
 
 
 def write_report(run: RunData, path: Path) -> None:
@@ -48,7 +49,8 @@ def report_page(run: RunData) -> str:
         run: From `Collector.finish`.
 
     Returns:
-        HTML that refers to nothing outside itself; the same run always gives the same page.
+        HTML that needs nothing outside itself, and links the annotated videos beside it; the same run
+        always gives the same page.
 
     Raises:
         ExtraMissingError: The run has figures, and Plotly is not installed.
@@ -58,26 +60,29 @@ def report_page(run: RunData) -> str:
     drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
     own = files("visup.report")
     page = Template((own / "report.html").read_text(encoding="utf-8"))
+    text = {
+        "title": escape(title_of(run)),
+        "verdict_word": escape(verdict_words(run)[0]),
+        "source": escape(run.source),
+        "verdict": sections.verdict_badge(run),
+        "notices": sections.notices(run),
+        "hero": sections.hero(run),
+        "narrative": sections.narrative(run),
+        "alerts": sections.alerts(run),
+        "key_frames": sections.key_frames(run),
+        "tasks": sections.tasks(run),
+        "courses": courses(run),
+        "stages": sections.figures([stages], "No stage was followed."),
+        "presence": sections.figures([presence], "No object was followed."),
+        "distances": sections.figures(distances, "No two objects were in view together."),
+        "votes": sections.figures(votes, "No object was identified."),
+        "similarity": sections.similarity(run),
+        "facts": sections.run_facts(run),
+        "figures": embedded(drawn),
+    }
     return page.substitute(
-        title=escape(title_of(run)),
-        verdict_word=escape(verdict_words(run)[0]),
+        {name: prose(words) for name, words in text.items()},
         style=(own / "report.css").read_text(encoding="utf-8"),
-        source=escape(run.source),
-        verdict=sections.verdict_badge(run),
-        notices=sections.notices(run),
-        hero=sections.hero(run),
-        narrative=sections.narrative(run),
-        alerts=sections.alerts(run),
-        key_frames=sections.key_frames(run),
-        tasks=sections.tasks(run),
-        courses=courses(run),
-        stages=sections.figures([stages], "No stage was followed."),
-        presence=sections.figures([presence], "No object was followed."),
-        distances=sections.figures(distances, "No two objects were in view together."),
-        votes=sections.figures(votes, "No object was identified."),
-        similarity=sections.similarity(run),
-        facts=sections.run_facts(run),
-        figures=embedded(drawn),
         plotly=plotly_source() if drawn else "",
         script=(own / "report.js").read_text(encoding="utf-8"),
     )

@@ -177,6 +177,7 @@ class RunData:
         problem: Why the source ended early, or None.
         notes: Sentences about what had to be assumed.
         courses: The tree of each task.
+        videos: Names of the annotated videos beside the report, in order.
     """
 
     source: str
@@ -197,6 +198,7 @@ class RunData:
     problem: str | None = None
     notes: tuple[str, ...] = ()
     courses: tuple[Branch, ...] = ()
+    videos: tuple[str, ...] = ()
 
     def spans_about(self, kind: str) -> tuple[StateSpan, ...]:
         """Spans of one kind: 'stage', 'relation' or 'presence'."""

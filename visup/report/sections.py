@@ -6,6 +6,7 @@ import base64
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
+from urllib.parse import quote
 
 from visup.agent import Alert, Event, Severity, StageBelief, TaskBelief
 from visup.report.figures import Figure
@@ -29,7 +30,7 @@ def hero(run: RunData) -> str:
     """The summary and, beside it, the picture that matters most."""
     heaviest = max(run.key_frames, key=lambda k: (k.weight, k.time), default=None)
     picture = f"<div class=hero-picture>{_image(run, heaviest)}</div>" if heaviest else ""
-    words = f"<p class=lead>{escape(summary(run))}</p>{_tiles(run)}"
+    words = f"<p class=lead>{escape(summary(run))}</p>{_tiles(run)}{_videos(run)}"
     return f"<div class=hero><div>{words}</div>{picture}</div>"
 
 
@@ -60,6 +61,16 @@ def _tiles(run: RunData) -> str:
         "alerts": str(grave),
     }
     return f"<dl class=tiles>{''.join(_tile(k, v) for k, v in facts.items())}</dl>"
+
+
+def _videos(run: RunData) -> str:
+    """Links to the annotated videos, which lie beside the page."""
+    parts = [f", part {n}" for n in range(1, len(run.videos) + 1)] if run.videos[1:] else [""]
+    links = (
+        f'<a href="{quote(name)}">Annotated video{part}</a>'
+        for name, part in zip(run.videos, parts, strict=False)
+    )
+    return f"<p class=videos>{' '.join(links)}</p>" if run.videos else ""
 
 
 def _tile(name: str, value: str) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from visup.agent import Alert, Severity, Verdict
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.report.records import KeyFrame, ReportedObject, RunData, StateSpan
 
 VERDICT_WORDS: dict[Verdict | None, tuple[str, str]] = {
-    Verdict.SUCCEEDED: ("Succeeded", "The task went as it should."),
+    Verdict.SUCCEEDED: ("Succeeded", "The task went as intended."),
     Verdict.FAILED: ("Failed", "The task failed."),
-    Verdict.INTERRUPTED: ("Interrupted", "Something unsafe or unexpected came between."),
+    Verdict.INTERRUPTED: ("Interrupted", "Something unsafe or unexpected interrupted it."),
     Verdict.IN_PROGRESS: (
         "In progress",
         "The task was still under way at the end, and nothing was wrong.",

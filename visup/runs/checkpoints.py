@@ -69,7 +69,7 @@ class CheckpointWriter:
         try:
             data = self._frozen(agent, step, kept())
         except StateError as fault:
-            self.note = f"no state of this run is kept ({fault}): resuming it looks at all again"
+            self.note = f"no checkpoint of this run is kept ({fault}): resuming it perceives all frames again"
             return
         self.largest = max(self.largest, len(data))
         self._writing = self._disk.submit(_replace, self._path, data)
@@ -101,7 +101,7 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
     try:
         told = load_state((folder / CHECKPOINT).read_bytes())
         if told["visup"] != __version__:
-            return None, f"its state is of visup {told['visup']}"
+            return None, f"its checkpoint is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None
     except FileNotFoundError:
         return None, None

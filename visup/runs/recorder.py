@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,13 +197,17 @@ class Recorder:
         return path
 
     def _run_data(self, result: RunResult) -> RunData:
-        return self.collector.finish(
+        collected = self.collector.finish(
             result.verdict,
             self.facts,
             problem=result.problem,
             notes=self.notes,
             courses=self._courses,
         )
+        videos = self.folder.glob("annotated*.webm")
+        # In the order of writing: `annotated.webm`, `annotated-2.webm`, ...
+        names = sorted((path.name for path in videos), key=lambda name: (len(name), name))
+        return replace(collected, videos=tuple(names))
 
 
 def recorder_state(recorder: Recorder | None) -> Mapping[str, Any]:

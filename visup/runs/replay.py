@@ -162,8 +162,8 @@ def recorded_transcript(recording: Recording) -> Transcript:
 def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
     """What the second run tells that the first does not, and the other way round.
 
-    Events are the same when all that is told of them is. `fault` and trouble outside of the agent count
-    like any other: they are part of what was perceived.
+    Events are the same when all that is told of them is. Faults of behaviours and of
+    the surroundings count like any other: they are part of what was perceived.
     """
     a = [event_text(e) for e in first.events]
     b = [event_text(e) for e in second.events]

@@ -71,10 +71,10 @@ def interrupted_run(run: Path) -> InterruptedRun:
     state, why_none = read_checkpoint(recording.path.parent)
     ends = recording.first_and_last()
     if state is not None and (ends is None or not ends[0] - 1 <= state.frame_index <= ends[1]):
-        state, why_none = None, "its state is not of this journal"
+        state, why_none = None, "its checkpoint does not belong to this journal"
     if state is None and facts.get("steps_dropped"):
         raise OutputError(
-            "the first steps of this run are not kept, nor is a state of later ones",
+            "neither the first steps of this run nor a later checkpoint is kept",
             where=str(run),
             hint="begin a new run",
         )
@@ -127,7 +127,7 @@ def catch_up(
     after = past.state.frame_index if past.state else -1
     whole = agent.load(past.state.agent) if past.state else False
     if source.live:
-        return _live(agent, source, past, after), ("What came between was not seen.",)
+        return _live(agent, source, past, after), ("Nothing was seen in between.",)
     answers = past.recording.answers()
     differing = 0
     frames: Iterator[Frame] = iter(source)
@@ -141,7 +141,7 @@ def catch_up(
     notes = []
     if not whole and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
-        notes.append(f"All {past.steps} frames before were looked at again{why}.")
+        notes.append(f"All {past.steps} earlier frames were perceived again{why}.")
     if differing:
         notes.append(
             f"{differing} frames look different now than when they were recorded: "

@@ -87,11 +87,13 @@ class WatchSettings:
     ] = ()
     actors: Annotated[
         Mapping[str, tuple[str, ...]],
-        Option("What an actor of the task looks like.", "--actor", "NAME=MODEL", parse_actors),
+        Option(
+            "The model that an actor of the task looks like.", "--actor", "NAME=MODEL", parse_actors
+        ),
     ] = field(default_factory=dict)
     behaviours: Annotated[
         tuple[Path | str, ...],
-        Option("Your own: FILE.py or package.module:Class.", "--behaviour", "FILE"),
+        Option("A behaviour of your own: FILE.py or package.module:Class.", "--behaviour", "FILE"),
     ] = ()
     plugins: Annotated[
         tuple[str, ...], Option("Name of an installed behaviour to add.", "--plugin", "NAME")
@@ -109,13 +111,11 @@ class WatchSettings:
         tuple[str, ...], Option("Run this behaviour in a process of its own.", metavar="NAME")
     ] = ()
     budgets: Annotated[
-        bool, Option("Give up what exceeds its budget; for live sources.", "--budgets")
+        bool, Option("Give up behaviours that exceed their budget; for live sources.", "--budgets")
     ] = False
     realtime: Annotated[
         bool | None,
-        Option(
-            "Drop the frames that visup is too slow for, and say so (default: of live sources)."
-        ),
+        Option("Drop frames when visup cannot keep up, and report it (default: for live sources)."),
     ] = None
     every: Annotated[int, Option("Use every n-th frame.")] = 1
     fps: Annotated[float | None, Option("Frame rate, where the source has none.")] = None
@@ -129,7 +129,7 @@ class WatchSettings:
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
     attention: Annotated[
-        bool, Option("Match what is known well less often: cheaper.", "--attention")
+        bool, Option("Match well-known objects less often, which saves time.", "--attention")
     ] = False
 
     def __post_init__(self) -> None:
@@ -151,12 +151,15 @@ class RunOptions:
     """Whether to write the report."""
     sinks: Annotated[
         tuple[str, ...],
-        Option("Send alerts there too: jsonl:- or webhook:URL ...", "--sink", "KIND:PLACE"),
+        Option("Also send alerts there: jsonl:-, webhook:URL, ...", "--sink", "KIND:PLACE"),
     ] = ()
     keep_gb: Annotated[
-        float | None, Option("Keep so much of the journal, gigabytes.", at_least=0.0)
+        float | None,
+        Option("How much of the journal to keep, in gigabytes (default: all).", at_least=0.0),
     ] = None
     state_every_s: Annotated[
         float,
-        Option("Seconds between states to resume from; 0 for none.", "--state-every", at_least=0.0),
+        Option(
+            "Seconds between checkpoints to resume from; 0 for none.", "--state-every", at_least=0.0
+        ),
     ] = 30.0

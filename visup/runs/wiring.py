@@ -154,16 +154,15 @@ def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
 ) -> Reasoners:
     interpreting = default_reasoners(rules=_rules(settings))
-    following = (task_reasoner(tasks),) if tasks else ()
-    attending = (AttentionReasoner(),) if settings.attention else ()
-    waking = activation_rules(contracts)
-    match = (
-        *following,
-        *attending,
-        *((ActivationReasoner(waking),) if waking else ()),
-        runtime_fault_reasoner,
+    attention = (AttentionReasoner(),) if settings.attention else ()
+    rules = activation_rules(contracts)
+    activation = (ActivationReasoner(rules),) if rules else ()
+    return Reasoners(
+        interpreting.update,
+        interpreting.cogitate,
+        match=(task_reasoner(tasks),) if tasks else (),
+        attend=(*attention, *activation, runtime_fault_reasoner),
     )
-    return Reasoners(interpreting.update, interpreting.cogitate, match)
 
 
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
@@ -173,7 +172,7 @@ def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
             if zone in drawn:
                 continue
             raise SettingsError(
-                f"zone `{zone}` of task `{task.name}` is drawn nowhere",
+                f"zone `{zone}` of task `{task.name}` is not drawn anywhere",
                 where=task.file,
                 expected=f"`zone {zone} is (100, 50) (300, 50) (300, 200)`, or a zones file with it",
             )

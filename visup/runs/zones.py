@@ -71,7 +71,7 @@ def _entries(path: Path) -> list[Any]:
 
 def _zone(entry: object, where: str) -> Zone:
     if not isinstance(entry, dict):
-        raise SettingsError("this is no zone", where=where, expected=_EXAMPLE)
+        raise SettingsError("this is not a zone", where=where, expected=_EXAMPLE)
     strange = next((key for key in entry if key not in _KEYS), None)
     if strange is not None:
         raise SettingsError(

@@ -83,7 +83,7 @@ class Outbox:
                 "sink_failed",
                 (),
                 Severity.WARNING,
-                f"The sink '{self.sink.name}' does not take all that it is told.",
+                f"The sink '{self.sink.name}' does not accept everything that is sent to it.",
                 tuple(part for part in (self.fault, _dropped(self.dropped)) if part),
                 key=self.sink.name,
                 needs=(),

@@ -41,7 +41,6 @@ EVENT_KINDS = (
     "alert",
     "alert_closed",
     "health",
-    "fault",
     "invariant_broken",
     "stage_started",
     "stage_progressing",
@@ -100,7 +99,7 @@ def _event(kind: str, mind: Mind) -> StopCondition:
     close = get_close_matches(kind, known, 1, 0.8)
     if not kind.isidentifier() or (close and kind not in known):
         raise SettingsError(
-            f"nothing is meant by '{kind}'",
+            f"'{kind}' is not known",
             expected="a phase, event, rule, stage, object, time, frame or expression",
             hint=f"did you mean '{close[0]}'?" if close else None,
         )
@@ -132,7 +131,7 @@ def _number(text: str, kind: str) -> float:
     try:
         return float(text.removesuffix("s").strip())
     except ValueError:
-        raise SettingsError(f"'{text}' is no number", expected=f"such as: {kind} 12") from None
+        raise SettingsError(f"'{text}' is not a number", expected=f"such as: {kind} 12") from None
 
 
 _READERS: Mapping[str, Callable[[str, Mind], StopCondition]] = {

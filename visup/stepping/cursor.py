@@ -56,13 +56,13 @@ class Bookmark:
 
     Attributes:
         number: How many steps led there.
-        was: What the agent was.
-        course: The history that it belongs to.
+        snapshot: What the agent was.
+        history: The history that it belongs to.
     """
 
     number: int
-    was: Snapshot
-    course: StepHistory = field(repr=False)
+    snapshot: Snapshot
+    history: StepHistory = field(repr=False)
 
 
 enable_display(PausedStep, StepResult)

@@ -25,13 +25,13 @@ LATEST = 100
 
 @dataclass(slots=True)
 class StepHistory:
-    """One course of steps, and a place in it.
+    """The steps of one timeline, and a place among them.
 
     Attributes:
         agent: Thinks; between two steps it is what it was after step `at`.
-        tape: What was perceived; a branch shares it with the course that it left.
+        observations: What was perceived; a branch shares it with the timeline that it left.
         at: The place: how many steps led here.
-        begin: The number of steps before this course began: 0 but for branches.
+        begin: The number of steps before this timeline began: 0 but for branches.
         answers: What the operator said before the step after each number.
         spacing: Steps between two minds that are kept.
         latest: How many steps are kept whole.
@@ -55,6 +55,15 @@ class StepHistory:
     def __post_init__(self) -> None:
         self.begin = self.made = self.at
         self._minds[self.at] = self.agent.snapshot()
+
+    def branch(self, agent: Agent) -> StepHistory:
+        """The history of a branch from here: another agent, which perceives and is told the same.
+
+        Args:
+            agent: As it is to be here.
+        """
+        answers = {n: given for n, given in self.answers.items() if n >= self.at}
+        return StepHistory(agent, self.observations, self.at, answers, self.spacing, self.latest)
 
     @property
     def here(self) -> Snapshot:
@@ -82,7 +91,7 @@ class StepHistory:
         return step
 
     def forward(self) -> Step:
-        """One step on along the tape."""
+        """One step on along what was perceived."""
         seen = self.observations.seen(self.at)
         *_, (_, thought) = self.phases(seen)
         return self.conclude(seen, thought)
@@ -91,7 +100,7 @@ class StepHistory:
         """Be after step `number`, one that was made.
 
         Returns:
-            That step; None where the course begins.
+            That step; None where the timeline begins.
         """
         self._note_answers()
         step = None
@@ -103,7 +112,7 @@ class StepHistory:
         return step
 
     def step(self, number: int) -> Step | None:
-        """Step `number`, one that was made, without going there; None where the course begins."""
+        """Step `number`, one that was made, without going there; None where the timeline begins."""
         with self.elsewhere():
             return self.go(number)
 

@@ -14,8 +14,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
 from visup.agent.storage.jsonable import event_record
-from visup.runs.replay import Transcript, TranscriptDiff, settings_for
-from visup.runs.replay import transcript_diff as told_difference
+from visup.runs.replay import Transcript, TranscriptDiff, settings_for, transcript_diff
 from visup.runs.wiring import final_verdict, reasoning_agent
 from visup.stepping.breakpoint_parser import parse_condition
 from visup.stepping.breakpoints import PhaseStop, Predicate, StopCondition
@@ -24,6 +23,7 @@ from visup.stepping.diff import MindDiff, mind_diff
 from visup.stepping.explanations import questions as asking
 from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import ReasonFinder
+from visup.stepping.explanations.why_not import LastStep
 from visup.stepping.history import LATEST, SPACING, StepHistory
 from visup.stepping.observation_sources import (
     LiveObservations,
@@ -39,10 +39,11 @@ class Stepper(Timeline):
     """Steps an agent forth and back, stops where it is told to, and looks into its mind.
 
     Args:
-        agent: The agent, new or after any step.
-        frames: Frames for its behaviours; or a `ObservationSource`, such as of a recorded run.
-        spacing: Steps between two minds that are kept; more of them is less to keep and longer to
-            go back.
+        agent: The agent, new or after any step; or a history of its steps, to go on with.
+        frames: Frames for its behaviours; an `ObservationSource`, such as of a recorded run; or the
+            timeline that this one branches off.
+        spacing: Steps between two minds that are kept; more means less memory and longer ways
+            back.
         latest: How many steps are kept whole.
 
     Attributes:
@@ -52,17 +53,17 @@ class Stepper(Timeline):
 
     def __init__(
         self,
-        agent: Agent,
-        frames: Iterable[Frame] | ObservationSource,
+        agent: Agent | StepHistory,
+        frames: Iterable[Frame] | ObservationSource | Timeline,
         *,
         spacing: int = SPACING,
         latest: int = LATEST,
     ) -> None:
-        feed = frames if isinstance(frames, ObservationSource) else LiveObservations(frames)
-        self._take(StepHistory(agent, spacing=spacing, latest=latest), feed)
-
-    def _take(self, history: StepHistory, source: ObservationSource | Timeline) -> None:
-        super().__init__(history, source)
+        if isinstance(agent, Agent):
+            agent = StepHistory(agent, spacing=spacing, latest=latest)
+        if not isinstance(frames, ObservationSource | Timeline):
+            frames = LiveObservations(frames)
+        super().__init__(agent, frames)
         self.breakpoints: dict[int, Breakpoint] = {}
         self.watches: dict[int, WatchExpression] = {}
         self._ahead = False
@@ -209,8 +210,8 @@ class Stepper(Timeline):
 
     @property
     def may_answer(self) -> bool:
-        """Whether the operator of this course can still speak: it is neither past nor recorded."""
-        return self.at == self.made and not isinstance(self._feed, RecordedObservations)
+        """Whether the operator of this timeline can still speak: it is neither past nor recorded."""
+        return self.at == self.made and not isinstance(self._source, RecordedObservations)
 
     def answer(self, object_id: int, name: str) -> None:
         """Say what an object is, as the operator of this run; where steps follow, branch first.
@@ -219,60 +220,50 @@ class Stepper(Timeline):
             SettingsError: Later steps were made, or nobody knows such an object or name.
         """
         if not self.may_answer:
-            recorded = isinstance(self._feed, RecordedObservations)
+            recorded = isinstance(self._source, RecordedObservations)
             other = "later steps were made without this answer"
             what = "the operator of a recorded run has spoken" if recorded else other
             raise SettingsError(what, hint="branch, and answer there")
         self.agent.answer(object_id, name)
 
-    def branch(self, *beliefs: Assumption, reasoners: Reasoners | None = None) -> Stepper:
-        """Another course from here on, with what is insisted upon; this one stays as it is.
+    def branch(self, *assumptions: Assumption, reasoners: Reasoners | None = None) -> Stepper:
+        """Another timeline from here on, under some assumptions; this one stays as it is.
 
-        It perceives the very same; when it comes to the end of what was perceived, this course goes
+        It perceives the very same; when it comes to the end of what was perceived, this timeline goes
         on by itself, ahead of its place.
 
         Args:
-            beliefs: To be held in every step of the branch whatever is seen, from `visup.stepping.what_if`.
+            assumptions: Held in every step of the branch whatever is seen, from `visup.stepping.what_if`.
             reasoners: What reasons there; as here when left out.
         """
         reasoners = reasoners or self.agent.reasoners
-        other = replace_agent(self.agent, assuming_reasoners(reasoners, beliefs))
+        other = replace_agent(self.agent, assuming_reasoners(reasoners, assumptions))
         here = self._history.here
         swapped = reasoners.match != self.agent.reasoners.match
-        mind = with_assumptions(without_tasks(here.mind) if swapped else here.mind, beliefs)
+        mind = with_assumptions(without_tasks(here.mind) if swapped else here.mind, assumptions)
         other.restore(replace(here, mind=mind))
-        history = self._history
-        course = StepHistory(
-            other,
-            history.observations,
-            self.at,
-            {n: said for n, said in history.answers.items() if n >= self.at},
-            history.spacing,
-            history.latest,
-        )
-        made = object.__new__(Stepper)
-        made._take(course, self)
+        made = Stepper(self._history.branch(other), self)
         made._last = self._last
         return made
 
     def compare(self) -> TranscriptDiff:
-        """What this branch tells differently from the course that it left, over the same steps.
+        """What this branch tells differently from the timeline that it left, over the same steps.
 
         Returns:
-            Events that only the course told, and only this branch told; and both verdicts here.
+            Events that only that timeline told, and only this branch told; and both verdicts here.
 
         Raises:
             SettingsError: This is no branch.
         """
         parent = self.parent
         if parent is None:
-            raise SettingsError("this is no branch: there is nothing to compare it with")
+            raise SettingsError("this is not a branch: there is nothing to compare it with")
         while parent.made < self.at and parent._look_ahead():
             continue  # it was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at
-        return told_difference(
-            _told(parent.told(first, last), parent.mind_at(last)),
-            _told(self.told(first, last), self.mind_at(last)),
+        return transcript_diff(
+            _transcript(parent.told(first, last), parent.mind_at(last)),
+            _transcript(self.told(first, last), self.mind_at(last)),
         )
 
     def diff(self, first: int, second: int | None = None) -> MindDiff:
@@ -304,16 +295,17 @@ class Stepper(Timeline):
         Raises:
             VisupError: Nothing is known of it.
         """
-        reasoners = self.agent.reasoners
-        every = (*reasoners.update, *reasoners.cogitate, *reasoners.match)
-        return asking.why_not(self.mind, every, text)
+        made = self.at > self.begin
+        before = self.mind_at(self.at - 1) if made else None
+        seen = self.observation_at(self.at) if made else None
+        return asking.why_not(LastStep(self.mind, before, seen, tuple(self.agent.reasoners)), text)
 
     def close(self) -> None:
         """Let go of what the agent's behaviours have started."""
         self.agent.close()
 
 
-def _told(events: Iterator[tuple[int, Event]], mind: Mind) -> Transcript:
+def _transcript(events: Iterator[tuple[int, Event]], mind: Mind) -> Transcript:
     verdict = final_verdict(mind).value if mind.tasks else None
     return Transcript(tuple(event_record(e) for _, e in events), verdict, mind.frame_index)
 

@@ -1,4 +1,4 @@
-"""One course of an agent that can be walked forth and back: new steps, old steps, half steps."""
+"""One timeline of an agent that can be walked forth and back: new steps, old steps, half steps."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ class Timeline:
 
     Args:
         history: Of its agent.
-        source: Gives observations; of a branch, the course that it left.
+        source: Gives observations; of a branch, the timeline that it left.
 
     Attributes:
         agent: The agent; its mind is that of the place.
-        parent: The course that this one branched off, or None.
+        parent: The timeline that this one branched off, or None.
     """
 
     def __init__(self, history: StepHistory, source: ObservationSource | Timeline) -> None:
         self.agent = history.agent
         self.parent = source if isinstance(source, Timeline) else None
-        self._feed = source if not isinstance(source, Timeline) else None
+        self._source = source if not isinstance(source, Timeline) else None
         self._history = history
         self._frame: Frame | None = None
         self._paused: PausedStep | None = None
@@ -56,7 +56,7 @@ class Timeline:
 
     @property
     def begin(self) -> int:
-        """How many steps there were before this course: 0 but for branches."""
+        """How many steps there were before this timeline: 0 but for branches."""
         return self._history.begin
 
     @property
@@ -66,7 +66,7 @@ class Timeline:
 
     @property
     def last(self) -> Step | None:
-        """The last completed step, or None where the course begins."""
+        """The last completed step, or None where the timeline begins."""
         return self._last
 
     # Forth
@@ -100,7 +100,7 @@ class Timeline:
         """Told of each step that is completed here, with the mind before it."""
 
     def _perceived(self) -> Observation | None:
-        """What the next step begins with: from the tape, or new."""
+        """What the next step begins with: what was perceived before, or new."""
         history = self._history
         if history.at < len(history.observations):
             return history.observations.seen(history.at)
@@ -111,7 +111,7 @@ class Timeline:
             if said := self.parent._history.answers.get(history.at):
                 history.answers[history.at] = said
             return history.observations.seen(history.at)
-        given = self._feed.next(self.agent) if self._feed else None
+        given = self._source.next(self.agent) if self._source else None
         if given is None:
             return None
         history.observations.add(given.seen)
@@ -121,7 +121,7 @@ class Timeline:
         return given.seen
 
     def _look_ahead(self) -> bool:
-        """One more step at the end of this course, for a branch; the place stays."""
+        """One more step at the end of this timeline, for a branch; the place stays."""
         place = self._paused, self._rest, self._last
         made = self.made
         with self._history.elsewhere():
@@ -139,7 +139,7 @@ class Timeline:
         self._last = step
 
     def _drop(self) -> None:
-        """Forget the half-made step, if there is one; what was perceived stays on the tape."""
+        """Forget the half-made step, if there is one; what was perceived stays recorded."""
         self._paused, self._rest = None, iter(())
 
     # Back
@@ -148,7 +148,7 @@ class Timeline:
         """Go back by some steps; a step inside which it is stopped is left, and counts as one.
 
         Returns:
-            The step after which it is now, or None where the course begins.
+            The step after which it is now, or None where the timeline begins.
         """
         return self.go(self.at - n + (self._paused is not None))
 
@@ -190,20 +190,20 @@ class Timeline:
         """Be again where a snapshot was taken.
 
         Raises:
-            SettingsError: It is of another course.
+            SettingsError: It is of another timeline.
         """
-        if mark.course is not self._history:
+        if mark.history is not self._history:
             raise SettingsError(
-                "this snapshot is of another course", expected="one of this stepper"
+                "this snapshot is of another timeline", expected="one of this stepper"
             )
         self._arrive(self._history.step(mark.number) if mark.number > self.begin else None)
-        self._history.jump(mark.number, mark.was)
+        self._history.jump(mark.number, mark.snapshot)
         self._look_again()
 
     # What was
 
     def at_step(self, number: int) -> Step | None:
-        """A step that was made, without going there; None where the course begins.
+        """A step that was made, without going there; None where the timeline begins.
 
         Raises:
             SettingsError: It was not made.

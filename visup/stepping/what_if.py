@@ -27,7 +27,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.cycle.agent import Reasoners
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.formula.nodes import Rule
 from visup.rules.safety.reasoner import RuleReasoner
@@ -143,9 +143,7 @@ def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> R
     def wrapped(some: tuple[Reasoner, ...]) -> tuple[Reasoner, ...]:
         return tuple(AssumingReasoner(t, tuple(beliefs)) for t in some)
 
-    return Reasoners(
-        wrapped(reasoners.update), wrapped(reasoners.cogitate), wrapped(reasoners.match)
-    )
+    return Reasoners(*(wrapped(some) for _, some in reasoners.by_phase()))
 
 
 def with_rules(reasoners: Reasoners, rules: Sequence[Rule]) -> Reasoners:
@@ -164,7 +162,7 @@ def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
 
 def without_tasks(mind: Mind) -> Mind:
     """The mind as if no task had been supervised yet."""
-    memory = {k: v for k, v in mind.memory.items() if k != MEMORY}
+    memory = {k: v for k, v in mind.memory.items() if k != MEMORY.name}
     return replace(mind, tasks=(), memory=MappingProxyType(memory))
 
 

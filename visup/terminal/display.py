@@ -118,7 +118,7 @@ def _in_words(record: Any) -> RenderableType:
 def _step_in_words(record: Step) -> RenderableType:
     head = Text(f"step of frame {record.frame_index}, {record.time:.2f} s", style="bold")
     told: list[RenderableType] = [event_row(e) for e in worded_once(record.events)]
-    told = told or [Text("nothing was told", style="dim")]
+    told = told or [Text("no events", style="dim")]
     asked = [shown(d) for d in record.directives]
     return Group(head, *told, objects_table(record.mind.objects.values()), *asked)
 
@@ -133,7 +133,9 @@ def _(record: Mind) -> RenderableType:
     parts += [alerts_list(record.alerts)] if record.alerts else []
     parts += [questions_list(record.questions)] if record.questions else []
     if record.unknown:
-        parts.append(Text(f"not known now: {', '.join(sorted(record.unknown))}", style="yellow"))
+        parts.append(
+            Text(f"currently unknown: {', '.join(sorted(record.unknown))}", style="yellow")
+        )
     return Group(*parts)
 
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import event_record
-from visup.wording import worded_once
+from visup.wording import prose, worded_once
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
 MARK = {Severity.INFO: " ", Severity.WARNING: "!", Severity.CRITICAL: "‼"}
@@ -25,10 +25,10 @@ VERDICT_STYLE = {
     Verdict.UNKNOWN: "bold magenta",
 }
 VERDICT_TEXT = {
-    Verdict.SUCCEEDED: "the task went as it should",
-    Verdict.IN_PROGRESS: "the task was still under way at the end, and nothing was wrong",
+    Verdict.SUCCEEDED: "the task went as intended",
+    Verdict.IN_PROGRESS: "the task was still in progress at the end, and nothing was wrong",
     Verdict.FAILED: "the task failed",
-    Verdict.INTERRUPTED: "something unsafe or unexpected came between",
+    Verdict.INTERRUPTED: "something unsafe or unexpected interrupted it",
     Verdict.UNKNOWN: "the task could not be followed",
 }
 
@@ -69,7 +69,7 @@ def event_row(event: Event) -> Table:
     row.add_column(justify="right", min_width=8, style="dim", no_wrap=True)
     row.add_column(width=1, style=style)
     row.add_column(style=style)
-    row.add_row(f"{event.time:.1f} s", MARK[event.severity], Text(event.text))
+    row.add_row(f"{event.time:.1f} s", MARK[event.severity], Text(prose(event.text)))
     return row
 
 

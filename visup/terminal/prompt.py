@@ -102,7 +102,7 @@ def read_commands(session: Session) -> Iterator[str]:
 def toolbar(session: Session) -> str:
     """Where the session is, in one line of at most 80 characters."""
     stepper = session.stepper
-    branch = f"  branch from {stepper.begin}" if len(session.courses) > 1 else ""
+    branch = f"  branch from {stepper.begin}" if len(session.timelines) > 1 else ""
     inside = f"  after {stepper.paused.phase.value}" if stepper.paused else ""
     place = f" step {stepper.at} of {stepper.made}{inside}{branch}  {stepper.mind.time:.2f} s"
     return f"{place}  Tab completes, 'help step' explains"[:80]

@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
 
 from rich.console import Console, Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
-from visup.agent import Frame, Observation
+from visup.agent import Frame
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
 from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
-from visup.terminal.display import shown
 from visup.terminal.narrator import event_row
-from visup.terminal.session_commands import COMMANDS, HELP
-from visup.terminal.tables import (
-    alerts_list,
-    behaviours_table,
-    candidates_table,
-    objects_table,
-    questions_list,
-    regions_table,
-    relations_table,
-    tasks_tree,
-)
+from visup.terminal.session_commands import COMMANDS
+from visup.terminal.session_views import VIEWS, number_in, refusal, usage
 from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
-from visup.wording import worded_once
-
-__all__ = ["HELP", "Session"]
+from visup.wording import prose, worded_once
 
 Answer = RenderableType | None
 
@@ -44,7 +33,7 @@ class Session:
         console: Where to write; standard output by default.
 
     Attributes:
-        courses: The run, and the branches that were begun from one another; the last one is stepped.
+        timelines: The run, and the branches that were begun from one another; the last one is stepped.
     """
 
     def __init__(
@@ -53,53 +42,18 @@ class Session:
         frames: Iterable[Frame] | ObservationSource,
         console: Console | None = None,
     ) -> None:
-        self.courses = [Stepper(agent, frames)]
+        self.timelines = [Stepper(agent, frames)]
         self.console = console or Console(highlight=False)
         self._marks: dict[str, Bookmark] = {}
-        self._commands: dict[str, Callable[[Sequence[str]], Answer]] = {
-            "step": self._step,
-            "run": self._run,
-            "back": self._back,
-            "go": self._go,
-            "mark": self._mark,
-            "break": self._break,
-            "delete": lambda words: self._breakpoint(words, "delete"),
-            "disable": lambda words: self._breakpoint(words, "disable"),
-            "enable": lambda words: self._breakpoint(words, "enable"),
-            "watch": self._watch,
-            "unwatch": self._unwatch,
-            "why": self._why,
-            "diff": self._diff,
-            "assert": lambda words: self._suppose(words, retract=False),
-            "forget": lambda words: self._suppose(words, retract=True),
-            "use": self._use,
-            "branch": lambda _: self._begin(self.stepper.branch()),
-            "compare": self._compare,
-            "leave": self._leave,
-            "mind": lambda _: shown(self.stepper.mind),
-            "percepts": lambda _: shown(seen) if (seen := self._seen()) else Text(_NO_STEP),
-            "regions": lambda _: regions_table(self._seen()),
-            "objects": lambda _: objects_table(self.stepper.mind.objects.values()),
-            "candidates": self._candidates,
-            "questions": lambda _: questions_list(self.stepper.mind.questions),
-            "answer": self._answer,
-            "relations": lambda words: relations_table(self.stepper.mind.relations, _number(words)),
-            "tasks": lambda _: tasks_tree(self.stepper.mind),
-            "alerts": lambda _: alerts_list(self.stepper.mind.alerts),
-            "events": self._events,
-            "directives": self._directives,
-            "behaviours": self._behaviours,
-            "help": _help,
-        }
 
     @property
     def stepper(self) -> Stepper:
-        """The course that is stepped."""
-        return self.courses[-1]
+        """The timeline that is stepped."""
+        return self.timelines[-1]
 
     @property
     def agent(self) -> Agent:
-        """The agent of that course."""
+        """The agent of that timeline."""
         return self.stepper.agent
 
     @property
@@ -109,7 +63,7 @@ class Session:
 
     def words(self) -> list[str]:
         """The commands, for completion."""
-        return [*self._commands, "until", "quit"]
+        return [*_NAMES, "until", "quit"]
 
     def run(self, commands: Iterable[str]) -> int:
         """Obey commands until 'quit' or their end.
@@ -136,20 +90,22 @@ class Session:
         word, *rest = command.split()
         if word.endswith("!"):
             word, rest = word[:-1], ["!", *rest]
-        names = [n for n in self._commands if n.startswith(word)]
-        name = word if word in self._commands else names[0] if len(names) == 1 else None
+        names = [n for n in _NAMES if n.startswith(word)]
+        name = word if word in _NAMES else names[0] if len(names) == 1 else None
         if name is None:
             meant = f" ({', '.join(names)}?)" if names else ""
-            return _amiss(f"'{word}' is not a command{meant}; 'help' lists them")
+            return refusal(f"'{word}' is not a command{meant}; 'help' lists them")
         try:
-            return self._commands[name](rest)
+            if name in VIEWS:
+                return VIEWS[name](self.stepper, rest)
+            return _ACTIONS[name](self, rest)
         except VisupError as fault:
-            return _amiss(str(fault))
+            return refusal(str(fault))
 
     # Forth and back
 
     def _step(self, words: Sequence[str]) -> Answer:
-        count = _number(words)
+        count = number_in(words)
         what = " ".join(words if count is None else words[1:]).removeprefix("until").strip()
         return self._advance(count, what)
 
@@ -160,7 +116,7 @@ class Session:
     def _advance(self, count: int | None, what: str | Callable[[Step], bool]) -> Answer:
         stop: StopCondition | None = parse_condition(what, self.stepper.mind) if what else None
         if stop is not None and self._is_past(stop):
-            return _amiss(f"{stop.text} is past: 'go' and 'back' lead there")
+            return refusal(f"{stop.text} is past: 'go' and 'back' lead there")
         stopped = self.stepper.step(count, stop, self._tell)
         return self._place(stopped)
 
@@ -185,7 +141,7 @@ class Session:
                 lines.append(Text("the source has ended", style="yellow"))
         for watch in self.stepper.watches.values():
             values = [f"{_ids(r.objects)} {r}".strip() for r in watch.readings[:6]]
-            told = ", ".join(values) or "nobody is meant by it"
+            told = ", ".join(values) or "no object matches"
             lines.append(Text(f"watch {watch.id}  {watch.text}: {told}", style="cyan"))
         seen = sum(b.last_seen == mind.time for b in mind.objects.values())
         where = f"frame {mind.frame_index}, {mind.time:.2f} s, {seen} regions"
@@ -198,12 +154,12 @@ class Session:
         told = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
         if stepper.paused:
             told.append(f"; inside the step, after {stepper.paused.phase.value}")
-        if len(self.courses) > 1:
+        if len(self.timelines) > 1:
             told.append(f"; branch from step {stepper.begin}")
         return "".join(told)
 
     def _back(self, words: Sequence[str]) -> Answer:
-        count = _number(words)
+        count = number_in(words)
         self.stepper.back(1 if count is None else count)
         return self._place()
 
@@ -218,7 +174,7 @@ class Session:
         elif place.isdecimal():
             self.stepper.go(int(place))
         else:
-            return _amiss(f"{_usage('go')}; marks: {', '.join(self._marks) or 'none'}")
+            return refusal(f"{usage('go')}; marks: {', '.join(self._marks) or 'none'}")
         return self._place()
 
     def _mark(self, words: Sequence[str]) -> Answer:
@@ -237,9 +193,9 @@ class Session:
         return Text(str(self.stepper.break_at(" ".join(words))))
 
     def _breakpoint(self, words: Sequence[str], what: str) -> Answer:
-        number = _number(words)
+        number = number_in(words)
         if number is None:
-            return _amiss(_usage(what))
+            return refusal(usage(what))
         if what == "delete":
             self.stepper.delete(number)
         else:
@@ -254,37 +210,23 @@ class Session:
         return self._place() if self.stepper.watches else Text("nothing is watched")
 
     def _unwatch(self, words: Sequence[str]) -> Answer:
-        number = _number(words)
+        number = number_in(words)
         if number is None:
-            return _amiss(_usage("unwatch"))
+            return refusal(usage("unwatch"))
         self.stepper.unwatch(number)
         return self._watch(())
 
     # Why
 
-    def _why(self, words: Sequence[str]) -> Answer:
-        if not words:
-            return Text(COMMANDS["why"].text)
-        if words[0] == "not":
-            return shown(self.stepper.why_not(" ".join(words[1:])))
-        return shown(self.stepper.why(" ".join(words)))
-
-    def _diff(self, words: Sequence[str]) -> Answer:
-        numbers = [int(w) for w in words if w.isdecimal()]
-        if self.stepper.at == self.stepper.begin and not numbers:
-            return Text(_NO_STEP)
-        first = numbers[0] if numbers else self.stepper.at - 1
-        return shown(self.stepper.diff(first, *numbers[1:2]))
-
     # What if
 
-    def _suppose(self, words: Sequence[str], *, retract: bool) -> Answer:
+    def _assume(self, words: Sequence[str], *, retract: bool) -> Answer:
         belief = parse_assumption(self.stepper.mind, words, self.agent.models, retract=retract)
         return self._begin(self.stepper.branch(belief))
 
     def _use(self, words: Sequence[str]) -> Answer:
         if len(words) != 2 or words[0] not in ("rules", "task"):
-            return _amiss(_usage("use"))
+            return refusal(usage("use"))
         reasoners = replaced_reasoners(self.agent.reasoners, words[0], words[1])
         return self._begin(self.stepper.branch(reasoners=reasoners))
 
@@ -293,100 +235,69 @@ class Session:
             branch.watch(watch.text, breaks=watch.breaks)
         for point in self.stepper.breakpoints.values():
             branch.enable(branch.break_at(point.stop).id, point.enabled)
-        self.courses.append(branch)
+        self.timelines.append(branch)
         return self._place()
 
     def _compare(self, words: Sequence[str]) -> Answer:
         changed = self.stepper.compare()
+        marked = [("-", "red", e) for e in changed.gone] + [("+", "green", e) for e in changed.new]
         told = [
-            *(Text(f"- {float(e['time']):7.1f} s  {e['text']}", style="red") for e in changed.gone),
-            *(
-                Text(f"+ {float(e['time']):7.1f} s  {e['text']}", style="green")
-                for e in changed.new
-            ),
+            Text(prose(f"{mark} {float(e['time']):7.1f} s  {e['text']}"), style=style)
+            for mark, style, e in marked
         ]
         before, after = changed.verdicts
         verdict = Text(f"verdict: {before or 'none'} -> {after or 'none'}")
-        return Group(*(told or [Text("nothing is told differently")]), verdict)
+        return Group(*(told or [Text("no difference")]), verdict)
 
     def _leave(self, words: Sequence[str]) -> Answer:
-        if len(self.courses) == 1:
-            return _amiss("this is no branch")
-        self.courses.pop()
+        if len(self.timelines) == 1:
+            return refusal("this is not a branch")
+        self.timelines.pop()
         return self._place()
 
     def _answer(self, words: Sequence[str]) -> Answer:
-        number = _number(words)
+        number = number_in(words)
         if number is None or len(words) < 2:
-            return _amiss("answer ID NAME, such as: answer 2 arm")
+            return refusal("answer ID NAME, such as: answer 2 arm")
         name = " ".join(words[1:])
         if not self.stepper.may_answer:
             branch = self.stepper.branch()
             branch.answer(number, name)
             return self._begin(branch)
         self.stepper.answer(number, name)
-        return Text("taken as a fact from the next step on", style="dim")
-
-    # What is believed
-
-    def _seen(self) -> Observation | None:
-        """What was perceived in this step."""
-        paused, last = self.stepper.paused, self.stepper.last
-        if paused is not None:
-            return paused.seen
-        return None if last is None else last.observation
-
-    def _candidates(self, words: Sequence[str]) -> Answer:
-        number = _number(words)
-        belief = self.stepper.mind.objects.get(number) if number is not None else None
-        if belief is None:
-            return _amiss("which object? 'objects' lists their ids")
-        return candidates_table(belief)
-
-    def _events(self, words: Sequence[str]) -> Answer:
-        most = _number(words) or 10
-        told = list(self.stepper.told(last=self.stepper.at))[-most:]
-        rows = Table.grid(padding=(0, 1))
-        for number, event in told:
-            rows.add_row(Text(f"step {number}", style="dim"), event_row(event))
-        return rows if told else Text("none yet")
-
-    def _directives(self, words: Sequence[str]) -> Answer:
-        asked = self.agent.directives
-        return Group(*map(shown, asked)) if asked else Text("nothing is asked for")
-
-    def _behaviours(self, words: Sequence[str]) -> Answer:
-        seen = self._seen()
-        return behaviours_table(seen.reports) if seen else Text(_NO_STEP)
+        return Text("taken as fact from the next step on", style="dim")
 
 
-_NO_STEP = "no step was taken yet"
+_ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProxyType(
+    {
+        "step": Session._step,
+        "run": Session._run,
+        "back": Session._back,
+        "go": Session._go,
+        "mark": Session._mark,
+        "break": Session._break,
+        "delete": partial(Session._breakpoint, what="delete"),
+        "disable": partial(Session._breakpoint, what="disable"),
+        "enable": partial(Session._breakpoint, what="enable"),
+        "watch": Session._watch,
+        "unwatch": Session._unwatch,
+        "assert": partial(Session._assume, retract=False),
+        "forget": partial(Session._assume, retract=True),
+        "use": Session._use,
+        "branch": lambda session, _: session._begin(session.stepper.branch()),
+        "compare": Session._compare,
+        "leave": Session._leave,
+        "answer": Session._answer,
+    }
+)
+"""Commands that move the session or change something, by their names."""
+
+_NAMES = tuple(name for name in COMMANDS if name in _ACTIONS or name in VIEWS)
 
 
 def _never(step: Step) -> bool:
     return False
 
 
-def _help(words: Sequence[str]) -> Answer:
-    if not words:
-        return Text(HELP)
-    found = [c for c in COMMANDS.values() if c.name.startswith(words[0])]
-    if not found:
-        return _amiss(f"'{words[0]}' is not a command; 'help' lists them")
-    return Text("\n\n".join(c.text for c in found))
-
-
-def _usage(name: str) -> str:
-    return f"{COMMANDS[name].usage}: {COMMANDS[name].does}"
-
-
 def _ids(objects: tuple[int, ...]) -> str:
     return f"({', '.join(map(str, objects))})" if objects else ""
-
-
-def _amiss(text: str) -> Text:
-    return Text(text, style="yellow")
-
-
-def _number(words: Sequence[str]) -> int | None:
-    return int(words[0]) if words and words[0].isdecimal() else None

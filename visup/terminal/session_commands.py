@@ -37,8 +37,8 @@ class Command:
 
 _WHERE = """\
 WHAT is one of
-  a phase            update, cogitate, match, act: stops inside the step after
-                     it, with the half-made mind to look at
+  a phase            update, cogitate, match, attend, act: stops inside the step
+                     after it, with the half-made mind to look at
   an event           alert, entry, coupled, stage_failing, ...
   a rule             collision_course: when it becomes true of anybody;
                      'rule NAME changes': whenever its verdict changes
@@ -60,16 +60,18 @@ _WHY = """\
   why not captured         what a stage waits for
   why not coupled 1 2, entry 3, exit 1, occlusion 1, identified 1, touching 1 2"""
 _BRANCH = """\
-What is supposed, asserted or swapped begins a branch at this place; the run
-itself stays as it is. 'compare' tells what the branch changes, 'leave' returns."""
+An assertion, a retraction or a swap begins a branch at this place; the run
+itself stays as it is. 'compare' shows what the branch changes, 'leave' returns."""
 
 _COMMANDS = (
-    Command("step [N] [until WHAT]", "one step, or N, or up to what is so", _WHERE, ("stop",)),
-    Command("run [until WHAT]", "until something is so, or the end", _WHERE, ("stop",)),
-    Command("back [N]", "one step back, or N; forward again tells the same"),
+    Command(
+        "step [N] [until WHAT]", "one step, or N, or until a condition holds", _WHERE, ("stop",)
+    ),
+    Command("run [until WHAT]", "until a condition holds, or the end", _WHERE, ("stop",)),
+    Command("back [N]", "one step back, or N; forward again gives the same steps"),
     Command(
         "go PLACE",
-        "to a step, a time (12.5s), a mark, 'start' or 'end'",
+        "go to a step, a time (12.5s), a mark, 'start' or 'end'",
         "Steps are numbered from 1. Breakpoints are not looked at on the way.",
         ("mark",),
     ),
@@ -89,7 +91,7 @@ _COMMANDS = (
     Command("diff [A [B]]", "what changed since the last step, or from step A to B"),
     Command(
         "assert BELIEF",
-        "what if: insist on a belief, on a branch",
+        "what if: assume a belief, on a branch",
         f"""\
   assert touching 1 2 true       a relation; or false, unknown
   assert object 1 arm            an identity; 'unknown' for none of the models
@@ -99,7 +101,7 @@ _COMMANDS = (
     ),
     Command(
         "forget BELIEF",
-        "what if: retract a belief, on a branch",
+        "what if: drop a belief, on a branch",
         f"  forget touching 1 2    forget object 1\n{_BRANCH}",
         ("relation", "object"),
     ),
@@ -109,9 +111,9 @@ _COMMANDS = (
         _BRANCH,
         ("file",),
     ),
-    Command("branch", "another course from here, with nothing changed yet", _BRANCH),
-    Command("compare", "what this branch tells differently"),
-    Command("leave", "back to the course that this branch left"),
+    Command("branch", "another timeline from here, with nothing changed yet", _BRANCH),
+    Command("compare", "how the events of this branch differ"),
+    Command("leave", "back to the timeline that this branch left"),
     Command("mind", "all that is believed, in short"),
     Command("percepts", "what was perceived in this step, by behaviour"),
     Command("regions", "what moved in the last frame"),
@@ -120,7 +122,7 @@ _COMMANDS = (
     Command("questions", "what the operator is asked"),
     Command(
         "answer ID NAME",
-        "say what object ID is",
+        "say which model object ID is",
         "In the past, or of a recorded run, it begins a branch.",
         ("object",),
     ),
@@ -139,6 +141,6 @@ HELP = "\n".join(
     [
         *(f"{c.usage:<22} {c.does}" for c in _COMMANDS),
         f"{'quit':<22} end",
-        "A unique beginning of a command will do; an empty line repeats the last one.",
+        "A unique beginning of a command is enough; an empty line repeats the last one.",
     ]
 )

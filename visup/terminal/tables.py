@@ -21,6 +21,7 @@ from visup.agent import (
     TaskBelief,
 )
 from visup.tasks.supervision.sentences import prospects_text
+from visup.wording import prose
 
 
 def table(*headings: str, title: str | None = None) -> Table:
@@ -87,17 +88,17 @@ def tasks_tree(mind: Mind) -> RenderableType:
 
 def task_tree(task: TaskBelief) -> Tree:
     """How one task stands."""
-    tree = Tree(Text(f"{task.task}: {task.verdict.value}  {task.evidence}".rstrip()))
+    tree = Tree(Text(prose(f"{task.task}: {task.verdict.value}  {task.evidence}".rstrip())))
     for s in task.stages:
         here = "> " if s.stage == task.current else "  "
         told = f"{here}{s.stage}: {s.status.value} since {s.since:.1f} s  {s.evidence}"
-        tree.add(Text(told.rstrip()))
+        tree.add(Text(prose(told.rstrip())))
     for b in task.bindings:
         who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "nobody"
-        tree.add(Text(f"  {b.actor} is played by {who}"))
-    tree.add(Text(f"  {prospects_text(task)}"))
+        tree.add(Text(f"  {b.actor} is bound to {who}"))
+    tree.add(Text(prose(f"  {prospects_text(task)}")))
     if task.active < 1.0:
-        tree.add(Text(f"  going on with probability {task.active:.2f}"))
+        tree.add(Text(f"  active with probability {task.active:.2f}"))
     return tree
 
 
@@ -109,7 +110,7 @@ def alerts_list(alerts: Iterable[Alert]) -> RenderableType:
 def alert_line(a: Alert) -> str:
     """One alert."""
     closed = "" if a.closed is None else f", closed at {a.closed:.1f} s"
-    return f"{a.id}  {a.severity.name.lower()}  since {a.opened:.1f} s{closed}  {a.cause}"
+    return f"{a.id}  {a.severity.name.lower()}  since {a.opened:.1f} s{closed}  {prose(a.cause)}"
 
 
 def questions_list(questions: Iterable[Question]) -> RenderableType:

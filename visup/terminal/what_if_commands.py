@@ -10,7 +10,7 @@ from visup.agent import Mind, Presence, Truth
 from visup.agent.cycle.agent import Reasoners
 from visup.agent.cycle.answers import resolve_answer
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.mind import UNKNOWN_OBJECT
+from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.rules.language.parser import load_rules
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.what_if import (
@@ -43,7 +43,7 @@ def parse_assumption(
     """
     said = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
     if not said:
-        raise SettingsError("nothing is supposed", expected=_EXPECTED)
+        raise SettingsError("no assumption is given", expected=_EXPECTED)
     if said[0] in ("object", "identity", "presence"):
         return _of_object(mind, said[1:], models, retract)
     return _relation(mind, said, retract)
@@ -71,7 +71,7 @@ def _relation(mind: Mind, words: list[str], retract: bool) -> Assumption:
 
 def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: bool) -> Assumption:
     if not words or not words[0].isdecimal() or (len(words) < 2 and not retract):
-        raise SettingsError("what of which object?", expected=_EXPECTED)
+        raise SettingsError("which object, and what about it?", expected=_EXPECTED)
     object_id = int(words[0])
     _known(mind, object_id)
     if retract:

@@ -110,7 +110,7 @@ def stub_behaviours(
     for kind in kinds:
         if kind not in known:
             raise BehaviourError(
-                f"the clips know nothing of '{kind}', which the behaviour needs",
+                f"the clips have no '{kind}', which the behaviour needs",
                 hint=f"say it: provide={{'{kind}': lambda frame: ...}}",
             )
     return [Scripted(f"true_{kind}", (kind,), known[kind]) for kind in kinds]

@@ -196,11 +196,11 @@ def covered_pixels(
     old: Labels,
     corners: Labels,
     members: NDArray[np.bool_],
-    dx: int,
-    dy: int,
+    by: tuple[int, int],
     count: int,
 ) -> NDArray[np.int64]:
-    """How many pixels of each of `count` cells some old cells cover when moved by whole pixels."""
+    """How many pixels of each of `count` cells some old cells cover when moved by (x, y) pixels."""
+    dx, dy = by
     out = np.zeros(count, np.int64)
     height, width = new.shape
     left, top, right, bottom = bounding_box(corners, members)

@@ -170,7 +170,7 @@ def track_points(
     # From one frame to the next dense flow tells where to begin: coarse images would only mislead.
     near = lag == 1
     there, found, misfit = _follow(new.grey, old.grey, start, begin.copy(), 1 if near else 2, near)
-    home, back = _back(points, begin, there, found, old, new, near)
+    home, back = _back(points, begin, there, found, (old, new), near)
     ok = (found.ravel() > 0) & (back.ravel() > 0)
     # What is said of points that were lost is not even finite.
     ok &= np.isfinite(there).all(axis=(1, 2)) & np.isfinite(home).all(axis=(1, 2))
@@ -192,8 +192,7 @@ def _back(
     begin: Floats,
     there: Floats,
     found: NDArray[np.uint8],
-    old: WorkImage,
-    new: WorkImage,
+    images: tuple[WorkImage, WorkImage],
     near: bool,
 ) -> tuple[Floats, NDArray[np.uint8]]:
     """Where points come out when they are followed back: (N, 1, 2), (N, 1).
@@ -210,6 +209,7 @@ def _back(
     asked = np.flatnonzero((found.ravel() > 0) & ~(near & (off < AGREED)))
     if len(asked):
         first = np.ascontiguousarray((start + aside)[asked])
+        old, new = images
         ends, sound, _ = _follow(
             old.grey, new.grey, np.ascontiguousarray(there[asked]), first, 0, near
         )

@@ -91,7 +91,7 @@ class Superpixels:
             (count,) float32.
         """
         some = np.ascontiguousarray(members)
-        pixels = covered_pixels(self.labels, old.labels, old.corners, some, *by, self.count)
+        pixels = covered_pixels(self.labels, old.labels, old.corners, some, by, self.count)
         return np.asarray(pixels / self.area, dtype=np.float32)
 
     def paint(self, members: NDArray[np.bool_]) -> Floats:

@@ -89,52 +89,88 @@ def reweighted_least_squares(
 
     Returns:
         (2, K) coefficients, the last (N,) weights, and the mean information of N under these.
+
+    Nine parameters, since a record costs more to unpack at each of hundreds of calls a frame than a fit
+    of few constraints does.
     """
     count, k = phi.shape
-    info, v = np.empty((count, 3)), slack * slack
-    for n in range(count):
-        a, b, c = float(information[n, 0]), float(information[n, 1]), float(information[n, 2])
-        det = a * c - b * b
-        scale = 1 / (1 + v * (a + c) + v * v * det)
-        info[n, 0], info[n, 1], info[n, 2] = (a + v * det) * scale, b * scale, (c + v * det) * scale
+    info = _with_slack(information, slack)
     now = start.astype(np.float64)
     w, model = np.empty(count), np.zeros((2, k))
     normal, right = np.empty((2 * k, 2 * k)), np.empty(2 * k)
     for _ in range(rounds):
+        _reweight(moved, info, weight, now, cutoff, w)
         normal[:], right[:] = 0, 0
         for i in range(k):
             normal[i, i] = normal[k + i, k + i] = hold[i]
-        for n in range(count):
-            a, b, c = info[n, 0], info[n, 1], info[n, 2]
-            dx, dy = float(moved[n, 0]), float(moved[n, 1])
-            ex, ey = dx - now[n, 0], dy - now[n, 1]
-            off = 1 + ((a * ex + 2 * b * ey) * ex + c * ey * ey) / cutoff**2
-            w[n] = weight[n] / (off * off)
-            for i in range(k):
-                p = w[n] * phi[n, i]
-                right[i] += p * (a * dx + b * dy)
-                right[k + i] += p * (b * dx + c * dy)
-                for j in range(i + 1):
-                    normal[i, j] += p * phi[n, j] * a
-                    normal[k + i, k + j] += p * phi[n, j] * c
-                for j in range(k):
-                    normal[k + i, j] += p * phi[n, j] * b
+        _add_equations(phi, moved, info, w, normal, right)
         _solve(normal, right)
         model = right.copy().reshape(2, k)
-        step = 0.0
-        for n in range(count):
-            for i in range(2):
-                there = 0.0
-                for j in range(k):
-                    there += model[i, j] * phi[n, j]
-                step = max(step, abs(there - now[n, i]))
-                now[n, i] = there
-        if step < SETTLED:
+        if _move(phi, model, now) < SETTLED:
             break
     mean = 0.0
     for n in range(count):
         mean += w[n] * (info[n, 0] + info[n, 2])
     return model, w, mean
+
+
+@compiled
+def _with_slack(information: Floats, slack: float) -> Doubles:
+    """(N, 3) information after adding an isotropic variance to the covariance."""
+    v, out = slack * slack, np.empty((len(information), 3))
+    for n in range(len(information)):
+        a, b, c = float(information[n, 0]), float(information[n, 1]), float(information[n, 2])
+        det = a * c - b * b
+        scale = 1 / (1 + v * (a + c) + v * v * det)
+        out[n, 0], out[n, 1], out[n, 2] = (a + v * det) * scale, b * scale, (c + v * det) * scale
+    return out
+
+
+@compiled
+def _reweight(
+    moved: Floats, info: Doubles, weight: Doubles, now: Doubles, cutoff: float, out: Doubles
+) -> None:
+    """Weights (N,) of constraints under the displacements (N, 2) as they are now."""
+    for n in range(len(moved)):
+        a, b, c = info[n, 0], info[n, 1], info[n, 2]
+        dx, dy = float(moved[n, 0]), float(moved[n, 1])
+        ex, ey = dx - now[n, 0], dy - now[n, 1]
+        off = 1 + ((a * ex + 2 * b * ey) * ex + c * ey * ey) / cutoff**2
+        out[n] = weight[n] / (off * off)
+
+
+@compiled
+def _add_equations(
+    phi: Doubles, moved: Floats, info: Doubles, w: Doubles, normal: Doubles, right: Doubles
+) -> None:
+    """Add the weighted normal equations, (2K, 2K) of which the lower triangle is filled, and (2K,)."""
+    count, k = phi.shape
+    for n in range(count):
+        a, b, c = info[n, 0], info[n, 1], info[n, 2]
+        dx, dy = float(moved[n, 0]), float(moved[n, 1])
+        for i in range(k):
+            p = w[n] * phi[n, i]
+            right[i] += p * (a * dx + b * dy)
+            right[k + i] += p * (b * dx + c * dy)
+            for j in range(i + 1):
+                normal[i, j] += p * phi[n, j] * a
+                normal[k + i, k + j] += p * phi[n, j] * c
+            for j in range(k):
+                normal[k + i, j] += p * phi[n, j] * b
+
+
+@compiled
+def _move(phi: Doubles, model: Doubles, now: Doubles) -> float:
+    """Bring displacements (N, 2) to what a model says; the longest step, pixels."""
+    longest = 0.0
+    for n in range(len(phi)):
+        for i in range(2):
+            there = 0.0
+            for j in range(phi.shape[1]):
+                there += model[i, j] * phi[n, j]
+            longest = max(longest, abs(there - now[n, i]))
+            now[n, i] = there
+    return longest
 
 
 @compiled

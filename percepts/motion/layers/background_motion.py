@@ -51,7 +51,9 @@ class PrevalenceMap:
         row, col = self._place(xy)
         return np.asarray(np.log(np.maximum(chance, 0.02))[:, row, col], dtype=np.float32)
 
-    def seen(self, c: Constraints, outside: Floats, models: tuple[Affine, ...]) -> PrevalenceMap:
+    def with_votes(
+        self, c: Constraints, outside: Floats, models: tuple[Affine, ...]
+    ) -> PrevalenceMap:
         """The same after more constraints of the background."""
         if len(models) != 2:
             return self
@@ -123,13 +125,26 @@ class BackgroundMotion:
         return np.asarray(np.max(each + prior, axis=0), dtype=np.float32)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ExpectedBackground:
+    """What is known of the background before a frame.
+
+    Attributes:
+        camera: The camera's motion over the baseline, as predicted.
+        fixed_too: Whether things fixed to the camera are background as well.
+        prevalence: Which motion prevailed where.
+    """
+
+    camera: Affine
+    fixed_too: bool
+    prevalence: PrevalenceMap
+
+
 def fit_background(
     c: Constraints,
     outside: Floats,
     shape: tuple[int, int],
-    guess: Affine,
-    still_too: bool,
-    ground: PrevalenceMap,
+    expected: ExpectedBackground,
     seed: int,
 ) -> BackgroundMotion:
     """Fit the background to the constraints that belong to no object.
@@ -138,20 +153,18 @@ def fit_background(
         c: N constraints over one baseline.
         outside: (N,) float32, how far each point is outside all objects, 0 to 1.
         shape: (h, w) of the image.
-        guess: Camera motion as predicted.
-        still_too: Whether things fixed to the camera are background as well.
-        ground: Which motion prevailed where before.
+        expected: What is known of it before.
         seed: For random samples.
 
     Returns:
         The background.
     """
     weight, cell = balanced_weights(c.xy, shape, outside)
-    still = Affine(STILL)
+    still, guess = Affine(STILL), expected.camera
     to_still = distances(still, c, 0.1)
     # Much that does not move in the image is no object, whatever else fills the view.
     rests = float(weight[to_still < 9].sum()) > 0.3 * float(weight.sum())
-    if still_too or rests:
+    if expected.fixed_too or rests:
         # What is fixed comes first, or a bending fit would swallow it with what drifts.
         moving = _image_wide_motion(c, outside * (to_still > 9), shape, seed)
         camera = moving or _camera_motion(c, outside, weight, (still, guess), shape, seed)
@@ -166,9 +179,9 @@ def fit_background(
     if fixed and len(models) < 2:
         models.insert(0, still)
     rest = np.min([distances(m, c, 0.15) for m in models], axis=0)
-    ground = ground.seen(c, outside, tuple(models))
+    prevalence = expected.prevalence.with_votes(c, outside, tuple(models))
     scale = _scale(rest, weight, cell)
-    return BackgroundMotion(tuple(models), scale, fixed, ground, camera is not None)
+    return BackgroundMotion(tuple(models), scale, fixed, prevalence, camera is not None)
 
 
 def _is_fixed(c: Constraints, outside: Floats, to_dominant: Floats) -> bool | None:

@@ -65,7 +65,7 @@ def inside_log_odds(share: Floats, tone: NDArray[np.uint8]) -> Floats:
     full = np.asarray(cv2.boxFilter(some, cv2.CV_32F, SAMPLED), dtype=np.float32)
     tones = np.ascontiguousarray(tone[::2, ::2])
     mine = np.asarray(cv2.bitwise_and(tones, tones, mask=some), dtype=np.uint8)
-    return _odds(beside, full, tone, *_means(mine), *_means(tones))
+    return _odds(beside, full, tone, _means(mine), _means(tones))
 
 
 def _means(tones: NDArray[np.uint8]) -> tuple[Floats, Floats]:
@@ -81,10 +81,8 @@ def _odds(
     beside: NDArray[np.bool_],
     full: Floats,
     tone: NDArray[np.uint8],
-    mine: Floats,
-    mine_squared: Floats,
-    all_: Floats,
-    all_squared: Floats,
+    inside: tuple[Floats, Floats],
+    all_: tuple[Floats, Floats],
 ) -> Floats:
     """Log odds of pixels beside an outline to be inside, by their tone, (h, w) float32; 0 elsewhere.
 
@@ -92,11 +90,12 @@ def _odds(
         beside: (h, w) which pixels.
         full: (h / 2, w / 2) share of the window around each that is inside.
         tone: (h, w, 3).
-        mine: (h / 2, w / 2, 3) mean over the window of the tones inside, 0 taken for others.
-        mine_squared: The same of their squares.
+        inside: (h / 2, w / 2, 3) means over the window of the tones inside, 0 taken for others, and
+            of their squares.
         all_: The same of all tones.
-        all_squared: The same of their squares.
     """
+    mine, mine_squared = inside
+    every, every_squared = all_
     out = np.zeros(beside.shape, np.float32)
     for y in range(beside.shape[0]):
         for x in range(beside.shape[1]):
@@ -109,8 +108,8 @@ def _odds(
                 one, two = mine[v, u, i] / part, mine_squared[v, u, i] / part
                 within = max(two - one * one, 0.0) + NOISE**2
                 gap = tone[y, x, i] - one
-                one = (all_[v, u, i] - mine[v, u, i]) / (1 - part)
-                two = (all_squared[v, u, i] - mine_squared[v, u, i]) / (1 - part)
+                one = (every[v, u, i] - mine[v, u, i]) / (1 - part)
+                two = (every_squared[v, u, i] - mine_squared[v, u, i]) / (1 - part)
                 beyond = max(two - one * one, 0.0) + NOISE**2
                 far = tone[y, x, i] - one
                 away += far * far / beyond - gap * gap / within

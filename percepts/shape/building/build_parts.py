@@ -13,7 +13,7 @@ from pathlib import Path
 
 from visup.agent.model.errors import DatabaseError, VisupError
 from visup.percepts.shape.database.catalogue import Shapes, Views
-from visup.percepts.shape.database.storage import VERSION
+from visup.percepts.shape.database.file_format import VERSION
 from visup.percepts.shape.index.view_records import LAYOUT, NewView
 from visup.percepts.shape.silhouette.silhouette import SMOOTHING
 from visup.version import __version__

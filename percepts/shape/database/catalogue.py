@@ -20,13 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError
-from visup.percepts.shape.database.storage import (
-    FileContents,
-    damaged,
-    open_checked,
-    read_contents,
-    read_shape,
-)
+from visup.percepts.shape.database.file_format import FileContents, damaged
+from visup.percepts.shape.database.file_reader import open_checked, read_contents, read_shape
 from visup.percepts.shape.index.view_records import Direction, InvalidRecordError, ModelView, decode
 from visup.percepts.shape.matching.shape_similarity import Shape
 

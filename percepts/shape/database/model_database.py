@@ -1,6 +1,6 @@
 """The model database: names, views and shapes, and what a silhouette looks like of them.
 
-Read `search.py` for the search, `storage.py` for the file and `build.py` for what goes into it.
+Read `search.py` for the search, `file_format.py` for the file and `build.py` for what goes into it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.database.catalogue import Shapes, Views
+from visup.percepts.shape.database.file_writer import write_more, write_new
 from visup.percepts.shape.database.search import Ranking, SearchLimits, ViewMatch, ViewSearch
-from visup.percepts.shape.database.storage import write_more, write_new
 from visup.percepts.shape.database.time_budget import share_within
 from visup.percepts.shape.database.view_directions import neighbours
 from visup.percepts.shape.index.view_records import ModelView, NewView
@@ -29,7 +29,17 @@ CANDIDATES = 20
 
 
 class QueryOptions(TypedDict, total=False):
-    """What may be asked of a ranking; `ModelDatabase.query` says what each means."""
+    """What may be asked of a ranking.
+
+    Attributes:
+        top: How many matches are wanted; 10 unless told.
+        per_name: How many views of one model may be among them; any number when None, as usual.
+        threshold: Least similarity; 0 unless told.
+        restrict: Names that alone are searched; all when None, as usual.
+        try_first: Names whose likeliest views are compared whatever the index says.
+        mirror: Whether a view is also recognised by its mirror image, which is what is seen from
+            behind; so unless told.
+    """
 
     top: int
     per_name: int | None
@@ -106,7 +116,7 @@ class ModelDatabase:
         *,
         budget_ms: float | None = None,
         budget: float = 0.1,
-        **wishes: Unpack[QueryOptions],
+        **options: Unpack[QueryOptions],
     ) -> tuple[Ranking, ...]:
         """Rank the views that each of several shapes looks like, such as all regions of a frame.
 
@@ -115,14 +125,14 @@ class ModelDatabase:
             budget_ms: Milliseconds for all together on the machine of the benchmarks, shared evenly;
                 the likeliest views are compared first. See `time_budget.py`.
             budget: See `query`.
-            wishes: For each shape, as for `query`.
+            options: For each shape, as for `query`.
 
         Returns:
             A ranking for each shape.
         """
         if budget_ms is not None and shapes:
             budget = min(budget, share_within(budget_ms / len(shapes), len(self.views)))
-        return tuple(self.query(shape, budget=budget, **wishes) for shape in shapes)
+        return tuple(self.query(shape, budget=budget, **options) for shape in shapes)
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
         """Add views, to names new or known; the database as it is then. See `build.py`.
@@ -138,13 +148,8 @@ class ModelDatabase:
         shape: NDArray[np.bool_] | Silhouette | Shape,
         *,
         cut: bool = False,
-        top: int = 10,
-        per_name: int | None = None,
-        threshold: float = 0.0,
-        restrict: Collection[str] | None = None,
-        try_first: Collection[str] = (),
         budget: float = 0.1,
-        mirror: bool = True,
+        **options: Unpack[QueryOptions],
     ) -> Ranking:
         """Rank the views that a shape looks like.
 
@@ -154,15 +159,9 @@ class ModelDatabase:
         Args:
             shape: A mask (H, W) bool, a silhouette or a shape.
             cut: Whether the image border cuts the mask; a silhouette or shape has its own mark.
-            top: How many matches are wanted.
-            per_name: How many views of one model may be among them; any number when None.
-            threshold: Least similarity.
-            restrict: Names that alone are searched; all when None.
-            try_first: Names whose likeliest views are compared whatever the index says.
             budget: Share of the views that may be compared in full: at least 16 are (4 when less than
                 the usual tenth is asked for), and at most `CANDIDATES`. With 1, all are.
-            mirror: Whether a view is also recognised by its mirror image, which is what is seen from
-                behind.
+            options: See `QueryOptions`.
 
         Returns:
             The matches, best first; empty when the mask shows nothing.
@@ -170,10 +169,17 @@ class ModelDatabase:
         query = as_shape(shape, cut)
         if query is None or not self.views:
             return Ranking((), 0)
-        among = self.views.named(restrict)
+        among = self.views.named(options.get("restrict"))
         most = candidates_wanted(len(self.views), budget)
-        wanted = SearchLimits(top, per_name, threshold, most, mirror)
-        favoured = np.intersect1d(self.views.named(try_first), among) if try_first else None
+        wanted = SearchLimits(
+            options.get("top", 10),
+            options.get("per_name"),
+            options.get("threshold", 0.0),
+            most,
+            options.get("mirror", True),
+        )
+        first = options.get("try_first")
+        favoured = np.intersect1d(self.views.named(first), among) if first else None
         if not query.cut or query.border is None:
             return self._search.whole(query, among, wanted, favoured)
         cut_views = self.views.cut[among]

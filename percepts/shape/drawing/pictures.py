@@ -201,19 +201,18 @@ def _draw_numbers(sheet: Sheet, graph: ShockGraph, place: Place) -> None:
 
 def _draw_levels(sheet: Sheet, graph: ShockGraph, corner: Point, other: Point) -> None:
     """The graph as a tree of levels, each node below all its parents."""
-    depth = np.zeros(len(graph), dtype=int)
+    import networkx as nx
+
+    tree = graph.to_networkx()
+    levels = list(nx.topological_generations(tree))
     across = np.full(len(graph), 0.5)
-    # Parents come before children: one pass finds the longest way to each.
-    for parent, child in sorted(graph.edges.tolist()):
-        depth[child] = max(depth[child], depth[parent] + 1)
     at: dict[int, Point] = {}
-    for level in range(depth.max() + 1):
-        nodes = np.flatnonzero(depth == level).tolist()
-        parents = {n: across[graph.edges[graph.edges[:, 1] == n, 0]] for n in nodes}
-        nodes.sort(key=lambda n: (float(parents[n].mean()) if len(parents[n]) else 0.5, n))
-        for k, node in enumerate(nodes):
-            across[node] = (k + 0.5) / len(nodes)
-            down = level / max(1, depth.max())
+    for level, nodes in enumerate(levels):
+        parents = {n: across[sorted(tree.predecessors(n))] for n in nodes}
+        order = sorted(nodes, key=lambda n: (float(parents[n].mean()) if n else 0.5, n))
+        for k, node in enumerate(order):
+            across[node] = (k + 0.5) / len(order)
+            down = level / max(1, len(levels) - 1)
             x = corner[0] + across[node] * (other[0] - corner[0])
             at[node] = (x, corner[1] + down * (other[1] - corner[1]))
     for parent, child in graph.edges.tolist():

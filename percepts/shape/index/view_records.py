@@ -4,7 +4,7 @@ A shape is three arrays of raw little-endian bytes: the nodes of its shock graph
 all that a node carries), the edges, and the outline. What a byte means is told once in the file, as text
 (`LAYOUT`), and whatever does not fit it is refused before anything is allocated.
 
-Read next: `storage.py`.
+Read next: `file_format.py` in `database/`.
 """
 
 from __future__ import annotations

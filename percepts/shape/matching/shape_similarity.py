@@ -142,7 +142,7 @@ def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True) -> Likeness:
         >>> y, x = np.mgrid[-40:41, -60:61]
         >>> disc = shape_of(normalise(np.hypot(x, y) < 30))
         >>> strip = shape_of(normalise((abs(x) < 55) & (abs(y) < 8)))
-        >>> compare(disc, disc).similarity, compare(disc, strip).similarity < 0.35
+        >>> compare_shapes(disc, disc).similarity, compare_shapes(disc, strip).similarity < 0.35
         (1.0, True)
     """
     overlaps = area_overlaps(a.areas, b.areas[None])

@@ -15,6 +15,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NotRequired, TypedDict, Unpack
 
 import cv2
 import numpy as np
@@ -31,6 +32,9 @@ from visup.percepts.shape.shocks.skeleton import Skeleton, skeletonise
 from visup.percepts.shape.shocks.topological_signature import descendants
 from visup.percepts.shape.shocks.topological_signature import signatures as topological_signatures
 from visup.percepts.shape.silhouette.silhouette import Silhouette
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 PROFILE = 8
 """Radii sampled along each node."""
@@ -86,6 +90,32 @@ class ShockGraph:
     def __len__(self) -> int:
         return len(self.kinds)
 
+    def to_networkx(self) -> nx.DiGraph[int]:
+        """The graph for drawing, export (GraphML, DOT) and algorithms; nodes by number, parent to child.
+
+        Example:
+            >>> from visup.percepts.shape.silhouette.silhouette import normalise
+            >>> y, x = np.mgrid[-40:41, -40:41]
+            >>> ellipse = shock_graph(normalise(np.hypot(x, 2 * y) < 36)).to_networkx()
+            >>> list(ellipse.edges), ellipse.nodes[1]["kind"]
+            ([(0, 1), (1, 2), (1, 3)], 'seed')
+        """
+        import networkx as nx
+
+        graph: nx.DiGraph[int] = nx.DiGraph()
+        for n in range(len(self)):
+            graph.add_node(
+                n,
+                kind=ShockKind(int(self.kinds[n])).name.lower(),
+                weight=float(self.weights[n]),
+                length=float(self.lengths[n]),
+                radius=float(self.profiles[n].mean()),
+                x=float(self.positions[n, 0]),
+                y=float(self.positions[n, 1]),
+            )
+        graph.add_edges_from(self.edges.tolist())
+        return graph
+
 
 @dataclass(frozen=True, slots=True)
 class _PlacedShock:
@@ -118,10 +148,10 @@ def shock_graph(silhouette: Silhouette) -> ShockGraph:
         >>> from visup.percepts.shape.silhouette.silhouette import normalise
         >>> y, x = np.mgrid[-40:41, -40:41]
         >>> disc = shock_graph(normalise(np.hypot(x, y) < 30))
-        >>> [Kind(k).name for k in disc.kinds]
+        >>> [ShockKind(k).name for k in disc.kinds]
         ['ROOT', 'SEED']
         >>> ellipse = shock_graph(normalise(np.hypot(x, 2 * y) < 36))
-        >>> [Kind(k).name for k in ellipse.kinds]
+        >>> [ShockKind(k).name for k in ellipse.kinds]
         ['ROOT', 'SEED', 'PROTRUSION', 'PROTRUSION']
         >>> ellipse.edges.tolist()
         [[0, 1], [1, 2], [1, 3]]
@@ -204,6 +234,8 @@ def _order(parts: list[_PlacedShock], links: list[tuple[int, int]]) -> list[int]
     kept = set(np.argsort(-lengths, kind="stable")[:MOST_NODES].tolist())
     waiting = {p: {a for a, b in links if b == p and a in kept} for p in kept}
     order: list[int] = []
+    # networkx's lexicographical topological sort gives the same; on the 8 to 40 nodes of a silhouette it
+    # takes 0.6 to 2.5 ms where this takes 0.04 to 0.45 ms, of some 3 ms for the whole shape.
     while waiting:
         free = [p for p, parents in waiting.items() if not parents]
         best = max(free, key=lambda p: (lengths[p], -p))
@@ -265,26 +297,29 @@ def _directions(
     return np.where(length > 1e-9, way / np.maximum(length, 1e-9), 0.0)
 
 
-def frozen_graph(
-    *,
-    kinds: NDArray[np.int8],
-    edges: NDArray[np.int16],
-    weights: NDArray[np.float32],
-    lengths: NDArray[np.float32],
-    profiles: NDArray[np.float32],
-    contexts: NDArray[np.float32],
-    positions: NDArray[np.float32],
-    directions: NDArray[np.float32],
-    signatures: NDArray[np.float32] | None = None,
-) -> ShockGraph:
+class NodeArrays(TypedDict):
+    """Those arrays of `ShockGraph` that have a row for each node."""
+
+    kinds: NDArray[np.int8]
+    weights: NDArray[np.float32]
+    lengths: NDArray[np.float32]
+    profiles: NDArray[np.float32]
+    contexts: NDArray[np.float32]
+    positions: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    signatures: NotRequired[NDArray[np.float32]]
+
+
+def frozen_graph(edges: NDArray[np.int16], **nodes: Unpack[NodeArrays]) -> ShockGraph:
     """A graph from its stored arrays; what follows from them is computed. See `ShockGraph`."""
     digest = hashlib.blake2b(digest_size=12)
-    for array in (kinds, edges, weights, profiles, contexts, positions):
+    parts = (nodes["weights"], nodes["profiles"], nodes["contexts"], nodes["positions"])
+    for array in (nodes["kinds"], edges, *parts):
         digest.update(np.ascontiguousarray(array).tobytes())
-    size = len(kinds)
-    arrays = (kinds, edges, weights, lengths, profiles, contexts, positions, directions)
-    vectors = topological_signatures(edges, size) if signatures is None else signatures
-    return ShockGraph(*arrays, vectors, descendants(edges, size), digest.digest())
+    size = len(nodes["kinds"])
+    if "signatures" not in nodes:
+        nodes["signatures"] = topological_signatures(edges, size)
+    return ShockGraph(edges=edges, below=descendants(edges, size), key=digest.digest(), **nodes)
 
 
 def _sample_area(silhouette: Silhouette) -> NDArray[np.float64]:

@@ -33,7 +33,7 @@ def join_fragments(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
     Example:
         >>> broken = np.zeros((30, 60), dtype=np.uint8)
         >>> broken[5:25, 5:25] = broken[12:16, 26:50] = 1
-        >>> bridged = joined(broken)
+        >>> bridged = join_fragments(broken)
         >>> bool(bridged[13, 25]), bool(bridged[2, 25]), int(bridged.sum())
         (True, False, 502)
     """

@@ -14,9 +14,9 @@ from visup.agent.model.errors import BehaviourError
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"name": ""}, "no name for a behaviour"),
-        ({"name": "two words"}, "no name for a behaviour"),
-        ({"name": 3}, "no name for a behaviour"),
+        ({"name": ""}, "not a valid name for a behaviour"),
+        ({"name": "two words"}, "not a valid name for a behaviour"),
+        ({"name": 3}, "not a valid name for a behaviour"),
         ({"gives": ()}, "at least one kind"),
         ({"gives": "lamp"}, r"a tuple of one has a comma: gives=\('lamp',\)"),
         ({"gives": ("lamp", 3)}, "a tuple of words"),

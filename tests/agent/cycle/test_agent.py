@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tests.agent.scripted import Scripted, counting, exploding_at, frames, worried_while
+from tests.agent.scripted import COUNTING, Scripted, counting, exploding_at, frames, worried_while
 from visup.agent import Directive, Mind, Observation, Outcome, Severity
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
@@ -37,7 +37,7 @@ def test_a_run_stops_at_its_condition_and_goes_on_from_there() -> None:
     assert first.frame_index == 3
     assert then is not None
     assert then.frame_index == 9
-    assert agent.mind.memory["counting"] == 10
+    assert agent.mind.recall(COUNTING) == 10
 
 
 def test_a_run_over_nothing_gives_no_step() -> None:
@@ -54,7 +54,7 @@ def test_a_reasoner_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None
     assert hit.mind.unknown == {"x"}
     assert [a.kind for a in hit.mind.alerts] == ["reasoning_failed"]
     assert hit.mind.alerts[0].severity is Severity.CRITICAL
-    assert after.mind.memory["counting"] == 5
+    assert after.mind.recall(COUNTING) == 5
 
 
 def test_an_open_alert_is_not_closed_by_a_step_that_could_not_think() -> None:
@@ -94,4 +94,4 @@ def test_observers_see_every_step_and_the_mind_is_theirs_to_keep() -> None:
     agent = make()
     agent.observers = (lambda step, frame: kept.append(step.mind),)
     agent.run(frames(5))
-    assert [m.memory["counting"] for m in kept] == [1, 2, 3, 4, 5]
+    assert [m.recall(COUNTING) for m in kept] == [1, 2, 3, 4, 5]

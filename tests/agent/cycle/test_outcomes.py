@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.scripted import COUNTING, Scripted, counting, frames, worried_while
 from visup.agent import Event, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 
@@ -52,4 +52,4 @@ def test_nonsense_of_a_reasoner_leaves_the_mind_as_it_was(what: str) -> None:
     assert {a.kind for a in hit.alerts} == {"worry", "reasoning_failed"}
     assert steps[3].directives == ()
     assert [e.kind for e in steps[3].events] == ["alert"]
-    assert steps[5].mind.memory["counting"] == 5
+    assert steps[5].mind.recall(COUNTING) == 5

@@ -58,12 +58,12 @@ def test_settings_go_to_the_plug_ins_own_model(lamp: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "where", "message"),
     [
-        ({"contrast": -3}, "lamp.contrast", "-3 will not do\n  expected: greater than 0"),
-        ({"contrast": "much"}, "lamp.contrast", "'much' will not do\n  expected: a valid number"),
+        ({"contrast": -3}, "lamp.contrast", "-3 is not valid\n  expected: greater than 0"),
+        ({"contrast": "much"}, "lamp.contrast", "'much' is not valid\n  expected: a valid number"),
         ({"contast": 3}, "lamp.contast", "did you mean 'contrast'?"),
         ({"zoom": 3}, "lamp.zoom", "expected: one of: contrast, colours"),
         ({"colours": ["octarine"]}, "lamp.colours", "expected: colours that people see"),
-        ({"colours": ["red", 3]}, "lamp.colours.1", "3 will not do"),
+        ({"colours": ["red", 3]}, "lamp.colours.1", "3 is not valid"),
     ],
 )
 def test_a_setting_that_will_not_do_is_told_with_its_place(
@@ -205,8 +205,8 @@ def test_one_setting_given_twice_is_refused() -> None:
         (None, "cannot be read"),
         ("x =", "it is not TOML"),
         ("[lamp]\nx = 1", "'lamp' is unknown"),
-        ("behaviours = 3", "no table of tables"),
-        ("[behaviours]\nlamp = 3", "no table of tables"),
+        ("behaviours = 3", "not a table of tables"),
+        ("[behaviours]\nlamp = 3", "not a table of tables"),
     ],
 )
 def test_a_settings_file_that_will_not_do_is_refused(

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.scripted import COUNTING, Scripted, counting, frames, worried_while
 from tests.agent.storage.test_codec import plugin_values, regions, same
 from visup.agent import Health, HealthStatus, Region
 from visup.agent.cycle.agent import Agent, Reasoners
@@ -154,4 +154,4 @@ def test_without_all_behaviours_only_the_mind_is_kept() -> None:
     first.run(frames(5))
     second = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))
     assert not second.load(load_state(dump_state(first.save())))
-    assert second.mind.memory["counting"] == 5
+    assert second.mind.recall(COUNTING) == 5

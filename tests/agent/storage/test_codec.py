@@ -233,13 +233,13 @@ def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, pl
 
 
 def test_a_bomb_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("visup.agent.storage.codec.LARGEST", 10**5)
+    monkeypatch.setattr("visup.agent.storage.codec.LARGEST_STEP_BYTES", 10**5)
     with pytest.raises(OutputError, match="too large"):
         unpack_observation(zlib.compress(b" " * 10**7))
 
 
 def test_the_schema_in_the_docs_is_that_of_the_code() -> None:
-    from visup.schema import schema_text
+    from visup.agent.storage.schema import schema_text
 
     path = ROOT / "docs" / "step.schema.json"
     assert path.read_text() == schema_text()
@@ -249,7 +249,7 @@ def test_the_schema_in_the_docs_is_that_of_the_code() -> None:
 @given(st.lists(regions(), max_size=2), hypotheses, plugin_values)
 def test_every_document_keeps_the_schema(found: list[Region], one: Hypothesis, own: Any) -> None:
     from visup.agent.storage.codec import to_document
-    from visup.schema import StepDocument
+    from visup.agent.storage.schema import StepDocument
 
     values = [("region", r) for r in found] + [("hypothesis", one), ("own", own)]
     text = json.dumps(to_document(seen_of(*values)))

@@ -194,7 +194,7 @@ def _timed(rules: tuple[Rule, ...], seen: list[Mind]) -> tuple[list[float], list
         outcome = reasoner(mind, nothing)
         taken.append(time.perf_counter() - begin)
         concerns.append(len(outcome.conditions))
-        memory = outcome.mind.memory[SAFETY]
+        memory = outcome.mind.recall(SAFETY)
     return taken, concerns
 
 
@@ -206,7 +206,7 @@ def _snapshots(count: int = SNAPSHOTS) -> dict[str, Any]:
     tracemalloc.start()
     for k in range(count):
         mind = reasoner(replace(mind, time=2.0 + k / FPS), nothing).mind
-        kept.append(mind.memory[SAFETY])
+        kept.append(mind.recall(SAFETY))
     held, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     return {"kept": len(kept), "kb_each": held / count / 1024}

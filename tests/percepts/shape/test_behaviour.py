@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from tests.percepts.shape.shapes import ZOO, Mask, small_database
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.model.errors import SettingsError
+from visup.agent.model.events import Directive
 from visup.agent.model.records import (
     Depth,
-    Directive,
     Frame,
     Hypothesis,
     Observation,

@@ -58,7 +58,7 @@ class Lens:
 def run(*lenses: Lens, wakeful: frozenset[str] = frozenset()) -> list[Step]:
     rules = default_reasoners()
     wake = ActivationReasoner(activation_rules([b.contract for b in lenses]))
-    reasoners = Reasoners(rules.update, rules.cogitate, (wake,))
+    reasoners = Reasoners(rules.update, rules.cogitate, attend=(wake,))
     limits = Limits(hang_s=None, wakeful=wakeful)
     return list(Agent([Eye(), *lenses], reasoners, limits=limits).steps(s.frame for s in CLIP))
 
@@ -192,7 +192,9 @@ def test_going_back_and_on_wakes_alike() -> None:
     rules = default_reasoners()
     lens = Lens(awake=f"{NEAR} for 0.5 s")
     reasoners = Reasoners(
-        rules.update, rules.cogitate, (ActivationReasoner(activation_rules([lens.contract])),)
+        rules.update,
+        rules.cogitate,
+        attend=(ActivationReasoner(activation_rules([lens.contract])),),
     )
     agent = Agent([Eye(), lens], reasoners, limits=Limits(hang_s=None))
     seen = [agent.step(s.frame).observation for s in CLIP]

@@ -101,7 +101,7 @@ def test_only_directives_for_the_behaviour_count() -> None:
 
 def test_attention_is_a_reasoner_like_any_other() -> None:
     rules = default_reasoners()
-    agent = Agent([], Reasoners(rules.update, rules.cogitate, (AttentionReasoner(),)))
+    agent = Agent([], Reasoners(rules.update, rules.cogitate, attend=(AttentionReasoner(),)))
     last = [agent.reason(seen) for seen in moving_ellipses(90)][-1]
     assert last.directives
     assert {d.data["region"] for d in last.directives} <= {1, 2, 3}

@@ -28,7 +28,7 @@ def at_speed(x: float, y: float, variance: float) -> RelativeVelocity:
     return RelativeVelocity(np.array([x, y]), variance * np.eye(2), 0.3)
 
 
-def joint(path: list[tuple[float, ...]]) -> RelativeTrack:
+def track(path: list[tuple[float, ...]]) -> RelativeTrack:
     nothing = OutlineTemplate(np.zeros((0, 2)), np.zeros((0, 2)))
     return RelativeTrack(nothing, nothing, 0.0, path=tuple(path))
 
@@ -101,14 +101,14 @@ def test_rest_and_motion_are_told_apart() -> None:
 
 @pytest.mark.parametrize("speed", [0.0, 8.0, 25.0])
 def test_the_slope_of_a_path_is_its_speed(speed: float) -> None:
-    found = relative_velocity(joint(places(speed)), 0.96, 0.3)
+    found = relative_velocity(track(places(speed)), 0.96, 0.3)
     assert found is not None
     assert abs(found.velocity[0] - speed) < 3 * np.sqrt(found.covariance[0, 0])
     assert found.span == pytest.approx(0.28, abs=0.05)
 
 
 def test_after_a_gap_the_way_gone_in_it_tells() -> None:
-    found = relative_velocity(joint(places(8.0, missing=range(8, 22))), 0.96, 0.3)
+    found = relative_velocity(track(places(8.0, missing=range(8, 22))), 0.96, 0.3)
     assert found is not None
     assert found.span > 0.6
     assert found.velocity[0] == pytest.approx(8.0, abs=2.0)
@@ -119,7 +119,7 @@ def test_after_a_gap_the_way_gone_in_it_tells() -> None:
 def test_whatever_is_missing_motion_stays_known(missing: set[int]) -> None:
     path = [p for k, p in enumerate(places(0.0)) if k not in missing]
     known = len(path) > 5 and path[-1][0] - path[0][0] >= 0.6 * 0.3
-    found = relative_velocity(joint(path), path[-1][0], 0.3) if path else None
+    found = relative_velocity(track(path), path[-1][0], 0.3) if path else None
     assert (found is not None) == known
     assert found is None or found.span >= 0.6 * 0.3 - 1e-6
 
@@ -154,7 +154,7 @@ def test_motion_is_that_of_matrices(seed: int, told: bool, later: float) -> None
         path[:, 3:] = rng.uniform(0.1, 2.0, (count, 3))
         path[rng.random(count) < 0.3, 3:] = np.nan
     now = float(path[-1, 0]) + later
-    found = relative_velocity(joint([tuple(p) for p in path.tolist()]), now, 0.3)
+    found = relative_velocity(track([tuple(p) for p in path.tolist()]), now, 0.3)
     expected = by_arrays(path, now, 0.3)
     assert found is not None
     assert found.span == pytest.approx(expected.span)
@@ -164,7 +164,7 @@ def test_motion_is_that_of_matrices(seed: int, told: bool, later: float) -> None
 
 @pytest.mark.parametrize("count", range(6))
 def test_of_a_few_places_nothing_is_told(count: int) -> None:
-    assert relative_velocity(joint(places(8.0)[:count]), count / 25, 0.3) is None
+    assert relative_velocity(track(places(8.0)[:count]), count / 25, 0.3) is None
 
 
 def test_boxes_that_move_apart_are_followed() -> None:

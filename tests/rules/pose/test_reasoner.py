@@ -42,7 +42,7 @@ Floats = np.ndarray
 def one_object(name: str = "sat") -> Mind:
     candidates = (Candidate(name, 1.0, 1.0),)
     belief = ObjectBelief(1, REGION, Presence.SEEN, 0.0, 0.0, True, candidates=candidates)
-    mind = Mind(memory=MappingProxyType({OWNERS: MappingProxyType({1: 1})}))
+    mind = Mind().remember(OWNERS, MappingProxyType({1: 1}))
     return mind.with_objects(belief)
 
 
@@ -215,7 +215,7 @@ def many_objects(count: int) -> Mind:
     ids = range(1, count + 1)
     regions = {i: replace(REGION, id=i) for i in ids}
     beliefs = [ObjectBelief(i, regions[i], Presence.SEEN, 0.0, 0.0, True) for i in ids]
-    mind = Mind(memory=MappingProxyType({OWNERS: MappingProxyType({i: i for i in ids})}))
+    mind = Mind().remember(OWNERS, MappingProxyType({i: i for i in ids}))
     return mind.with_objects(*beliefs)
 
 

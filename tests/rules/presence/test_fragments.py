@@ -180,7 +180,7 @@ def test_doubts_are_forgotten_with_their_regions() -> None:
         return [region(1, BODY), box_region(10 + i // 20, (360, 160, 30, 30))]
 
     thoughts = reason(seen(i, parts(i)) for i in range(400))
-    assert max(len(t.mind.memory[FRAGMENTS]) for t in thoughts) <= 3
+    assert max(len(t.mind.recall(FRAGMENTS)) for t in thoughts) <= 3
     assert kinds(thoughts) == [("entry", 1)]
 
 

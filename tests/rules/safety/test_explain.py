@@ -15,7 +15,8 @@ from tests.rules.safety.test_reasoner import NAMES, believed
 from tests.rules.scenes import box_region, seen
 from visup.agent import Binding, Expectation, Mind, Observation, Outcome, TaskBelief, Verdict
 from visup.agent.model.errors import RuleError
-from visup.agent.model.mind import Pose, Spin, Zone
+from visup.agent.model.mind import Zone
+from visup.agent.model.object_beliefs import Pose, Spin
 from visup.cli import app
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.snapshot import Snapshot
@@ -70,7 +71,7 @@ def test_explanations_agree_with_what_was_told_whatever_the_rule() -> None:
     for mind in minds(3, 60):
         mind = mind if memory is None else mind.remember(SAFETY, memory)
         outcome = reasoner(mind, NOTHING)
-        memory = outcome.mind.memory[SAFETY]
+        memory = outcome.mind.recall(SAFETY)
     values = evaluation_of(outcome.mind)
     raised = {(rule.name, ids) for rule, ids in values.true()}
     for rule in values.prepared.rules:
@@ -88,7 +89,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
         told: list[tuple[object, ...]] = []
         for new in rest:
             if mind is not None:
-                new = new.remember(SAFETY, mind.memory[SAFETY])
+                new = new.remember(SAFETY, mind.recall(SAFETY))
             outcome = reasoner(new, NOTHING)
             mind = outcome.mind
             told.append(outcome.conditions)
@@ -97,7 +98,7 @@ def test_an_older_mind_goes_on_as_if_no_newer_one_had_been_made() -> None:
     kept: list[Mind] = []
     mind = None
     for new in seen_minds:
-        new = new if mind is None else new.remember(SAFETY, mind.memory[SAFETY])
+        new = new if mind is None else new.remember(SAFETY, mind.recall(SAFETY))
         mind = reasoner(new, NOTHING).mind
         kept.append(mind)
     straight = run(None, seen_minds)
@@ -277,7 +278,7 @@ def test_the_command_checks_and_lists_rules(tmp_path: Path) -> None:
     bad.write_text('rule q(a): info when sen(a) for 2 px say "{a}"\n')
     fine = CliRunner().invoke(app, ["rules", "check", str(good)])
     assert fine.exit_code == 0
-    assert "r: told 2 s late, at most" in fine.output
+    assert "r: reported 2 s late, at most" in fine.output
     wrong = CliRunner().invoke(app, ["rules", "check", str(good), str(bad)])
     assert "'sen'" in str(wrong.exception)
     assert "'for' wants a time" in str(wrong.exception)

@@ -130,5 +130,5 @@ def test_the_narrative_is_that_of_the_paper() -> None:
     assert told[2].startswith("Stage `approach` is complete")
     assert told[3].startswith("Stage `captured` of task `dock` has begun")
     failing = next(t for t in told if t.startswith("Stage `captured` is failing: "))
-    assert failing.endswith("s; `captured` asks for coupled.")
+    assert failing.endswith("s; stage `captured` requires `coupled`.")
     assert told[-1].startswith("Task `dock` has failed: ")

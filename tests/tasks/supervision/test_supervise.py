@@ -58,7 +58,7 @@ def test_capture_fails_as_in_the_paper() -> None:
     assert failing.severity is Severity.WARNING
     assert failing.text == (
         "Stage `captured` is failing: the arm and the satellite have been diverging since 12.8 s; "
-        "`captured` asks for coupled."
+        "stage `captured` requires `coupled`."
     )
     assert status(played, "captured", 25.0) in (Status.FAILING, Status.FAILED)
     assert finish(task_of(played)) is Verdict.FAILED

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from lsprotocol import types as lsp
 from pygls.lsp.server import LanguageServer
@@ -10,7 +12,7 @@ from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
 from visup.agent.model.errors import SourceLocation, VisupError
-from visup.commands.task.task import laid_out
+from visup.commands.task.format import formatted_source
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
 from visup.tasks.diagnostics.diagnostic import Diagnostic
@@ -37,76 +39,92 @@ def serve() -> None:
 def make_server() -> LanguageServer:
     """A language server with diagnostics, completion, hover, definition, format and rename."""
     server = LanguageServer("visup-task", __version__)
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
-    def opened(ls: LanguageServer, params: lsp.DidOpenTextDocumentParams) -> None:
-        _publish(ls, params.text_document.uri)
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
-    def changed(ls: LanguageServer, params: lsp.DidChangeTextDocumentParams) -> None:
-        _publish(ls, params.text_document.uri)
-
-    @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
-    def closed(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
-        none = lsp.PublishDiagnosticsParams(params.text_document.uri, [])
-        ls.text_document_publish_diagnostics(none)
-
-    options = lsp.CompletionOptions(trigger_characters=["<", "(", '"'])
-
-    @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, options)
-    def complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
-        document = ls.workspace.get_text_document(params.text_document.uri)
-        line, column = _from(document, params.position)
-        found = completions(document.source, _file(document), line, column)
-        return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
-
-    @server.feature(lsp.TEXT_DOCUMENT_HOVER)
-    def show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
-        document, word = _word(ls, params)
-        said = hover(document.source, _file(document), word) if word else None
-        if word is None or said is None:
-            return None
-        content = lsp.MarkupContent(lsp.MarkupKind.Markdown, said)
-        return lsp.Hover(content, _range(document, word.span))
-
-    @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
-    def define(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | None:
-        document, word = _word(ls, params)
-        return _location(ls, document, word) if word else None
-
-    @server.feature(lsp.TEXT_DOCUMENT_FORMATTING)
-    def lay_out(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
-        document = ls.workspace.get_text_document(params.text_document.uri)
-        try:
-            new = laid_out(document.source, _file(document))
-        except VisupError:
-            return []  # the mistakes that hinder it are shown already
-        if new == document.source:
-            return []
-        end = lsp.Position(len(document.lines), 0)
-        return [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), new)]
-
-    @server.feature(lsp.TEXT_DOCUMENT_RENAME)
-    def rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
-        document, word = _word(ls, params)
-        new = params.new_name.strip("<> ")
-        if word is None or not new.isidentifier():
-            return None
-        places = references(document.source, word)
-        edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
-        return lsp.WorkspaceEdit({document.uri: edits}) if edits else None
-
+    for feature, handler, options in _FEATURES:
+        server.feature(feature, options)(handler)
     return server
+
+
+def _opened(ls: LanguageServer, params: lsp.DidOpenTextDocumentParams) -> None:
+    _publish(ls, params.text_document.uri)
+
+
+def _changed(ls: LanguageServer, params: lsp.DidChangeTextDocumentParams) -> None:
+    _publish(ls, params.text_document.uri)
+
+
+def _closed(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
+    none = lsp.PublishDiagnosticsParams(params.text_document.uri, [])
+    ls.text_document_publish_diagnostics(none)
+
+
+def _complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
+    document = ls.workspace.get_text_document(params.text_document.uri)
+    line, column = _from(document, params.position)
+    found = completions(document.source, _file(document), line, column)
+    return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
+
+
+def _show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
+    document, word = _word(ls, params)
+    said = hover(document.source, _file(document), word) if word else None
+    if word is None or said is None:
+        return None
+    content = lsp.MarkupContent(lsp.MarkupKind.Markdown, said)
+    return lsp.Hover(content, _range(document, word.span))
+
+
+def _define(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | None:
+    document, word = _word(ls, params)
+    return _location(ls, document, word) if word else None
+
+
+def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
+    document = ls.workspace.get_text_document(params.text_document.uri)
+    try:
+        new = formatted_source(document.source, _file(document))
+    except VisupError:
+        return []  # the mistakes that hinder it are shown already
+    if new == document.source:
+        return []
+    end = lsp.Position(len(document.lines), 0)
+    return [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), new)]
+
+
+def _rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
+    document, word = _word(ls, params)
+    new = params.new_name.strip("<> ")
+    if word is None or not new.isidentifier():
+        return None
+    places = references(document.source, word)
+    edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
+    return lsp.WorkspaceEdit({document.uri: edits}) if edits else None
+
+
+_FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
+    (lsp.TEXT_DOCUMENT_DID_OPEN, _opened, None),
+    (lsp.TEXT_DOCUMENT_DID_CHANGE, _changed, None),
+    (lsp.TEXT_DOCUMENT_DID_CLOSE, _closed, None),
+    (
+        lsp.TEXT_DOCUMENT_COMPLETION,
+        _complete,
+        lsp.CompletionOptions(trigger_characters=["<", "(", '"']),
+    ),
+    (lsp.TEXT_DOCUMENT_HOVER, _show_meaning, None),
+    (lsp.TEXT_DOCUMENT_DEFINITION, _define, None),
+    (lsp.TEXT_DOCUMENT_FORMATTING, _format, None),
+    (lsp.TEXT_DOCUMENT_RENAME, _rename, None),
+)
+"""What the server offers, by what, and how."""
 
 
 def _publish(server: LanguageServer, uri: str) -> None:
     document = server.workspace.get_text_document(uri)
-    _, faults = diagnose(document.source, _file(document), read=_Reader(server).read)
+    _, faults = diagnose(document.source, _file(document), read=_EditorFiles(server).read)
     shown = [_diagnostic(document, f) for f in faults]
     server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, shown))
 
 
-class _Reader:
+class _EditorFiles:
     """Reads included files as they stand in the editor, else from the disk."""
 
     def __init__(self, server: LanguageServer) -> None:
@@ -147,7 +165,7 @@ def _word(
 def _location(server: LanguageServer, document: TextDocument, word: NameUse) -> lsp.Location | None:
     if word.kind == "include":
         try:
-            path, _ = _Reader(server).read(word.name, _file(document))
+            path, _ = _EditorFiles(server).read(word.name, _file(document))
         except VisupError:
             return None
         uri = from_fs_path(str(Path(path).resolve())) if Path(path).exists() else None

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 def simulate(
     file: Annotated[str, typer.Argument(help="A task file, `file.task:NAME`, or a shipped task.")],
     listed: Annotated[
-        int | None, typer.Option("--list", min=1, help="List so many courses, short ones first.")
+        int | None, typer.Option("--list", min=1, help="List this many courses, short ones first.")
     ] = None,
     drawn: Annotated[
-        int | None, typer.Option("--sample", min=1, help="Draw so many courses at random.")
+        int | None, typer.Option("--sample", min=1, help="Draw this many courses at random.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of what is drawn.")] = 0,
 ) -> None:
@@ -60,7 +60,7 @@ def _walk(task: Task) -> None:
     """Ask at every step which way to go on, until the task ends or the user does."""
     from visup.tasks.tools.simulate import initial_positions, successors
 
-    typer.echo(f"task {task.name}: choose how it goes on by number; q ends the walk")
+    typer.echo(f"task {task.name}: choose the next step by number; q ends the walk")
     places = initial_positions(task)
     while True:
         for number, place in enumerate(places, 1):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from visup.commands.task.format import format_files
 from visup.commands.task.simulate import simulate
 
 if TYPE_CHECKING:
@@ -16,19 +15,20 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Check, show, lay out and try task files.", no_args_is_help=True)
 app.command("simulate")(simulate)
+app.command("format")(format_files)
 
 Files = Annotated[list[str], typer.Argument(help="Task files, or names of shipped tasks.")]
 File = Annotated[str, typer.Argument(help="A task file or shipped task.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
 Without = Annotated[
     list[str] | None,
-    typer.Option(help="A kind of percept that will not be at hand, such as depth; repeatable."),
+    typer.Option(help="A kind of percept that will be missing, such as depth; repeatable."),
 ]
 
 
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
-    """Tell every mistake of some task files; exit code 2 when there is any."""
+    """Report every mistake in task files; exit code 2 if there is any."""
     from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
     from visup.tasks.actions.actions import ALL_PERCEPTS
     from visup.tasks.checks.diagnose import diagnose
@@ -56,38 +56,6 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
         raise told[0]
     if told:
         raise ErrorGroup(told)
-
-
-@app.command("format")
-def format_files(
-    files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
-    only_check: Annotated[
-        bool, typer.Option("--check", help="Change nothing; exit code 1 when a layout differs.")
-    ] = False,
-) -> None:
-    """Give task files one layout; words, comments and meaning stay as they are."""
-    from visup.agent.model.errors import OutputError, TaskError
-    from visup.tasks.checks.files import read_text
-
-    differ = False
-    for file in files:
-        text = sys.stdin.read() if file == "-" else read_text(file)
-        new = laid_out(text, "<stdin>" if file == "-" else file)
-        differ = differ or new != text
-        if file == "-" and not only_check:
-            typer.echo(new, nl=False)
-        elif new != text and only_check:
-            typer.echo(f"{file}: not laid out")
-        elif new != text:
-            if not Path(file).is_file():
-                raise TaskError("it ships with visup and is not changed", where=file)
-            try:
-                Path(file).write_text(new, encoding="utf-8")
-            except OSError as e:
-                what = f"cannot be written: {e.strerror or e}"
-                raise OutputError(what, where=file) from e
-            typer.echo(f"{file}: laid out")
-    raise typer.Exit(1 if only_check and differ else 0)
 
 
 @app.command()
@@ -174,25 +142,6 @@ def lsp() -> None:
             raise
         raise ExtraMissingError("`visup task lsp`", "lsp") from e
     serve()
-
-
-def laid_out(text: str, file: str) -> str:
-    """A text in the layout of visup.
-
-    Raises:
-        TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
-        ManyErrors: The same, for several reasons.
-    """
-    from visup.tasks.checks.diagnose import raise_all
-    from visup.tasks.diagnostics.diagnostic import Source
-    from visup.tasks.diagnostics.normalise import normalise
-    from visup.tasks.diagnostics.recovery import parse
-    from visup.tasks.tools.formatter import formatted
-
-    source = Source(text, file)
-    code, odd = normalise(text, source)
-    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
-    return formatted(text)
 
 
 def _as_data(error: VisupError) -> dict[str, Any]:

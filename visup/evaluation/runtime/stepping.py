@@ -179,9 +179,7 @@ def _making() -> float:
 
 def whole(mind: Mind) -> Mind:
     """The same mind without where in memory its samples lie, which is no part of what is believed."""
-    kept = mind.memory.get(RELATIONS)
-    if kept is None:
-        return mind
+    kept = mind.recall(RELATIONS)
     return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from visup.agent import Mind, Presence, Reasoner
+from visup.agent import Mind, Presence
 from visup.agent.model.errors import SettingsError
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import why_not as whynot
 from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import ReasonFinder
+from visup.stepping.explanations.why_not import LastStep
 
 ABOUT = ("alert", "object", "identity", "relation", "rule", "stage", "verdict")
 """What reasons can be asked for, by the first word."""
@@ -60,20 +61,21 @@ def why(reasons: ReasonFinder, text: str) -> Why:
     return answers[asked.about]()
 
 
-def why_not(mind: Mind, reasoners: Sequence[Reasoner], text: str) -> Why:
+def why_not(step: LastStep, text: str) -> Why:
     """The answer to `why not TEXT`.
 
     Raises:
         VisupError: The question cannot be understood, or nothing is known of what it is about.
     """
+    mind = step.mind
     asked = _taken_apart(text, mind, (*NOT_YET, "relation"))
     if asked.about in _PRESENCE:
         wanted = _PRESENCE[asked.about]
-        return whynot.presence_unmet(mind, _one(asked, mind), wanted, reasoners)
+        return whynot.presence_unmet(step, _one(asked, mind), wanted)
     answers: dict[str, Callable[[], Why]] = {
-        "entry": lambda: whynot.entry_unmet(mind, _one(asked, mind), reasoners),
-        "identified": lambda: whynot.identity_unmet(mind, _one(asked, mind), reasoners),
-        "coupled": lambda: whynot.coupling_unmet(mind, *_two(asked), reasoners),
+        "entry": lambda: whynot.entry_unmet(step, _one(asked, mind)),
+        "identified": lambda: whynot.identity_unmet(step, _one(asked, mind)),
+        "coupled": lambda: whynot.coupling_unmet(step, *_two(asked)),
         "rule": lambda: whynot.alert_unmet(mind, asked.name, asked.ids),
         "stage": lambda: whynot.stage_unmet(mind, asked.name),
         "relation": lambda: whynot.relation_unmet(mind, asked.name, asked.ids),

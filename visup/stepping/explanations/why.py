@@ -185,7 +185,7 @@ class ReasonFinder:
 
     def _coupled(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
         low, high = sorted(objects)
-        pending: Any = self.mind.memory.get(COUPLING, {}).get((low, high))
+        pending = self.mind.recall(COUPLING).get((low, high))
         since = {
             "they last converged at": getattr(pending, "converged_at", None),
             "apart since": getattr(pending, "apart_since", None),

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Protocol
 
-from visup.agent import Mind, ObjectBelief, Presence, Reasoner, Status, TaskBelief, Truth
+from visup.agent import (
+    Mind,
+    ObjectBelief,
+    Observation,
+    Presence,
+    Reasoner,
+    Status,
+    TaskBelief,
+    Truth,
+)
 from visup.agent.model.errors import SettingsError
-from visup.rules.coupling.reasoner import COUPLING, CouplingReasoner, CouplingSettings
-from visup.rules.identity.votes import VOTES, IdentityReasoner, ObjectVotes, VoteMemory
-from visup.rules.presence.object_tracks import ObjectTrack, at_border, presence_memory
+from visup.agent.model.fast_replace import replace
+from visup.rules.coupling.reasoner import CouplingReasoner
+from visup.rules.identity.votes import IdentityReasoner, object_votes
 from visup.rules.presence.reasoner import PresenceReasoner
-from visup.rules.presence.step_context import PresenceSettings
 from visup.rules.safety.explain import RuleExplanation
 from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
 from visup.rules.safety.reasoner import rule_memory
+from visup.rules.wording.conditions import Condition, DecisionLog
 from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import Why, explanation_tree
-
-Kind = TypeVar("Kind")
 
 
 def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
@@ -105,101 +114,110 @@ def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
             yield Why(f"awaited: {wanted.relation}({who}) is {stands}{amount}")
 
 
-def entry_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Why:
-    """Why the entry of an object was not told."""
-    belief, track = _tracked(mind, object_id)
+@dataclass(frozen=True, slots=True)
+class LastStep:
+    """The last step, to be judged again by reasoners that explain themselves.
+
+    Attributes:
+        mind: After the step.
+        before: The mind before it, or None when no step was made yet.
+        observation: What was perceived in it.
+        reasoners: All of them, in the order in which they run.
+    """
+
+    mind: Mind
+    before: Mind | None
+    observation: Observation | None
+    reasoners: Sequence[Reasoner]
+
+    def conditions(
+        self, kind: type[ExplainingReasoner], decision: str, objects: tuple[int, ...]
+    ) -> tuple[Condition, ...]:
+        """What a decision of a reasoner of some kind hung on in this step."""
+        if self.before is None or self.observation is None:
+            return (Condition("a step was made", False),)
+        seen = self.observation
+        mind = replace(
+            self.before,
+            time=seen.time,
+            frame_index=seen.frame_index,
+            frame_size=seen.frame_size,
+            answers=MappingProxyType({**self.before.answers, **self.mind.answers}),
+        )
+        for reasoner in self.reasoners:
+            bare = getattr(reasoner, "reasoner", reasoner)  # one that is made to hold to beliefs
+            if isinstance(bare, kind):
+                return bare.explain(mind, seen).get((decision, objects), ())
+            mind = reasoner(mind, seen).mind
+        return (Condition("there is a reasoner that decides it", False),)
+
+
+class ExplainingReasoner(Protocol):
+    """A reasoner that gives the conditions of its decisions."""
+
+    def explain(self, mind: Mind, observation: Observation) -> DecisionLog:  # noqa: D102
+        ...
+
+
+def entry_unmet(step: LastStep, object_id: int) -> Why:
+    """Why the entry of an object was not reported."""
+    belief = _belief(step.mind, object_id)
     if belief.confirmed:
         return Why(f"object {object_id} has entered; first seen at {belief.first_seen:.2f} s")
-    presence = _first(reasoners, PresenceReasoner)
-    s = presence.settings if presence else PresenceSettings()
-    parts = []
-    if track is not None:
-        start = presence_memory(mind).start or 0.0
-        early = track.coherent_since - start <= s.start_s
-        near = at_border(track.region, mind.frame_size)
-        needed = s.entry_s if early or near else s.entry_inside_s
-        steady = mind.time - track.coherent_since
-        parts.append(_short_of("sightings", track.sightings, s.least_sightings, ""))
-        parts.append(_short_of("seen steadily for", steady, needed, " s"))
-    width, height = mind.frame_size
-    if not belief.candidates:
-        least = s.least_share * width * height
-        parts.append(
-            _short_of("area, while nobody says what it is", belief.region.area, least, " px")
-        )
-    parts.append(Why(f"last seen at {belief.last_seen:.2f} s"))
-    return Why(f"object {object_id} has not entered", tuple(parts))
+    unmet = _conditions(step, PresenceReasoner, "entry", (object_id,))
+    last = Why(f"last seen at {belief.last_seen:.2f} s")
+    return Why(f"object {object_id} has not entered", (*unmet, last))
 
 
-def presence_unmet(
-    mind: Mind, object_id: int, wanted: Presence, reasoners: Sequence[Reasoner]
-) -> Why:
+_CHANGES = {
+    Presence.LEFT: "exit",
+    Presence.HIDDEN: "occlusion",
+    Presence.SEEN: "reappearance",
+}
+"""The decision by which an object comes to be believed somewhere."""
+
+
+def presence_unmet(step: LastStep, object_id: int, wanted: Presence) -> Why:
     """Why an object is not believed hidden, gone, or seen."""
-    belief, track = _tracked(mind, object_id)
+    belief = _belief(step.mind, object_id)
     if belief.presence is wanted:
         return Why(f"object {object_id} is {wanted.value}")
-    presence = _first(reasoners, PresenceReasoner)
-    s = presence.settings if presence else PresenceSettings()
-    parts = [Why(f"it is {belief.presence.value}, last seen at {belief.last_seen:.2f} s")]
-    missing = mind.time - belief.last_seen
-    if wanted is not Presence.SEEN:
-        parts.append(_short_of("missing for", missing, s.settle_s, " s"))
-    if track is not None:
-        share = s.hidden_share if wanted is Presence.HIDDEN else s.leaving_share
-        if wanted is not Presence.SEEN and missing == 0.0:
-            parts.append(Why(f"{track.visible:.0%} of it shows, told below {share:.0%}"))
-        elif wanted is Presence.SEEN:
-            parts.append(_short_of("share of it that shows", track.visible, s.shown_share, ""))
-    return Why(f"object {object_id} is not believed to be {wanted.value}", tuple(parts))
+    is_now = Why(f"it is {belief.presence.value}, last seen at {belief.last_seen:.2f} s")
+    unmet = _conditions(step, PresenceReasoner, _CHANGES[wanted], (object_id,))
+    return Why(f"object {object_id} is not believed to be {wanted.value}", (is_now, *unmet))
 
 
-def identity_unmet(mind: Mind, object_id: int, reasoners: Sequence[Reasoner]) -> Why:
+def identity_unmet(step: LastStep, object_id: int) -> Why:
     """Why an object was not identified."""
-    belief = _belief(mind, object_id)
-    ballots: Any = mind.memory.get(VOTES, VoteMemory(mind.time))
-    ballot: ObjectVotes = ballots.of.get(object_id, ObjectVotes())
-    s = (_first(reasoners, IdentityReasoner) or IdentityReasoner()).settings
-    if ballot.told is not None and ballot.told == belief.name:
-        return Why(f"object {object_id} was identified as {ballot.told}")
-    parts = []
-    if not belief.candidates:
-        most = max((votes for _, votes in ballot.tally), default=0.0)
-        parts.append(_short_of("votes of the best name", most, s.known_votes, ""))
-        parts.append(Why(f"votes for none of the models: {ballot.stranger:.3g}"))
-    else:
-        best = belief.candidates[0]
-        parts.append(_short_of(f"likelihood of {best.name}", best.confidence, s.settle, ""))
-        if ballot.leader is not None:
-            parts.append(_short_of("leads for", mind.time - ballot.leads_since, s.settle_s, " s"))
-    heard = "never" if ballot.heard is None else f"at {ballot.heard:.2f} s"
+    belief = _belief(step.mind, object_id)
+    votes = object_votes(step.mind, object_id)
+    if votes.reported is not None and votes.reported == belief.name:
+        return Why(f"object {object_id} was identified as {votes.reported}")
+    parts = [*_conditions(step, IdentityReasoner, "identified", (object_id,))]
+    heard = "never" if votes.heard is None else f"at {votes.heard:.2f} s"
     parts.append(Why(f"what it looks like was last said {heard}"))
     if not belief.confirmed:
-        parts.append(entry_unmet(mind, object_id, reasoners))
+        parts.append(entry_unmet(step, object_id))
     return Why(f"object {object_id} is not identified", tuple(parts))
 
 
-def coupling_unmet(mind: Mind, a: int, b: int, reasoners: Sequence[Reasoner]) -> Why:
+def coupling_unmet(step: LastStep, a: int, b: int) -> Why:
     """Why two objects are not believed to be coupled."""
     low, high = sorted((a, b))
     for object_id in (low, high):
-        _belief(mind, object_id)
-    if mind.coupled(low, high):
+        _belief(step.mind, object_id)
+    if step.mind.coupled(low, high):
         return Why(f"objects {low} and {high} are coupled")
-    couple = _first(reasoners, CouplingReasoner)
-    s = couple.settings if couple else CouplingSettings()
-    pending: Any = mind.memory.get(COUPLING, {}).get((low, high))
-    parts = []
-    touching = mind.relation("touching", low, high)
-    if touching is None or touching.truth is not Truth.TRUE:
-        parts.append(Why(f"touching is {touching.truth.value if touching else 'not judged'}"))
-    odds = getattr(pending, "rest_odds", 0.0)
-    parts.append(_short_of("log odds that they touch and are at rest", odds, s.odds, ""))
-    met = getattr(pending, "converged_at", None)
-    together = mind.relation("moving_together", low, high)
-    if together is None or together.truth is not Truth.TRUE:
-        ago = "never" if met is None else f"{mind.time - met:.2f} s ago"
-        parts.append(Why(f"they last converged {ago}, at most {s.approach_s:g} s ago is wanted"))
-    return Why(f"objects {low} and {high} are not believed to be coupled", tuple(parts))
+    touching = step.mind.relation("touching", low, high)
+    stands = Why(f"touching is {touching.truth.value if touching else 'not judged'}")
+    unmet = _conditions(step, CouplingReasoner, "coupled", (low, high))
+    return Why(f"objects {low} and {high} are not believed to be coupled", (stands, *unmet))
+
+
+def _conditions(
+    step: LastStep, kind: type[ExplainingReasoner], decision: str, objects: tuple[int, ...]
+) -> tuple[Why, ...]:
+    return tuple(Why(c.line()) for c in step.conditions(kind, decision, objects))
 
 
 def relation_unmet(mind: Mind, name: str, objects: tuple[int, ...]) -> Why:
@@ -236,25 +254,8 @@ def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
     return Why(why.text, (*why.parts, *resting), why.frame_index, why.time)
 
 
-def _short_of(what: str, is_: float, wanted: float, unit: str) -> Why:
-    """An amount beside what it must reach."""
-    met = is_ >= wanted - 1e-9
-    missing = "enough" if met else f"{wanted - is_:.3g}{unit} short"
-    return Why(f"{what} {is_:.3g}{unit} of {wanted:.3g}{unit}: {missing}")
-
-
 def _belief(mind: Mind, object_id: int) -> ObjectBelief:
     if object_id not in mind.objects:
         known = ", ".join(map(str, sorted(mind.objects))) or "none yet"
         raise SettingsError(f"there is no object {object_id}", expected=known)
     return mind.objects[object_id]
-
-
-def _tracked(mind: Mind, object_id: int) -> tuple[ObjectBelief, ObjectTrack | None]:
-    return _belief(mind, object_id), presence_memory(mind).of.get(object_id)
-
-
-def _first(reasoners: Sequence[Reasoner], kind: type[Kind]) -> Kind | None:
-    """The reasoner of a kind, also where it was made to hold to beliefs."""
-    bare = (getattr(t, "reasoner", t) for t in reasoners)
-    return next((t for t in bare if isinstance(t, kind)), None)

@@ -18,8 +18,8 @@ from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.building.build import (
     silhouette_views,
 )
+from visup.percepts.shape.database.file_format import APPLICATION_ID, VERSION
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.shape.database.storage import APPLICATION_ID, VERSION
 from visup.percepts.shape.index.view_records import NODE, VIEW
 from visup.percepts.shape.matching.shape_similarity import compare_shapes
 from visup.percepts.shape.shocks.shock_graph import ShockGraph

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -98,3 +99,17 @@ def test_radii_are_right_below_a_pixel() -> None:
     skeleton = skeletonise(shape(RECTANGLE).contour.astype(float))
     unit = np.sqrt(139 * 39)
     assert np.median(skeleton.radii) * unit == pytest.approx(19.5, abs=0.4)
+
+
+@settings(max_examples=10, deadline=None)
+@given(LIMBS)
+def test_the_exported_graph_is_the_same_rooted_graph(angles: tuple[float, ...]) -> None:
+    graph = shape(limbs(angles)).graph
+    exported = graph.to_networkx()
+    assert nx.is_directed_acyclic_graph(exported)
+    assert sorted(exported.edges) == sorted(map(tuple, graph.edges.tolist()))
+    assert {0, *nx.descendants(exported, 0)} == set(exported.nodes) == set(range(len(graph)))
+    for node in exported:
+        below = {node, *nx.descendants(exported, node)}
+        assert below == set(np.flatnonzero(graph.below[node]).tolist())
+    assert sum(w for _, w in exported.nodes(data="weight")) == pytest.approx(1.0, abs=1e-4)

@@ -1,13 +1,31 @@
-"""The form of a recorded step, for programs that read journals without visup (docs/step.schema.json)."""
+"""The form of a recorded step, for programs that read journals without visup (docs/step.schema.json).
+
+What records hold is taken from the records themselves; what the codec writes otherwise stands here.
+"""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any, Literal
+from dataclasses import fields as dataclass_fields
+from enum import Enum
+from functools import reduce
+from operator import or_
+from types import UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from visup.agent import ReportState
+from visup.agent.model.records import Depth, Health, Hypothesis, Region, ReportState
 
 VERSION = 1
 """Of the form; that of the journal that holds it is `visup.agent.storage.journal.VERSION`."""
@@ -45,66 +63,69 @@ class Chain(_Strict):
     )
 
 
-class RegionValue(_Strict):
-    """A part of the image that moves coherently (`visup.agent.Region`)."""
+def _plain(hint: Any) -> Any:
+    """What a field of a record becomes in a document."""
+    if hint is float:
+        return Number
+    if isinstance(hint, UnionType):
+        return reduce(or_, (_plain(part) for part in get_args(hint)))
+    if get_origin(hint) is tuple:
+        return Tuple
+    if get_origin(hint) is np.ndarray:
+        return ArrayValue
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return _tagged(
+            hint, "State of the camera's image", of=(Literal[tuple(m.value for m in hint)], ...)
+        )
+    return hint
 
-    tag: Literal["Region"] = Field(alias="$")
-    id: int
-    bbox: Annotated[list[int], Field(min_length=4, max_length=4, description="x, y, width, height")]
-    mask: list[int] = Field(
+
+def _tagged(kind: type, says: str, **fields: Any) -> Any:
+    name = kind.__name__
+    tag: Any = (Literal[name], Field(alias="$"))
+    return create_model(
+        f"{name}Value",
+        __base__=_Strict,
+        __doc__=f"{says} (`visup.agent.{name}`).",
+        tag=tag,
+        **fields,
+    )
+
+
+def _record(kind: type, says: str, **written: Any) -> Any:
+    """The form of a record: its fields, in their order, but for those that are written otherwise."""
+    hints = get_type_hints(kind, localns={"np": np, "NDArray": NDArray})
+    fields = {
+        f.name: (written.get(f.name) or _plain(hints[f.name]), ...) for f in dataclass_fields(kind)
+    }
+    return _tagged(kind, says, **fields)
+
+
+_BOX = Annotated[list[int], Field(min_length=4, max_length=4, description="x, y, width, height")]
+_RUNS = Annotated[
+    list[int],
+    Field(
         description="Lengths of runs in reading order within the box: first of pixels that are not of "
         "the region, then of those that are, and so on."
-    )
-    contour: Chain | ArrayValue
-    centroid: Tuple
-    area: Number
-    velocity: Tuple
-    velocity_sigma: Number
-    motion: ArrayValue | None
-    cut: bool
-    confidence: Number
-    visible_since: Number | None
+    ),
+]
+RECORDS = (
+    _record(
+        Region,
+        "A part of the image that moves coherently",
+        bbox=_BOX,
+        mask=_RUNS,
+        contour=Chain | ArrayValue,
+    ),
+    _record(Hypothesis, "What a region looks like"),
+    _record(Depth, "Relative depth of a region under one identity"),
+    _record(Health, "State of the camera's image, and why"),
+)
 
-
-class HypothesisValue(_Strict):
-    """What a region looks like (`visup.agent.Hypothesis`)."""
-
-    tag: Literal["Hypothesis"] = Field(alias="$")
-    region_id: int
-    name: str
-    view: int
-    similarity: Number
-    rotation: Number | None
-    scale: Number | None
-    direction: Tuple | None
-
-
-class DepthValue(_Strict):
-    """Relative depth of a region under one identity (`visup.agent.Depth`)."""
-
-    tag: Literal["Depth"] = Field(alias="$")
-    region_id: int
-    name: str
-    depth: Number
-    sigma: Number
-
-
-class HealthStatusValue(_Strict):
-    """State of the camera's image (`visup.agent.HealthStatus`)."""
-
-    tag: Literal["HealthStatus"] = Field(alias="$")
-    of: str
-
-
-class HealthValue(_Strict):
-    """State of the camera's image, and why (`visup.agent.Health`)."""
-
-    tag: Literal["Health"] = Field(alias="$")
-    status: HealthStatusValue
-    detail: str
-
-
-Value = RegionValue | HypothesisValue | DepthValue | HealthValue | Tuple | ArrayValue | Any
+if TYPE_CHECKING:
+    Value = Any
+else:
+    Value = reduce(or_, (*RECORDS, Tuple, ArrayValue, Any))
 """Whatever a behaviour reports. Plug-ins' values are JSON values, with objects that have the key '$' for
 tuples, arrays, bytes, sets, mappings with other keys than words, and visup's records by their name."""
 

@@ -1,0 +1,125 @@
+"""What is believed about a task: its stages, who plays its actors, its verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Status(StrEnum):
+    """How a stage of a task stands."""
+
+    PENDING = "pending"
+    ACTIVE = "active"
+    PROGRESSING = "progressing"
+    STALLED = "stalled"
+    FAILING = "failing"
+    FAILED = "failed"
+    DONE = "done"
+    UNKNOWN = "unknown"
+
+
+class Verdict(StrEnum):
+    """How a task as a whole stands."""
+
+    IN_PROGRESS = "in_progress"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """An actor of a task matched to an object.
+
+    Attributes:
+        actor: Name in the task file.
+        models: Model names that the actor may be.
+        object_id: The object believed to play it, or None when none does.
+        strength: Strength of that belief, 0 to 1.
+    """
+
+    actor: str
+    models: tuple[str, ...]
+    object_id: int | None = None
+    strength: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """An action that the current stage of a task asks for; rules are suspended by it.
+
+    Attributes:
+        relation: Name of the relation, such as 'converging'.
+        objects: Ids of the objects that play its actors.
+    """
+
+    relation: str
+    objects: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Prospect:
+    """A stage that may begin next.
+
+    Attributes:
+        stage: Its name.
+        probability: 0 to 1.
+    """
+
+    stage: str
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
+class StageBelief:
+    """How one stage of a task stands.
+
+    Attributes:
+        stage: Its name.
+        status: Pending, active, progressing, ...
+        since: Seconds since when it has this status.
+        confidence: 0 to 1.
+        evidence: One sentence: why.
+    """
+
+    stage: str
+    status: Status
+    since: float
+    confidence: float = 1.0
+    evidence: str = ""
+
+
+@dataclass(frozen=True)
+class TaskBelief:
+    """How a task stands.
+
+    Attributes:
+        task: Its name.
+        verdict: Overall.
+        stages: In the order of the task.
+        current: Name of the stage that is under way, or None.
+        bindings: Which object plays which actor.
+        expected: What the current stage asks for.
+        unexplained: Ids of objects that no actor of the task explains.
+        confidence: 0 to 1.
+        evidence: One sentence: why the verdict is what it is.
+        prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
+            end of the task.
+        success: Probability that the task still ends well, or None while nothing is followed.
+        active: How likely it is that the task is going on at all; 1 when it is the only one given.
+    """
+
+    task: str
+    verdict: Verdict
+    stages: tuple[StageBelief, ...] = ()
+    current: str | None = None
+    bindings: tuple[Binding, ...] = ()
+    expected: tuple[Expectation, ...] = ()
+    unexplained: tuple[int, ...] = ()
+    confidence: float = 1.0
+    evidence: str = ""
+    prospects: tuple[Prospect, ...] = ()
+    success: float | None = None
+    active: float = 1.0

@@ -1,0 +1,86 @@
+"""The format of a database file: its tables, versions and check sums, and how damage is reported.
+
+One SQLite file. What is needed of every view (its model, direction, root and sketch) stands in a few
+blocks, so that opening a hundred thousand views reads some megabytes; each shape stands in a row of its
+own and is read when it is asked for. All bytes have a check sum: what is read is what was written.
+
+Read next: `file_writer.py`, `file_reader.py`.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from visup.agent.model.errors import DatabaseError
+from visup.percepts.shape.index.view_records import Records
+
+APPLICATION_ID = 0x76697375
+"""'visu' in ASCII, in the header of every database file."""
+
+VERSION = 2
+"""Version of the tables; a newer file is refused, since its meaning is not known."""
+
+BLOCK = 1024
+"""Views of a block at most."""
+
+MOST_NAME = 200
+"""Characters of a model's name at most."""
+
+TABLES = (
+    "CREATE TABLE layout (part TEXT PRIMARY KEY, meaning TEXT NOT NULL)",
+    "CREATE TABLE models (code INTEGER PRIMARY KEY, name TEXT NOT NULL, crc INTEGER NOT NULL)",
+    "CREATE TABLE blocks (number INTEGER PRIMARY KEY, views BLOB NOT NULL, also BLOB NOT NULL, "
+    "crc INTEGER NOT NULL)",
+    "CREATE TABLE shapes (view INTEGER PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
+    "contour BLOB NOT NULL, crc INTEGER NOT NULL)",
+)
+MOST_BYTES = 1 << 24
+# Messages about damaged tables quote them, and are no text when what they quote is none.
+UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
+BUILD_HINT = "build it anew with 'visup models build'"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FileContents:
+    """All that stands in a file but the shapes.
+
+    Attributes:
+        names: Names of the models, in the order of the file.
+        views: (V,) records of `VIEW`.
+        also: (A,) records of `ALSO`, rising by view (from 0).
+    """
+
+    names: tuple[str, ...]
+    views: Records
+    also: Records
+
+
+def checksum(number: int, *parts: bytes) -> int:
+    """Check sum of a row; its number is in it, so that rows cannot change places."""
+    total = number
+    for part in parts:
+        total = zlib.crc32(part, total)
+    return total
+
+
+def damaged(path: Path, found: str, expected: str) -> DatabaseError:
+    """The error of a file that is a database, but not a sound one."""
+    return DatabaseError(
+        f"this model database is damaged: {found}",
+        where=str(path),
+        expected=expected,
+        hint=BUILD_HINT,
+    )
+
+
+def unreadable(path: Path, error: object) -> DatabaseError:
+    """The error of a file that is no database at all, or that SQLite cannot read."""
+    return DatabaseError(
+        f"this is not a model database that can be read ({error})",
+        where=str(path),
+        expected="a file made by 'visup models build'",
+        hint=BUILD_HINT,
+    )

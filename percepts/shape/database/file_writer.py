@@ -1,0 +1,142 @@
+"""Writing a database file: whole or not at all.
+
+Views are appended in blocks to a copy beside the file, which takes its place when all went well.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from visup.agent.model.errors import DatabaseError
+from visup.percepts.shape.database.file_format import (
+    APPLICATION_ID,
+    BLOCK,
+    TABLES,
+    VERSION,
+    FileContents,
+    checksum,
+)
+from visup.percepts.shape.database.file_reader import read_contents
+from visup.percepts.shape.index.outline_sketch import sketch
+from visup.percepts.shape.index.view_records import (
+    ALSO,
+    LAYOUT,
+    POINT,
+    VIEW,
+    NewView,
+    Records,
+    encode,
+    node_records,
+)
+from visup.percepts.shape.silhouette.height_functions import outline_heights
+
+
+def write_new(path: Path, views: Iterable[NewView]) -> None:
+    """Write a database with these views, in place of whatever stands at the path.
+
+    Raises:
+        DatabaseError: The file cannot be written; nothing is left behind.
+    """
+    with _replacing(path) as temporary, closing(sqlite3.connect(temporary)) as file:
+        file.execute("PRAGMA page_size = 8192")
+        file.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        file.execute(f"PRAGMA user_version = {VERSION}")
+        for table in TABLES:
+            file.execute(table)
+        file.executemany("INSERT INTO layout VALUES (?, ?)", LAYOUT.items())
+        _insert(file, FileContents((), np.empty(0, VIEW), np.empty(0, ALSO)), views)
+
+
+def write_more(path: Path, views: Iterable[NewView]) -> None:
+    """Add views to a database; the file is replaced whole, or left as it was.
+
+    Raises:
+        DatabaseError: The file is no database of this version, or cannot be written.
+    """
+    before = read_contents(path)
+    with _replacing(path) as temporary:
+        shutil.copyfile(path, temporary)
+        with closing(sqlite3.connect(temporary)) as file:
+            _insert(file, before, views)
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """A temporary file beside the path that takes its place when all went well."""
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    except OSError as e:
+        raise DatabaseError(
+            f"the database cannot be written ({e.strerror})",
+            where=str(path),
+            expected="a folder that exists and can be written to",
+        ) from e
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except (OSError, sqlite3.Error) as e:
+        raise DatabaseError(f"the database cannot be written ({e})", where=str(path)) from e
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _insert(file: sqlite3.Connection, before: FileContents, views: Iterable[NewView]) -> None:
+    """Append views in blocks; models new to the file get the next codes."""
+    codes = {name: code for code, name in enumerate(before.names)}
+    numbers = dict(enumerate(np.bincount(before.views["model"], minlength=len(codes)).tolist()))
+    (blocks,) = file.execute("SELECT coalesce(max(number), -1) + 1 FROM blocks").fetchone()
+    start, coming = len(before.views), iter(views)
+    with file:
+        while new := list(islice(coming, BLOCK)):
+            for view in new:
+                if view.name not in codes:
+                    codes[view.name] = code = len(codes)
+                    known = (code, view.name, checksum(code, view.name.encode()))
+                    file.execute("INSERT INTO models VALUES (?, ?, ?)", known)
+            rows, also = _block(new, start, codes, numbers)
+            data = (rows.tobytes(), also.tobytes())
+            row = (blocks, *data, checksum(blocks, *data))
+            file.execute("INSERT INTO blocks VALUES (?, ?, ?, ?)", row)
+            file.executemany("INSERT INTO shapes VALUES (?, ?, ?, ?, ?)", _shape_rows(new, start))
+            start, blocks = start + len(new), blocks + 1
+
+
+def _block(
+    new: list[NewView], start: int, codes: dict[str, int], numbers: dict[int, int]
+) -> tuple[Records, Records]:
+    """The records of some views; `numbers` counts the views of each model."""
+    rows = np.zeros(len(new), dtype=VIEW)
+    also = []
+    for k, view in enumerate(new):
+        code = codes[view.name]
+        rows[k]["model"], rows[k]["number"] = code, numbers.get(code, 0)
+        numbers[code] = numbers.get(code, 0) + 1
+        rows[k]["direction"] = view.direction or (np.nan, np.nan, np.nan)
+        rows[k]["area"] = np.nan if view.area is None else view.area
+        rows[k]["smoothing"], rows[k]["cut"] = view.smoothing, view.shape.cut
+        rows[k]["border"] = np.nan if view.shape.border is None else view.shape.border
+        rows[k]["areas"] = view.shape.areas
+        rows[k]["root"] = node_records(view.shape.graph)[0]
+        # Of the outline as it will be read, so that it does not matter where a view comes from.
+        rows[k]["sketch"] = sketch(outline_heights(np.asarray(view.shape.contour, POINT.base)))
+        also += [(start + k, d) for d in view.also]
+    return rows, np.array(also, dtype=ALSO)
+
+
+def _shape_rows(new: list[NewView], start: int) -> Iterator[tuple[int, bytes, bytes, bytes, int]]:
+    for k, view in enumerate(new):
+        data = encode(view.shape)
+        parts = (data.nodes, data.edges, data.contour)
+        yield start + k, *parts, checksum(start + k, *parts)

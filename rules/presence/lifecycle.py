@@ -1,0 +1,114 @@
+"""The life of an object: every change of its state is made, and told, here.
+
+    initiate -> TENTATIVE -- confirm --> VISIBLE -- occlude --> OCCLUDED
+                    |                       |  ----- lose -----> LOST
+                    |                       |  ----- leave ----> LEFT
+                    |                       <----- reappear ---- OCCLUDED, LOST, LEFT
+                    <------- demote -------- VISIBLE (it was but a part of another)
+    delete from any state: merged into a known object (`reidentification.py`), or forgotten (`objects.py`)
+
+A region that appears initiates an object; who decides about the other changes are `initiation.py`,
+`occlusion.py`, `exits.py` and `reidentification.py`. The state is held once: `ObjectBelief.confirmed` and
+`ObjectBelief.presence` are it, and the track adds only whether a hidden object is lost.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from visup.agent import ObjectBelief, Presence
+from visup.agent.model.fast_replace import replace
+from visup.rules.presence.object_tracks import ObjectTrack
+from visup.rules.presence.step_context import StepContext
+
+EXIT_CONFIDENCE = 0.9
+
+
+class LifecycleState(StrEnum):
+    """Where an object stands in its life."""
+
+    TENTATIVE = "tentative"
+    VISIBLE = "visible"
+    OCCLUDED = "occluded"
+    LOST = "lost"
+    LEFT = "left"
+
+
+TRANSITIONS = frozenset(
+    {
+        (LifecycleState.TENTATIVE, LifecycleState.VISIBLE),
+        (LifecycleState.VISIBLE, LifecycleState.TENTATIVE),
+        (LifecycleState.VISIBLE, LifecycleState.OCCLUDED),
+        (LifecycleState.VISIBLE, LifecycleState.LOST),
+        (LifecycleState.VISIBLE, LifecycleState.LEFT),
+        (LifecycleState.OCCLUDED, LifecycleState.VISIBLE),
+        (LifecycleState.LOST, LifecycleState.VISIBLE),
+        (LifecycleState.LEFT, LifecycleState.VISIBLE),
+    }
+)
+"""From which state an object may come to which."""
+
+
+def state_of(belief: ObjectBelief, track: ObjectTrack | None) -> LifecycleState:
+    """Where an object stands, by what is believed of it."""
+    if not belief.confirmed:
+        return LifecycleState.TENTATIVE
+    if belief.presence is Presence.SEEN:
+        return LifecycleState.VISIBLE
+    if belief.presence is Presence.LEFT:
+        return LifecycleState.LEFT
+    return LifecycleState.LOST if track is not None and track.lost else LifecycleState.OCCLUDED
+
+
+def confirm(
+    context: StepContext, belief: ObjectBelief, kind: str, template: str, confidence: float
+) -> None:
+    """It is an object of its own, and enters."""
+    context.put(replace(belief, confirmed=True))
+    context.tell(kind, template, belief.id, confidence=confidence)
+
+
+def demote(context: StepContext, belief: ObjectBelief) -> None:
+    """It was but a part of another object; it has to show that it is more."""
+    context.put(replace(belief, confirmed=False))
+
+
+def occlude(context: StepContext, belief: ObjectBelief, occluder: ObjectBelief | None) -> None:
+    """It goes behind another object, or behind something unknown."""
+    _go(context, belief, Presence.HIDDEN, lost=False)
+    if occluder is not None and occluder.confirmed:
+        context.tell("occlusion", "{0} {is} hidden by {1}.", belief.id, occluder.id)
+    else:
+        context.tell("occlusion", "{0} {is} hidden.", belief.id)
+
+
+def lose(context: StepContext, belief: ObjectBelief) -> None:
+    """It is no longer seen, and nothing tells why."""
+    _go(context, belief, Presence.HIDDEN, lost=True)
+    template = "{0} {is} lost: it is no longer seen, and nothing tells why."
+    context.tell("lost", template, belief.id)
+
+
+def leave(context: StepContext, belief: ObjectBelief) -> None:
+    """It goes over the border of the image."""
+    _go(context, belief, Presence.LEFT, lost=False)
+    template = "{0} {leaves} the field of view."
+    context.tell("exit", template, belief.id, confidence=EXIT_CONFIDENCE)
+
+
+def _go(context: StepContext, belief: ObjectBelief, where: Presence, *, lost: bool) -> None:
+    gone = replace(belief, presence=where)
+    context.put(gone, lost=lost, partial_since=None, clear_since=None)
+
+
+def reappear(context: StepContext, belief: ObjectBelief) -> None:
+    """It is seen again, wherever it was."""
+    before = state_of(belief, context.of[belief.id])
+    seen = replace(belief, presence=Presence.SEEN)
+    context.put(seen, lost=False, clear_since=None, partial_since=None)
+    if before is LifecycleState.LEFT:
+        context.tell("entry", "{0} {comes} back into the field of view.", belief.id)
+    elif before is LifecycleState.LOST:
+        context.tell("found", "{0} {is} seen again.", belief.id)
+    else:
+        context.tell("reappearance", "{0} {reappears}.", belief.id)

@@ -1,0 +1,107 @@
+"""Percepts enter the mind: regions as objects, health, plug-ins' percepts, what is unknown.
+
+A new region becomes a tentative object; whether it is an object at all, or one known before
+that shows itself again, is for `reasoner.py` to say. Objects out of sight are forgotten here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from visup.agent import Mind, ObjectBelief, Observation, Outcome, Percept, Presence, Region
+from visup.agent.model.fast_replace import replace
+from visup.rules.presence.association import OWNERS, associate, delete_objects
+
+KNOWN_KINDS = frozenset({"region", "hypothesis", "depth", "health"})
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectSettings:
+    """How much is remembered, and for how long.
+
+    Attributes:
+        most_objects: Bound on remembered objects; those unseen for longest go first.
+        most_owners: Bound on remembered region ids.
+        forget_unconfirmed_s: A new region unseen for this long was nothing.
+        forget_left_s: An object that left is remembered for this long.
+        forget_hidden_s: A hidden object is remembered for this long.
+        percept_age_s: Percepts of plug-ins' own kinds fade after this.
+    """
+
+    most_objects: int = 64
+    most_owners: int = 256
+    forget_unconfirmed_s: float = 0.5
+    forget_left_s: float = 30.0
+    forget_hidden_s: float = 300.0
+    percept_age_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectReasoner:
+    """Reasoner of the update phase: percepts enter the mind.
+
+    When no behaviour looked for regions in this step, nothing is concluded about any object.
+    """
+
+    settings: ObjectSettings = ObjectSettings()
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Take in one observation; see `Reasoner`."""
+        mind = replace(
+            mind,
+            time=observation.time,
+            frame_index=observation.frame_index,
+            frame_size=observation.frame_size,
+            unknown=observation.unknown,
+            percepts=self._fresh(mind.percepts, observation),
+        )
+        for health in observation.of("health"):
+            mind = replace(mind, health=health)
+        if observation.observed("region"):
+            mind = self._see(mind, observation)
+        return Outcome(self._forget(mind))
+
+    def _see(self, mind: Mind, observation: Observation) -> Mind:
+        found, owners = associate(mind, observation.of("region"))
+        beliefs = [_sighted(mind, i, region) for i, region in found.items()]
+        newest = list(owners.items())[-self.settings.most_owners :]
+        return mind.with_objects(*beliefs).remember(OWNERS, MappingProxyType(dict(newest)))
+
+    def _fresh(
+        self, known: Mapping[str, tuple[Percept, ...]], observation: Observation
+    ) -> Mapping[str, tuple[Percept, ...]]:
+        oldest = observation.time - self.settings.percept_age_s
+        fresh = {
+            k: kept for k, ps in known.items() if (kept := tuple(p for p in ps if p.time >= oldest))
+        }
+        new: dict[str, list[Percept]] = {}
+        for report in observation.reports:
+            for p in report.percepts:
+                if p.kind not in KNOWN_KINDS:
+                    new.setdefault(p.kind, []).append(p)
+        return MappingProxyType({**fresh, **{k: tuple(ps) for k, ps in new.items()}})
+
+    def _forget(self, mind: Mind) -> Mind:
+        gone = {i for i, b in mind.objects.items() if self._stale(b, mind.time)}
+        left = [b for i, b in mind.objects.items() if i not in gone]
+        left.sort(key=lambda b: (b.confirmed, b.last_seen, b.id))
+        gone |= {b.id for b in left[: max(0, len(left) - self.settings.most_objects)]}
+        return delete_objects(mind, frozenset(gone))
+
+    def _stale(self, belief: ObjectBelief, now: float) -> bool:
+        unseen = now - belief.last_seen
+        if not belief.confirmed:
+            return unseen > self.settings.forget_unconfirmed_s
+        if belief.presence is Presence.LEFT:
+            return unseen > self.settings.forget_left_s
+        return belief.presence is Presence.HIDDEN and unseen > self.settings.forget_hidden_s
+
+
+def _sighted(mind: Mind, object_id: int, region: Region) -> ObjectBelief:
+    """The belief about an object after another sight of it; a first sight initiates it."""
+    old, now = mind.objects.get(object_id), mind.time
+    if old is None:
+        return ObjectBelief(object_id, region, Presence.SEEN, first_seen=now, last_seen=now)
+    return replace(old, region=region, last_seen=now)

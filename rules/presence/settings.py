@@ -1,0 +1,48 @@
+"""How long what is seen must last before an object changes its state, and how much must show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PresenceSettings:
+    """How long things must last before they are reported, and how much must show.
+
+    Attributes:
+        entry_s: A region that came over the border, or was there at the start, enters after this.
+        entry_inside_s: The same for one that appears in the middle of the image.
+        start_s: Length of the start, in which every region may be new.
+        least_sightings: Sightings that an entry needs.
+        allowed_gap_s: Longest flicker within a steady sighting.
+        settle_s: How long an object must be missing before exit or occlusion is told.
+        missed_s: The same when it is not seen though another hides only a part of it.
+        lost_s: The same when nothing explains it.
+        partial_s: How long little must show before exit or occlusion is told.
+        hidden_share: Below this share in sight, beside another region, an object is occluded.
+        leaving_share: Below this share, going over the border, it has left.
+        shown_share: Above this share a hidden object has reappeared.
+        shown_s: How long it must show, or stay in the clear, before that is told.
+        whole_share: An object of which less shows was being hidden, and did not merge with another.
+        contact_px: Regions closer than this may hide parts of each other.
+        reidentify_s: A new region must be seen this long before it can be a hidden object.
+        least_share: Share of the image below which nobody enters who has not been recognised.
+    """
+
+    entry_s: float = 0.36
+    entry_inside_s: float = 1.0
+    start_s: float = 2.0
+    least_sightings: int = 3
+    allowed_gap_s: float = 0.25
+    settle_s: float = 0.3
+    missed_s: float = 0.9
+    lost_s: float = 2.0
+    partial_s: float = 0.16
+    hidden_share: float = 0.2
+    leaving_share: float = 0.12
+    shown_share: float = 0.5
+    shown_s: float = 0.12
+    whole_share: float = 0.6
+    contact_px: float = 4.0
+    reidentify_s: float = 0.12
+    least_share: float = 0.0005

@@ -1,0 +1,64 @@
+"""`visup task format`: task files in one layout."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def format_files(
+    files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
+    only_check: Annotated[
+        bool,
+        typer.Option("--check", help="Change nothing; exit code 1 when a file is not formatted."),
+    ] = False,
+) -> None:
+    """Format task files; words, comments and meaning stay as they are."""
+    from visup.tasks.checks.files import read_text
+
+    differ = False
+    for file in files:
+        text = sys.stdin.read() if file == "-" else read_text(file)
+        new = formatted_source(text, "<stdin>" if file == "-" else file)
+        differ = differ or new != text
+        if file == "-" and not only_check:
+            typer.echo(new, nl=False)
+        elif new != text and only_check:
+            typer.echo(f"{file}: not formatted")
+        elif new != text:
+            _write(file, new)
+            typer.echo(f"{file}: formatted")
+    raise typer.Exit(1 if only_check and differ else 0)
+
+
+def _write(file: str, text: str) -> None:
+    from visup.agent.model.errors import OutputError, TaskError
+
+    if not Path(file).is_file():
+        raise TaskError("it ships with visup and is not changed", where=file)
+    try:
+        Path(file).write_text(text, encoding="utf-8")
+    except OSError as e:
+        raise OutputError(f"cannot be written: {e.strerror or e}", where=file) from e
+
+
+def formatted_source(text: str, file: str) -> str:
+    """The text of a task file in the layout of visup.
+
+    Raises:
+        TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
+        ManyErrors: The same, for several reasons.
+    """
+    from visup.tasks.checks.diagnose import raise_all
+    from visup.tasks.diagnostics.diagnostic import Source
+    from visup.tasks.diagnostics.normalise import normalise
+    from visup.tasks.diagnostics.recovery import parse
+    from visup.tasks.tools.formatter import formatted
+
+    source = Source(text, file)
+    code, odd = normalise(text, source)
+    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
+    return formatted(text)

@@ -1,0 +1,135 @@
+"""The commands of `visup step` that look and change nothing: the mind, what was perceived, why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from visup.agent import Observation
+from visup.stepping import Stepper
+from visup.terminal.display import shown
+from visup.terminal.narrator import event_row
+from visup.terminal.session_commands import COMMANDS, HELP
+from visup.terminal.tables import (
+    alerts_list,
+    behaviours_table,
+    candidates_table,
+    objects_table,
+    questions_list,
+    regions_table,
+    relations_table,
+    tasks_tree,
+)
+
+Words = Sequence[str]
+View = Callable[[Stepper, Words], RenderableType]
+"""Answers a command, from the words after its name."""
+
+_NO_STEP = Text("no step was taken yet")
+
+
+def refusal(text: str) -> Text:
+    """An answer to what cannot be done."""
+    return Text(text, style="yellow")
+
+
+def usage(name: str) -> str:
+    """How a command is written, and what it does."""
+    return f"{COMMANDS[name].usage}: {COMMANDS[name].does}"
+
+
+def number_in(words: Words) -> int | None:
+    """The whole number that comes first, or None."""
+    return int(words[0]) if words and words[0].isdecimal() else None
+
+
+def observation_of(stepper: Stepper) -> Observation | None:
+    """What was perceived in this step."""
+    if stepper.paused is not None:
+        return stepper.paused.seen
+    return None if stepper.last is None else stepper.last.observation
+
+
+def _help(stepper: Stepper, words: Words) -> RenderableType:
+    if not words:
+        return Text(HELP)
+    found = [c for c in COMMANDS.values() if c.name.startswith(words[0])]
+    if not found:
+        return refusal(f"'{words[0]}' is not a command; 'help' lists them")
+    return Text("\n\n".join(c.text for c in found))
+
+
+def _why(stepper: Stepper, words: Words) -> RenderableType:
+    if not words:
+        return Text(COMMANDS["why"].text)
+    if words[0] == "not":
+        return shown(stepper.why_not(" ".join(words[1:])))
+    return shown(stepper.why(" ".join(words)))
+
+
+def _diff(stepper: Stepper, words: Words) -> RenderableType:
+    numbers = [int(w) for w in words if w.isdecimal()]
+    if stepper.at == stepper.begin and not numbers:
+        return _NO_STEP
+    first = numbers[0] if numbers else stepper.at - 1
+    return shown(stepper.diff(first, *numbers[1:2]))
+
+
+def _percepts(stepper: Stepper, words: Words) -> RenderableType:
+    seen = observation_of(stepper)
+    return shown(seen) if seen else _NO_STEP
+
+
+def _behaviours(stepper: Stepper, words: Words) -> RenderableType:
+    seen = observation_of(stepper)
+    return behaviours_table(seen.reports) if seen else _NO_STEP
+
+
+def _candidates(stepper: Stepper, words: Words) -> RenderableType:
+    number = number_in(words)
+    belief = stepper.mind.objects.get(number) if number is not None else None
+    if belief is None:
+        return refusal("which object? 'objects' lists their ids")
+    return candidates_table(belief)
+
+
+def _events(stepper: Stepper, words: Words) -> RenderableType:
+    most = number_in(words) or 10
+    latest = list(stepper.told(last=stepper.at))[-most:]
+    rows = Table.grid(padding=(0, 1))
+    for number, event in latest:
+        rows.add_row(Text(f"step {number}", style="dim"), event_row(event))
+    return rows if latest else Text("none yet")
+
+
+def _directives(stepper: Stepper, words: Words) -> RenderableType:
+    asked = stepper.agent.directives
+    return Group(*map(shown, asked)) if asked else Text("nothing is asked for")
+
+
+VIEWS: Mapping[str, View] = MappingProxyType(
+    {
+        "why": _why,
+        "diff": _diff,
+        "mind": lambda stepper, _: shown(stepper.mind),
+        "percepts": _percepts,
+        "regions": lambda stepper, _: regions_table(observation_of(stepper)),
+        "objects": lambda stepper, _: objects_table(stepper.mind.objects.values()),
+        "candidates": _candidates,
+        "questions": lambda stepper, _: questions_list(stepper.mind.questions),
+        "relations": lambda stepper, words: relations_table(
+            stepper.mind.relations, number_in(words)
+        ),
+        "tasks": lambda stepper, _: tasks_tree(stepper.mind),
+        "alerts": lambda stepper, _: alerts_list(stepper.mind.alerts),
+        "events": _events,
+        "directives": _directives,
+        "behaviours": _behaviours,
+        "help": _help,
+    }
+)
+"""By the names of their commands."""
