@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from visup.agent import AlertCondition, Frame, Severity
 from visup.agent.model.errors import SourceError
@@ -13,6 +14,21 @@ from visup.percepts.video.source import Ending, VideoSource
 
 FIRST_WAIT_S = 0.5
 LONGEST_WAIT_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Reconnection:
+    """How a source that delivers nothing any more is opened again.
+
+    Attributes:
+        reopen: Opens it.
+        patience_s: How long to try, seconds.
+        wait: Waits so many seconds; an argument for tests.
+    """
+
+    reopen: Callable[[], Capture]
+    patience_s: float
+    wait: Callable[[float], None] = time.sleep
 
 
 class LiveSource(VideoSource):
@@ -27,9 +43,7 @@ class LiveSource(VideoSource):
         every: Only every n-th frame is given.
         fps: Frame rate to assume, or None for what the camera says.
         clock: Seconds from any start; an argument so that a run can be repeated.
-        reopen: Opens it again; None to end when it drops.
-        patience_s: How long to try, seconds.
-        wait: Waits so many seconds; an argument for tests.
+        reconnection: How it is opened again; None to end when it drops.
 
     Attributes:
         notify: Told at once when it drops, while nobody can step: one sentence.
@@ -37,6 +51,8 @@ class LiveSource(VideoSource):
     Raises:
         SourceError: It delivers no frame.
     """
+
+    live = True
 
     def __init__(
         self,
@@ -46,13 +62,11 @@ class LiveSource(VideoSource):
         every: int = 1,
         fps: float | None = None,
         clock: Callable[[], float] = time.monotonic,
-        reopen: Callable[[], Capture] | None = None,
-        patience_s: float = 0.0,
-        wait: Callable[[float], None] = time.sleep,
+        reconnection: Reconnection | None = None,
     ) -> None:
         rate, notes = frame_rate(capture, fps)
         self.notify: Callable[[str], None] | None = None
-        self._reopen, self._patience_s, self._wait = reopen, patience_s, wait
+        self._reconnection = reconnection
         # Written by whoever reads frames, which may be a thread of its own, and read by the cycle.
         self._came_back: deque[str] = deque()
         self._capture = capture
@@ -71,7 +85,7 @@ class LiveSource(VideoSource):
             )
         self._waiting: Frame | None = first
         super().__init__(
-            name, fps=rate, size=first.size, frame_count=None, every=every, live=True, notes=notes
+            name, fps=rate, size=first.size, frame_count=None, every=every, notes=notes
         )
 
     def _next(self) -> Frame | None:
@@ -101,16 +115,17 @@ class LiveSource(VideoSource):
 
     def _back_again(self) -> bool:
         """Open it again and again; whether a frame can be received."""
-        if self._reopen is None or self._patience_s <= 0:
+        again = self._reconnection
+        if again is None or again.patience_s <= 0:
             return False
         if self.notify:
             self.notify(f"{self.name} delivers nothing; it is tried again.")
         since, pause = self._clock(), FIRST_WAIT_S
-        while (gone := self._clock() - since) < self._patience_s:
+        while (gone := self._clock() - since) < again.patience_s:
             self._capture.release()
-            self._wait(min(pause, self._patience_s - gone))
+            again.wait(min(pause, again.patience_s - gone))
             pause = min(2 * pause, LONGEST_WAIT_S)
-            self._capture = self._reopen()
+            self._capture = again.reopen()
             if self._capture.isOpened() and self._capture.grab():
                 gone = self._clock() - since
                 self._came_back.append(f"{self.name} delivered nothing for {gone:.1f} s.")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from visup.agent.model.errors import SettingsError, SourceError
+from visup.agent.model.suggestions import closest
 from visup.percepts.video.capture import (
     Capture,
     CaptureFactory,
@@ -14,7 +16,7 @@ from visup.percepts.video.capture import (
     open_capture,
 )
 from visup.percepts.video.image_folder import open_folder
-from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.live_source import LiveSource, Reconnection
 from visup.percepts.video.source import VideoSource
 from visup.percepts.video.video_file import VideoFile, open_file
 
@@ -50,31 +52,28 @@ def open_source(
     _check(every, fps)
     if not source.strip():
         raise SourceError("no source was named", hint="name a video file or a folder of images")
+    opening = _Opening(every, fps, factory, patience_s)
     if source.isdecimal():
         camera = _camera(int(source), factory)
-        return _live(f"camera {source}", camera, int(source), every, fps, factory, patience_s)
+        return opening.live(f"camera {source}", camera, int(source))
     if URL.match(source):
-        return _open_url(source, every, fps, factory, patience_s)
-    return _open_path(Path(source).expanduser(), every, fps, factory, patience_s)
+        return _open_url(source, opening)
+    return _open_path(Path(source).expanduser(), opening)
 
 
-def _live(
-    name: str,
-    capture: Capture,
-    opened: str | int,
-    every: int,
-    fps: float | None,
-    factory: CaptureFactory,
-    patience_s: float,
-) -> LiveSource:
-    return LiveSource(
-        name,
-        capture,
-        every=every,
-        fps=fps,
-        reopen=lambda: factory(opened),
-        patience_s=patience_s,
-    )
+@dataclass(frozen=True, slots=True)
+class _Opening:
+    """How sources are opened; fields as the arguments of `open_source`."""
+
+    every: int
+    fps: float | None
+    factory: CaptureFactory
+    patience_s: float
+
+    def live(self, name: str, capture: Capture, opened: str | int) -> LiveSource:
+        """A source of an open capture that is opened again when it drops."""
+        again = Reconnection(lambda: self.factory(opened), self.patience_s)
+        return LiveSource(name, capture, every=self.every, fps=self.fps, reconnection=again)
 
 
 def _check(every: int, fps: float | None) -> None:
@@ -98,15 +97,13 @@ def _camera(camera: int | str, factory: CaptureFactory) -> Capture:
     return capture
 
 
-def _open_url(
-    url: str, every: int, fps: float | None, factory: CaptureFactory, patience_s: float
-) -> VideoFile | LiveSource:
+def _open_url(url: str, opening: _Opening) -> VideoFile | LiveSource:
     """A recording when the stream knows how many frames it has, else a live source."""
     if url.split(":", 1)[0].lower() not in SCHEMES:
         raise SourceError(
             "this kind of URL cannot be read", where=url, expected=f"one of {', '.join(SCHEMES)}"
         )
-    capture = factory(url)
+    capture = opening.factory(url)
     if not capture.isOpened():
         raise SourceError(
             "the URL cannot be opened, or what it gives is not a video",
@@ -115,24 +112,21 @@ def _open_url(
             hint="check the address and the network",
         )
     if announced_frames(capture):
-        return VideoFile(url, capture, every=every, fps=fps)
-    return _live(url, capture, url, every, fps, factory, patience_s)
+        return VideoFile(url, capture, every=opening.every, fps=opening.fps)
+    return opening.live(url, capture, url)
 
 
-def _open_path(
-    path: Path, every: int, fps: float | None, factory: CaptureFactory, patience_s: float
-) -> VideoSource:
+def _open_path(path: Path, opening: _Opening) -> VideoSource:
     try:
         if path.is_dir():
-            return open_folder(path, every=every, fps=fps)
+            return open_folder(path, every=opening.every, fps=opening.fps)
         if path.is_char_device():
-            camera = _camera(str(path), factory)
-            return _live(str(path), camera, str(path), every, fps, factory, patience_s)
+            return opening.live(str(path), _camera(str(path), opening.factory), str(path))
         regular, exists = path.is_file(), path.exists()
     except (OSError, ValueError) as e:  # a name that is too long or has a NUL in it
         raise SourceError("this is not a usable file name", where=str(path)) from e
     if regular:
-        return open_file(path, every=every, fps=fps, factory=factory)
+        return open_file(path, every=opening.every, fps=opening.fps, factory=opening.factory)
     if exists:
         raise SourceError("it is neither a file nor a folder", where=str(path))
     raise SourceError(
@@ -145,11 +139,9 @@ def _open_path(
 
 def _nearest(path: Path) -> str:
     """The file of the same folder whose name comes closest, if one does."""
-    import difflib
-
     try:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:
         return f"there is no folder {path.parent} that can be read"
-    close = difflib.get_close_matches(path.name, names, n=1)
-    return f"did you mean {path.parent / close[0]}?" if close else "check the name"
+    near = closest(path.name, names)
+    return f"did you mean {path.parent / near}?" if near else "check the name"

@@ -36,7 +36,7 @@ class VideoSource(ABC, Iterator[Frame]):
         size: (width, height) pixels.
         frame_count: Frames of the source before `every`, or None when unknown; for video files it
             is what the container announces, which may be a little off.
-        live: Whether frames are made while they are read.
+        live: Whether frames are made while they are read; so for a whole kind of source.
         notes: Sentences about what had to be assumed.
         ended: How it ended, or None while frames may still come.
         problem: Why it is truncated, one sentence, or None.
@@ -47,9 +47,10 @@ class VideoSource(ABC, Iterator[Frame]):
         size: (width, height) pixels.
         frame_count: Frames, or None when unknown.
         every: Only every n-th frame is given.
-        live: Whether frames are made while they are read.
         notes: Sentences about what had to be assumed.
     """
+
+    live = False
 
     def __init__(
         self,
@@ -59,7 +60,6 @@ class VideoSource(ABC, Iterator[Frame]):
         size: tuple[int, int],
         frame_count: int | None,
         every: int = 1,
-        live: bool = False,
         notes: tuple[str, ...] = (),
     ) -> None:
         self.name = name
@@ -67,7 +67,6 @@ class VideoSource(ABC, Iterator[Frame]):
         self.size = size
         self.frame_count = frame_count
         self.every = every
-        self.live = live
         self.notes = notes
         self.ended: Ending | None = None
         self.problem: str | None = None

@@ -22,7 +22,7 @@ from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.runtime.resume import evaluate_resume
-from visup.percepts.video.live_source import LiveSource
+from visup.percepts.video.live_source import LiveSource, Reconnection
 from visup.runs.checkpoints import CHECKPOINT
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.operator import HumanOperator
@@ -241,9 +241,9 @@ def test_a_camera_that_drops_comes_back_and_goes_on() -> None:
         "camera 0",
         FakeCapture(images[:3]),
         clock=lambda: next(clock),
-        reopen=lambda: later.pop(0) if later else FakeCapture([]),
-        patience_s=3.0,
-        wait=waited.append,
+        reconnection=Reconnection(
+            lambda: later.pop(0) if later else FakeCapture([]), 3.0, waited.append
+        ),
     )
     source.notify = said.append
     frames: list[Frame] = []

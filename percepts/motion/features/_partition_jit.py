@@ -35,9 +35,25 @@ def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
     first, last = np.full(LEVELS, -1, np.int32), np.full(LEVELS, -1, np.int32)
     marks[0], marks[height - 1] = LINE, LINE
     marks[:, 0], marks[:, width - 1] = LINE, LINE
+    # In a function of its own this loop takes an eighth longer: it is called for each pixel.
     for y in range(1, height - 1):
         for x in range(1, width - 1):
-            _queue_beside_seeds(flat, east, south, first, last, np.uint64(y * width + x))
+            p = np.uint64(y * width + x)
+            if flat[p] != 0:
+                continue
+            edge = np.uint8(LEVELS - 1)
+            west, right_of = flat[p - one] > 0, flat[p + one] > 0
+            above, below = flat[p - row] > 0, flat[p + row] > 0
+            if west:
+                edge = min(edge, east[p - one])
+            if right_of:
+                edge = min(edge, east[p])
+            if above:
+                edge = min(edge, south[p - row])
+            if below:
+                edge = min(edge, south[p])
+            if west or right_of or above or below:
+                _queue(flat, first, last, p, np.uint64(edge))
     lowest = np.uint64(0)
     while True:
         while lowest < np.uint64(LEVELS) and first[lowest] < 0:
@@ -56,29 +72,6 @@ def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
         lowest = _come_to(flat, first, last, p + one, east[p], lowest)
         lowest = _come_to(flat, first, last, p - row, south[p - row], lowest)
         lowest = _come_to(flat, first, last, p + row, south[p], lowest)
-
-
-@compiled
-def _queue_beside_seeds(
-    flat: Labels, east: Bytes, south: Bytes, first: Labels, last: Labels, p: np.uint64
-) -> None:
-    """Queue a pixel that is free and has a seed beside it, by the least edge to one."""
-    if flat[p] != 0:
-        return
-    one, row = np.uint64(1), np.uint64(len(east) - len(south))  # all but one row have one below
-    edge = np.uint8(LEVELS - 1)
-    west, right_of = flat[p - one] > 0, flat[p + one] > 0
-    above, below = flat[p - row] > 0, flat[p + row] > 0
-    if west:
-        edge = min(edge, east[p - one])
-    if right_of:
-        edge = min(edge, east[p])
-    if above:
-        edge = min(edge, south[p - row])
-    if below:
-        edge = min(edge, south[p])
-    if west or right_of or above or below:
-        _queue(flat, first, last, p, np.uint64(edge))
 
 
 @compiled

@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypedDict, Unpack
 
 import cv2
 import numpy as np
@@ -174,16 +175,29 @@ def silhouette_views(
     ]
 
 
+class BuildOptions(TypedDict, total=False):
+    """What may be asked of a build.
+
+    Attributes:
+        views: Views of each mesh, before symmetric ones are merged; `VIEWS` unless told.
+        seed: Turns the directions of the views; 0, as usual, leaves them.
+        clusters: Exemplars of each name's silhouettes; `CLUSTERS` unless told.
+        jobs: Processes; one unless told.
+    """
+
+    views: int
+    seed: int
+    clusters: int
+    jobs: int
+
+
 def build_database(
     path: Path | str,
     meshes: Sequence[Path],
     silhouettes: Mapping[str, Sequence[NDArray[np.bool_]]] = MappingProxyType({}),
     *,
-    views: int = VIEWS,
-    seed: int = 0,
-    clusters: int = CLUSTERS,
-    jobs: int = 1,
     progress: Progress | None = None,
+    **options: Unpack[BuildOptions],
 ) -> ModelDatabase:
     """Build a database from mesh files; each model's name is its file's stem.
 
@@ -194,11 +208,8 @@ def build_database(
         path: Where the database is written; what stands there is replaced when all is done.
         meshes: Mesh files with different stems.
         silhouettes: Name -> masks (H, W) bool, whole pictures; their exemplars are added to that name.
-        views: Views of each mesh, before symmetric ones are merged.
-        seed: Turns the directions of the views; 0 leaves them.
-        clusters: Exemplars of each name's silhouettes.
-        jobs: Processes.
         progress: Told of views done.
+        options: See `BuildOptions`.
 
     Returns:
         The database; the same bytes for the same input, whatever `jobs` is and however often the
@@ -209,19 +220,20 @@ def build_database(
         DatabaseError: A mesh cannot be read, or the file cannot be written.
         ExtraMissingError: What renders meshes is not installed.
     """
+    views, jobs = options.get("views", VIEWS), options.get("jobs", 1)
     _check_names(meshes)
     if not 1 <= views <= 10_000:
         raise SettingsError(f"{views} views of each mesh were asked for", expected="1 to 10000")
     target = Path(path)
     folder = building_folder(target)
-    every = [parts_of(mesh, folder, views, seed) for mesh in meshes]
+    every = [parts_of(mesh, folder, views, options.get("seed", 0)) for mesh in meshes]
     _make([p for parts in every for p in parts], jobs, progress)
 
     def stored() -> Iterator[NewView]:
         for parts in every:
             yield from merge_symmetric([v for part in parts for v in read_part(part)])
         for name, masks in silhouettes.items():
-            yield from silhouette_views(name, masks, clusters)
+            yield from silhouette_views(name, masks, options.get("clusters", CLUSTERS))
 
     built = ModelDatabase.create(target, stored())
     shutil.rmtree(folder, ignore_errors=True)

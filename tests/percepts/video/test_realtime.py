@@ -103,8 +103,10 @@ def test_what_was_dropped_long_ago_is_told_no_more() -> None:
 class Steps(VideoSource):
     """A live source that delivers a frame each time that it is let."""
 
+    live = True
+
     def __init__(self, count: int, fault: Exception | None = None) -> None:
-        super().__init__("camera", fps=25.0, size=(4, 4), frame_count=None, live=True)
+        super().__init__("camera", fps=25.0, size=(4, 4), frame_count=None)
         self.count, self.fault, self.at = count, fault, 0
         self.let = threading.Semaphore(0)
         self.released = False
