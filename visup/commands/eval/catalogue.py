@@ -118,7 +118,7 @@ EVALUATIONS = (
     EvaluationCommand(
         "robustness",
         "Damaged database files and odd masks: a clear error, an answer or nothing, within a second.",
-        "visup.evaluation.shape.robustness:evaluate_robustness",
+        "tests.oracles.shape.robustness:evaluate_robustness",
         "damaging",
         ("trials", "refused", "answered", "nothing", "failed", "worst_s"),
         (
@@ -150,7 +150,7 @@ EVALUATIONS = (
 
         Exit code: 0 when that is so, else 1.
         """,
-        "visup.evaluation.runtime.behaviour_faults:evaluate_faults",
+        "tests.oracles.runtime.behaviour_faults:evaluate_faults",
         "injecting",
         ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
         (_count("count", 1000, "How many faults are injected."), _SEED),
@@ -160,7 +160,7 @@ EVALUATIONS = (
     EvaluationCommand(
         "relations",
         "Relations of boxes: frames per second, changes of what rests, drift, oracles.",
-        "visup.evaluation.reasoning.relations:evaluate_relations",
+        "tests.oracles.reasoning.relations:evaluate_relations",
         "judging",
         ("fps", "fps_cpu", "plain_fps", "ratio", "changes", "seen_s"),
         (
@@ -174,7 +174,7 @@ EVALUATIONS = (
     EvaluationCommand(
         "rules",
         "Rules over time: equal to an oracle and to rtamt, cost of windows, of rules, of snapshots.",
-        "visup.evaluation.reasoning.rules:evaluate_rules",
+        "tests.oracles.reasoning.rules:evaluate_rules",
         "judging",
         (
             *("formulas", "samples", "online", "different", "us", "samples_per_s", "times_rtamt"),
@@ -211,7 +211,7 @@ EVALUATIONS = (
     EvaluationCommand(
         "tasks",
         "Damage task files and read them; time long files and a usual one.",
-        f"{_ADAPTERS}:tasks",
+        "tests.oracles.reasoning.task_files:evaluate_tasks",
         "damaging",
         (),
         (
