@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.oracles.relation_oracles import plain_relations, qtc_by_definition
-from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
-from visup.evaluation.reasoning.relations import (
+from tests.oracles.reasoning.relations import (
     SCENES,
     changes,
     drift_seen,
@@ -17,6 +15,8 @@ from visup.evaluation.reasoning.relations import (
     qtc_wrong,
     rcc8_wrong,
 )
+from tests.oracles.relation_oracles import plain_relations, qtc_by_definition
+from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
 from visup.rules.geometry.hysteresis import UNKNOWN
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import RCC8, Floats
@@ -31,7 +31,8 @@ from visup.rules.relations.direction import CONVERSE, DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
 from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import rcc8
-from visup.rules.relations.thresholds import AWAY, DIRECTION, DISTANCE, SIDE, ThresholdSettings
+from visup.rules.relations.rows import AWAY, DIRECTION, DISTANCE, SIDE
+from visup.rules.relations.thresholds import ThresholdSettings
 
 A = (100.0, 200.0, 80.0, 60.0)
 MIRROR = {"converging": "diverging", "diverging": "converging"}
