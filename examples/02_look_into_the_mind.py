@@ -1,15 +1,10 @@
-"""Step the agent until an object is identified, then look at what it believes and why."""
+"""Watch until an object is identified, then look at what is believed and why."""
 
 from __future__ import annotations
 
+import visup
 from visup.agent import ObjectBelief
-from visup.agent.model.step import Step
 from visup.runs.demo import demo_settings
-from visup.runs.wiring import build_agent, open_video
-
-
-def identified(step: Step) -> bool:
-    return any(event.kind == "identified" for event in step.events)
 
 
 def describe(belief: ObjectBelief) -> str:
@@ -18,12 +13,10 @@ def describe(belief: ObjectBelief) -> str:
 
 
 if __name__ == "__main__":
-    settings = demo_settings(every=2)
-    agent = build_agent(settings)
-    with open_video(settings) as source:
-        last = agent.run(source, until=identified)
-    print(f"frame {agent.mind.frame_index}, {agent.mind.time:.1f} s")
-    for belief in agent.mind.objects.values():
+    with visup.watch(demo_settings(every=2)) as run:
+        step = next(s for s in run if any(e.kind == "identified" for e in s.events))
+    print(f"frame {step.frame_index}, {step.time:.1f} s")
+    for belief in step.mind.objects.values():
         print(" ", describe(belief))
-    for relation in agent.mind.relations:
+    for relation in step.mind.relations:
         print(" ", relation.name, relation.objects, relation.truth.value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from visup.percepts.shape.database.model_database import ModelDatabase
+import visup
 from visup.runs.demo import demo_settings
 
 if __name__ == "__main__":
@@ -15,5 +15,5 @@ if __name__ == "__main__":
     path = demo_settings().models
     if path is None:
         raise SystemExit("the demo has no model database")
-    for match in ModelDatabase.open(path).query(silhouette > 0, top=5).matches:
+    for match in visup.ModelDatabase.open(path).query(silhouette > 0, top=5).matches:
         print(f"{match.similarity:.3f}  {match.view.name}, view {match.view.number}")

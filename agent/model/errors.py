@@ -46,6 +46,9 @@ class VisupError(Exception):
         hint: What to do about it.
     """
 
+    code: str | None = None
+    """The stable code of what is wrong, where there is one."""
+
     def __init__(
         self,
         what: str,
