@@ -178,7 +178,7 @@ class Recorder:
                 self.notes = (*self.notes, said)
 
     def _report(self, result: RunResult) -> Path | None:
-        from visup.report.html import write_report
+        from visup.report.page.html import write_report
 
         if not self._wants_report:
             return None

@@ -40,7 +40,7 @@ Recorded = Sequence[tuple[float, Observe]]
 
 
 @dataclass(frozen=True, slots=True)
-class Distance:
+class FilterDistance:
     """How far two posteriors of stages are from each other over time.
 
     Attributes:
@@ -54,7 +54,7 @@ class Distance:
     lost: float = 0.0
 
 
-def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> Distance:
+def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> FilterDistance:
     """How far supervision is from the posterior with each history by itself.
 
     Args:
@@ -69,7 +69,7 @@ def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> Distanc
         told = model.filter.step(told, observe, now - told.time, now)
         true = certified.step(true, observe, now - true.time, now)
         differences.append(_apart(dict(model.filter.ranking(told)), dict(certified.ranking(true))))
-    return Distance(max(differences), sum(differences) / len(differences), true.lost)
+    return FilterDistance(max(differences), sum(differences) / len(differences), true.lost)
 
 
 def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
@@ -77,7 +77,7 @@ def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
     return max(abs(one.get(k, 0.0) - other.get(k, 0.0)) for k in {*one, *other})
 
 
-def drawn_distance(seed: int) -> Distance:
+def drawn_distance(seed: int) -> FilterDistance:
     """How far supervision is from certified on a random grammar with observations of no course."""
     rng = random.Random(seed)
     task = read(recognition_tasks.text_of(recognition_tasks.Draw(rng).rules()))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from visup.report.figures import MOST_FIGURES, Figure, rounded, time_layout
+from visup.report.page.figures import MOST_FIGURES, Figure, rounded, time_layout
+from visup.report.page.summary import called, span_sentence
 from visup.report.records import RunData, StateSpan
-from visup.report.summary import called, span_sentence
 
 MOVE_COLOURS = {"converging": "#009e73", "diverging": "#d55e00", "keeping_distance": "#8a8f98"}
 FEWEST_POINTS = 3

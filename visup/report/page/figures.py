@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from visup.agent import Severity, Status
+from visup.report.page.summary import name_of, span_sentence
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, css, object_colour
 from visup.report.records import ReportedObject, RunData, StateSpan
-from visup.report.summary import name_of, span_sentence
 
 CANDIDATE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8a8f98")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")

@@ -9,10 +9,8 @@ from typing import Any
 from urllib.parse import quote
 
 from visup.agent import Alert, Event, Severity, StageBelief, TaskBelief
-from visup.report.figures import Figure
-from visup.report.palette import OBJECT_COLOURS, css, object_colour
-from visup.report.records import KeyFrame, RegionCloseup, RunData
-from visup.report.summary import (
+from visup.report.page.figures import Figure
+from visup.report.page.summary import (
     SEVERITY_WORDS,
     called,
     picture_words,
@@ -20,6 +18,8 @@ from visup.report.summary import (
     summary,
     verdict_words,
 )
+from visup.report.palette import OBJECT_COLOURS, css, object_colour
+from visup.report.records import KeyFrame, RegionCloseup, RunData
 
 MARKS = {Severity.INFO: "•", Severity.WARNING: "▲", Severity.CRITICAL: "◆"}
 MOST_COMPARED = 10

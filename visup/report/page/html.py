@@ -9,12 +9,12 @@ from pathlib import Path
 from string import Template
 
 from visup.agent.model.errors import ExtraMissingError, OutputError
-from visup.report import sections
-from visup.report.distance_figures import distance_figures
-from visup.report.figures import Figure, presence_figure, stage_figure, vote_figures
+from visup.report.page import sections
+from visup.report.page.distance_figures import distance_figures
+from visup.report.page.figures import Figure, presence_figure, stage_figure, vote_figures
+from visup.report.page.summary import title_of, verdict_words
+from visup.report.page.task_trees import courses
 from visup.report.records import RunData
-from visup.report.summary import title_of, verdict_words
-from visup.report.task_trees import courses
 from visup.wording import prose
 
 
@@ -58,7 +58,7 @@ def report_page(run: RunData) -> str:
     stages, presence = stage_figure(run), presence_figure(run)
     distances, votes = distance_figures(run), vote_figures(run)
     drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
-    own = files("visup.report")
+    own = files("visup.report.page")
     page = Template((own / "report.html").read_text(encoding="utf-8"))
     text = {
         "title": escape(title_of(run)),

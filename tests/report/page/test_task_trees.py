@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from tests.report.scene import run
 from visup.agent import Status
 from visup.report.collector import Collector
-from visup.report.html import report_page
+from visup.report.page.html import report_page
+from visup.report.page.task_trees import changes, courses
 from visup.report.records import RunData, StateSpan
-from visup.report.task_trees import changes, courses
 from visup.tasks.checks.load import parse_task
 from visup.tasks.tools.outline import Branch, outline
 

@@ -20,12 +20,12 @@ from tests.report.scene import TOLD, run
 from visup.agent import Event, Severity, Verdict
 from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.report.collector import Collector
-from visup.report.distance_figures import distance_figures, fitted_lines
-from visup.report.figures import vote_figures
-from visup.report.html import embedded, plotly_source, report_page, write_report
+from visup.report.page.distance_figures import distance_figures, fitted_lines
+from visup.report.page.figures import vote_figures
+from visup.report.page.html import embedded, plotly_source, report_page, write_report
+from visup.report.page.sections import flat, narrative, nearest
+from visup.report.page.summary import summary, title_of, verdict_words
 from visup.report.records import RunData, StateSpan
-from visup.report.sections import flat, narrative, nearest
-from visup.report.summary import summary, title_of, verdict_words
 
 EVIL = "<script>alert('x')</script> & \"quotes\""
 VOID = frozenset({"meta", "img", "br", "link", "input", "hr"})
