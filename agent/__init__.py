@@ -10,13 +10,14 @@ Rooms, in the order in which to read them:
 6. `storage/`: journals and checkpoints.
 """
 
+from dataclasses import is_dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.contract.saving import Saveable
 from visup.agent.model.display import enable_display
 from visup.agent.model.errors import VisupError
@@ -73,6 +74,7 @@ _LAZY = {
 
 __all__ = [
     "Agent",
+    "AgentSnapshot",
     "Alert",
     "AlertCondition",
     "Behaviour",
@@ -112,7 +114,6 @@ __all__ = [
     "ReportState",
     "Saveable",
     "Severity",
-    "Snapshot",
     "Spin",
     "StageBelief",
     "Status",
@@ -134,35 +135,7 @@ if not TYPE_CHECKING:  # else every name would be there for checkers
         return getattr(import_module(_LAZY[name]), name)
 
 
-_RECORDS = (
-    Alert,
-    Binding,
-    Candidate,
-    AlertCondition,
-    Coupling,
-    Depth,
-    Directive,
-    Event,
-    Expectation,
-    Frame,
-    Health,
-    Hypothesis,
-    Mind,
-    ObjectBelief,
-    Observation,
-    Outcome,
-    Percept,
-    Pose,
-    Question,
-    Region,
-    Prospect,
-    Relation,
-    RelationTable,
-    Report,
-    Spin,
-    StageBelief,
-    TaskBelief,
-    Zone,
-    Step,
+_NOT_SHOWN = {AgentSnapshot, Column, Contract, Limits, MemoryKey, PastFrame}
+enable_display(
+    *{k for k in list(vars().values()) if isinstance(k, type) and is_dataclass(k)} - _NOT_SHOWN
 )
-enable_display(*_RECORDS)

@@ -1,11 +1,11 @@
-"""Interpreting: from what was seen to what is going on (paper, section 5 and part of 7.4).
+"""Reasoning: from what was perceived to what is going on (paper, section 5 and part of 7.4).
 
-Read in this order: `reasoners.py` (everything, in the order in which it runs), `objects.py` and
-`presence.py` (who is there; one idea each in `adoption.py`, `merging.py`, `fragments.py`,
-`entering.py` and `vanishing.py`), `votes.py` (who is who), `pose.py` with
-`interpretation.py` and `spin.py` (which way it faces, how it turns), `relations.py` and `coupling.py` (what
-holds between them), `safety.rules` and `rules.lark` (what to watch for, and the language that says
-so), `program.py`, `layout.py` and `machine.py` (how it is judged), `sentences.py` (how it is told).
-Below them lie `history.py` and `measure.py` (samples and quantities) and `geometry.py`,
-`fit_loops.py`, `latch.py` (the mathematics).
+Read in this order: `reasoners.py` (all reasoners, in the order in which they run), then the rooms:
+`presence` (who is there), `identity` (who is who), `pose` (which way it faces, how it turns),
+`relations` (what holds between objects) and `coupling` (which move as one body); `formula`, `language`,
+`predicates`, `monitoring` and `safety` (what rules watch for, the language that says so, how they are
+judged); `activation` (which behaviours are needed) and `wording` (sentences, and conditions in words).
+Below them lies `geometry` (outlines, fits, hysteresis).
+
+A decision and its explanation are the same conditions: `wording/conditions.py`.
 """

@@ -5,20 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from visup.agent import Reasoner
-from visup.rules.coupling.reasoner import CouplingReasoner, CouplingSettings
+from visup.rules.coupling import CouplingReasoner, CouplingSettings
 from visup.rules.formula.nodes import Rule
-from visup.rules.identity.depth import DepthReasoner, DepthSettings
-from visup.rules.identity.questions import QuestionReasoner, QuestionSettings
-from visup.rules.identity.votes import IdentityReasoner, VoteSettings
+from visup.rules.identity import (
+    DepthReasoner,
+    DepthSettings,
+    IdentityReasoner,
+    QuestionReasoner,
+    QuestionSettings,
+    VoteSettings,
+)
 from visup.rules.language.parser import shipped_rules
-from visup.rules.pose.reasoner import PoseReasoner, PoseSettings
-from visup.rules.presence.objects import ObjectReasoner, ObjectSettings
-from visup.rules.presence.reasoner import PresenceReasoner, PresenceSettings
-from visup.rules.relations.kinematics import RelationSettings
-from visup.rules.relations.reasoner import RelationReasoner
-from visup.rules.relations.zones import ZoneReasoner, ZoneSettings
+from visup.rules.pose import PoseReasoner, PoseSettings
+from visup.rules.presence import (
+    ObjectReasoner,
+    ObjectSettings,
+    PresenceReasoner,
+    PresenceSettings,
+)
+from visup.rules.relations import RelationReasoner, RelationSettings, ZoneReasoner, ZoneSettings
 from visup.rules.safety.reasoner import RuleReasoner
-from visup.rules.wording.relation_events import RelationEventReasoner, RelationEventSettings
+from visup.rules.wording import RelationEventReasoner, RelationEventSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,11 @@ phases of a step) and `saving.py` (behaviours whose state can be saved).
 from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.contract.saving import Saveable
 
 __all__ = [
+    "AgentSnapshot",
     "Behaviour",
     "Contract",
     "Limits",
@@ -19,5 +20,4 @@ __all__ = [
     "Phase",
     "Reasoner",
     "Saveable",
-    "Snapshot",
 ]

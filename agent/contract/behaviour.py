@@ -49,7 +49,7 @@ class Outcome:
     Attributes:
         mind: The mind after it.
         events: What happened.
-        concerns: Reasons for alerts that hold now; an alert whose concern is not renewed is closed.
+        conditions: Reasons for alerts that hold now; an alert whose condition is not renewed is closed.
         directives: What is asked of behaviours.
     """
 

@@ -22,7 +22,7 @@ class Phase(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Snapshot:
+class AgentSnapshot:
     """All that an agent has come to believe and ask for: with what was perceived since, its later steps.
 
     What behaviours hold is not part of it: they are not needed to think again about what was

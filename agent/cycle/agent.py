@@ -9,7 +9,7 @@ from typing import Any
 
 from visup.agent.contract.behaviour import Behaviour, Outcome, Reasoner
 from visup.agent.contract.limits import Limits
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.contract.saving import Saveable
 from visup.agent.cycle.alerts import alert_events, fault_conditions, update_alerts
 from visup.agent.cycle.answers import apply_answers, resolve_answer
@@ -109,7 +109,7 @@ class Agent:
         return perceive(self._slots, frame, self.directives)
 
     def reason(self, observation: Observation, answers: Mapping[int, str] | None = None) -> Step:
-        """Reason about what was perceived, now or in a recorded run; observers are not told.
+        """Reason about what was perceived, now or in a recorded run; observers are not called.
 
         Args:
             observation: What was perceived of the next frame.
@@ -140,9 +140,9 @@ class Agent:
             frame_index=observation.frame_index,
             frame_size=observation.frame_size,
         )
-        begin, told = apply_answers(begin, self._answers if answers is None else answers)
+        begin, answered = apply_answers(begin, self._answers if answers is None else answers)
         self._answers = {}
-        outcome = Outcome(begin, told)
+        outcome = Outcome(begin, answered)
         for phase, reasoners in self.reasoners.by_phase():
             for reasoner in reasoners:
                 try:
@@ -153,17 +153,19 @@ class Agent:
                     # The half-made mind is dropped: beliefs stay as they were and count as unknown.
                     yield (
                         phase,
-                        replace(_failed_outcome(begin, observation, reasoner, fault), events=told),
+                        replace(
+                            _failed_outcome(begin, observation, reasoner, fault), events=answered
+                        ),
                     )
                     return
             yield phase, outcome
 
     def act(self, observation: Observation, thought: Outcome) -> Step:
         """The last phase: alerts and directives; what was thought becomes the mind."""
-        concerns = (*thought.conditions, *fault_conditions(observation))
+        conditions = (*thought.conditions, *fault_conditions(observation))
         alerts, opened, closed = update_alerts(
             self.mind.alerts,
-            concerns,
+            conditions,
             observation.time,
             self._alerts_opened + 1,
             thought.mind.unknown,
@@ -185,12 +187,12 @@ class Agent:
         self.mind, self.directives = step.mind, step.directives
         return step
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> AgentSnapshot:
         """What it believes now, to go back to with `restore`; a few references, no copy."""
         answers = MappingProxyType(dict(self._answers))
-        return Snapshot(self.mind, self.directives, self._alerts_opened, answers)
+        return AgentSnapshot(self.mind, self.directives, self._alerts_opened, answers)
 
-    def restore(self, was: Snapshot) -> None:
+    def restore(self, was: AgentSnapshot) -> None:
         """Believe again what it, or another agent, believed then; behaviours stay as they are."""
         self.mind, self.directives = was.mind, was.directives
         self._alerts_opened, self._answers = was.alerts_opened, dict(was.answers)
@@ -223,7 +225,7 @@ class Agent:
         return (self.step(frame) for frame in frames)
 
     def answer(self, object_id: int, name: str) -> None:
-        """Say what an object is; a fact from the next step on, told by an 'answer' event.
+        """Say what an object is; a fact from the next step on, reported by an 'answer' event.
 
         Args:
             object_id: The object.
@@ -241,10 +243,10 @@ class Agent:
             `mind`, and `behaviours` by name, or None when one of them cannot tell its state.
         """
         whole = all(s.is_saveable for s in self._slots)
-        kept = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.is_saveable}
+        saveable = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.is_saveable}
         return {
             "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
-            "behaviours": {n: _saved(b) for n, b in kept.items()} if whole else None,
+            "behaviours": {n: _saved(b) for n, b in saveable.items()} if whole else None,
             "slots": {s.behaviour.contract.name: s.state_dict() for s in self._slots},
         }
 
@@ -272,7 +274,7 @@ def _failed_outcome(
     mind: Mind, observation: Observation, reasoner: Reasoner, fault: BaseException
 ) -> Outcome:
     name = getattr(reasoner, "__name__", type(reasoner).__name__)
-    concern = AlertCondition(
+    condition = AlertCondition(
         "reasoning_failed",
         (),
         Severity.CRITICAL,
@@ -286,4 +288,4 @@ def _failed_outcome(
         for a in mind.alerts
     )
     unknown = frozenset(kind for r in observation.reports for kind in r.gives)
-    return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, concern))
+    return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, condition))

@@ -1,4 +1,4 @@
-"""The last phase of a step: alerts open, are renewed, and close, as concerns come and go."""
+"""The last phase of a step: alerts open, are renewed, and close, as conditions come and go."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import FAULT_STATES, Observation, ReportState
 
 GRACE_S = 1.0
-"""A concern may be silent this long before its alert closes: alerts must not flicker."""
+"""A condition may be silent this long before its alert closes: alerts must not flicker."""
 
 SETTLE_S = 3.0
 """After a kind of percept was unknown, rules need so long to see again what they had seen; until
@@ -25,7 +25,7 @@ def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
             "behaviour_failed",
             (),
             Severity.WARNING,
-            f"The behaviour '{r.behaviour}' {_ails(r.state)}; its output is unavailable.",
+            f"The behaviour '{r.behaviour}' {_failure(r.state)}; its output is unavailable.",
             (r.error,),
             key=r.behaviour,
             needs=(),
@@ -35,22 +35,22 @@ def fault_conditions(observation: Observation) -> tuple[AlertCondition, ...]:
     )
 
 
-def _ails(state: ReportState) -> str:
+def _failure(state: ReportState) -> str:
     return "gave no answer in time" if state is ReportState.LATE else "failed"
 
 
 def update_alerts(
     alerts: Sequence[Alert],
-    concerns: Iterable[AlertCondition],
+    conditions: Iterable[AlertCondition],
     time: float,
     next_id: int,
     unknown: frozenset[str] = frozenset(),
 ) -> tuple[tuple[Alert, ...], tuple[Alert, ...], tuple[Alert, ...]]:
-    """Alerts after the concerns of one step.
+    """Alerts after the conditions of one step.
 
     Args:
         alerts: Those that were open, in the order in which they opened.
-        concerns: Those that hold now; of two alike the graver stays.
+        conditions: Those that hold now; of two alike the graver stays.
         time: Seconds.
         next_id: Number of the next alert that opens.
         unknown: Kinds of percept that are unknown now: an alert that needs one of them stays open,
@@ -59,13 +59,13 @@ def update_alerts(
     Returns:
         The alerts that are open now, those that opened, those that closed.
     """
-    fresh = _by_key(concerns)
+    fresh = _by_key(conditions)
     still: list[Alert] = []
     closed: list[Alert] = []
     for alert in alerts:
-        concern = fresh.pop(_key(alert), None)
-        if concern is not None:
-            still.append(_renew(alert, concern, time))
+        condition = fresh.pop(_key(alert), None)
+        if condition is not None:
+            still.append(_renew(alert, condition, time))
             continue
         silent = _unsure(alert, unknown, time)
         if _is_over(silent, time):
@@ -99,34 +99,34 @@ def _key(it: Alert | AlertCondition) -> Key:
     return it.kind, it.objects, it.key
 
 
-def _by_key(concerns: Iterable[AlertCondition]) -> dict[Key, AlertCondition]:
+def _by_key(conditions: Iterable[AlertCondition]) -> dict[Key, AlertCondition]:
     now: dict[Key, AlertCondition] = {}
-    for concern in concerns:
-        held = now.setdefault(_key(concern), concern)
-        if concern.severity > held.severity:
-            now[_key(concern)] = concern
+    for condition in conditions:
+        held = now.setdefault(_key(condition), condition)
+        if condition.severity > held.severity:
+            now[_key(condition)] = condition
     return now
 
 
-def _open(concern: AlertCondition, time: float, number: int) -> Alert:
+def _open(condition: AlertCondition, time: float, number: int) -> Alert:
     return Alert(
         id=number,
-        kind=concern.kind,
-        severity=concern.severity,
+        kind=condition.kind,
+        severity=condition.severity,
         opened=time,
         updated=time,
-        objects=concern.objects,
-        cause=concern.cause,
-        evidence=concern.evidence,
-        key=concern.key,
-        needs=concern.needs,
+        objects=condition.objects,
+        cause=condition.cause,
+        evidence=condition.evidence,
+        key=condition.key,
+        needs=condition.needs,
     )
 
 
-def _renew(alert: Alert, concern: AlertCondition, time: float) -> Alert:
+def _renew(alert: Alert, condition: AlertCondition, time: float) -> Alert:
     # The cause keeps its first wording, so that the narrative and the report tell one story.
-    severity = max(alert.severity, concern.severity)
-    return replace(alert, severity=severity, updated=time, evidence=concern.evidence)
+    severity = max(alert.severity, condition.severity)
+    return replace(alert, severity=severity, updated=time, evidence=condition.evidence)
 
 
 def _unsure(alert: Alert, unknown: frozenset[str], time: float) -> Alert:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from types import MappingProxyType
 
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Event
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
+from visup.agent.model.suggestions import did_you_mean
 
 NOBODY = ("unknown", UNKNOWN_OBJECT)
 """Answers that say that an object is none of the models."""
@@ -61,11 +61,10 @@ def resolve_model(
     meant |= {_plain(actor): _model(found, own) for actor, found in mind.actors.items() if found}
     if _plain(said) in meant:
         return meant[_plain(said)]
-    close = get_close_matches(_plain(said), meant, n=1)
     raise SettingsError(
         f"nobody knows a '{said}': there is no such model or actor",
         expected=f"one of: {', '.join([*sorted(meant), 'unknown'])}",
-        hint=f"did you mean '{close[0]}'?" if close else None,
+        hint=did_you_mean(_plain(said), meant),
     )
 
 

@@ -1,7 +1,7 @@
 """The first phase of a step: the behaviours run on the frame, each contained.
 
 A behaviour that raises, hangs or breaks its contract never reaches the mind: its report says so,
-and its output is unavailable. `slot.py` has one behaviour, `limits.py` the policy.
+and its output is unavailable. `behaviour_slot.py` has one behaviour, `limits.py` the policy.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The frame goes over shared memory, everything else as messages. The process is started by a server
 that has the libraries loaded already where the platform has one (`forkserver`), else afresh
 (`spawn`). A process that hangs or dies is replaced by a new one, whose behaviour is as it was when
-it was plugged in: what it had learnt is lost. `isolated.py` is the other end.
+it was plugged in: what it had learnt is lost. `worker.py` is the other end.
 """
 
 from __future__ import annotations

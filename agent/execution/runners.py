@@ -1,6 +1,6 @@
 """Running a behaviour on a frame: in the caller's thread, or in a thread that can be given up.
 
-`isolation.py` has the third way, a process of its own. All three keep one protocol, `Runner`.
+`process_runner.py` has the third way, a process of its own. All three keep one protocol, `Runner`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The other end of `isolation.py`: what runs in the process of an isolated behaviour."""
+"""The other end of `process_runner.py`: what runs in the process of an isolated behaviour."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Observation, PastFrame, Percept
 from visup.agent.plugins.factory import import_file
 
-_TOLD = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)
-_TOLD_TOO = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
+_SOME = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)
+_MORE = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
 EXCEPTIONS: Mapping[str, type[Exception]] = MappingProxyType(
-    {kind.__name__: kind for kind in (*_TOLD, *_TOLD_TOO)}
+    {kind.__name__: kind for kind in (*_SOME, *_MORE)}
 )
 """Exceptions that are told by their own names; all others come as `BehaviourError`."""
 
@@ -93,7 +93,7 @@ def serve(pipe: Connection, parcel: PackedBehaviour, memory_mb: float) -> None:
         start_behaviour(behaviour)
         _limit(memory_mb)
     except BaseException as fault:
-        _send(pipe, _told(fault))
+        _send(pipe, _failure_reply(fault))
         return
     _send(pipe, RunReply())
     past: deque[PastFrame] = deque(maxlen=parcel.contract.history)
@@ -113,10 +113,10 @@ def _answer(
         return RunReply(run_behaviour(behaviour, contract, frame, observation, request.directives))
     except BaseException as fault:
         # Whatever it is, it is the behaviour's failure; the supervisor decides what comes of it.
-        return _told(fault)
+        return _failure_reply(fault)
 
 
-def _told(fault: BaseException) -> RunReply:
+def _failure_reply(fault: BaseException) -> RunReply:
     if isinstance(fault, SystemExit | GeneratorExit | KeyboardInterrupt):
         return RunReply(fault=("", f"it called for an exit ({type(fault).__name__})"))
     kind, said = type(fault).__name__, error_line(fault)

@@ -46,6 +46,9 @@ class VisupError(Exception):
         hint: What to do about it.
     """
 
+    code: str | None = None
+    """The stable code of what is wrong, where there is one."""
+
     def __init__(
         self,
         what: str,
@@ -115,7 +118,7 @@ class ExtraMissingError(VisupError):
 
 
 class ErrorGroup(VisupError):
-    """All the faults of one file, told at once.
+    """All the faults of one file, reported together.
 
     Args:
         errors: At least one fault, in the order of their places.

@@ -102,7 +102,7 @@ class ObjectBelief:
         presence: Seen, hidden or left.
         first_seen: Seconds.
         last_seen: Seconds.
-        confirmed: Seen often enough to have had its entry told.
+        confirmed: Seen often enough for its entry to be reported.
         candidates: Identities, most likely first; empty while nothing is known.
         depth: Relative depth in the units of the best candidate's model, or None when unknown.
         depth_sigma: Standard deviation of `depth`.

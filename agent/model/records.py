@@ -4,7 +4,7 @@ Frames of reference: image coordinates are pixels with x to the right and y down
 centre of the top left pixel; boxes are half open (x, y, width, height); times are seconds since the
 start of the source; velocities are pixels per second. Arrays in records are never written to.
 
-Read next: `mind.py` (what is believed), then `agent.py` (the cycle).
+Read next: `events.py`, `mind.py` (what is believed), then `cycle/agent.py`.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class Column:
         confidence: Row of the numbers that say how sure the answer is, 0 to 1.
         value: Row of the quantity behind it, NaN unknown; or None.
         sigma: Row of its standard deviation, NaN unknown; or None.
-        listed: Which of its relations are told when a mind's relations are gone through: 'each'
+        listed: Which of its relations are given when a mind's relations are gone through: 'each'
             (true or false), 'one' (the one that holds), or 'none' (they are there to be asked for).
     """
 
@@ -120,7 +120,7 @@ class RelationBlock:
             self._number(column.sigma, k),
         )
 
-    def told(self, column: Column, pair: tuple[int, int], k: int) -> Iterator[Relation]:
+    def listed_of(self, column: Column, pair: tuple[int, int], k: int) -> Iterator[Relation]:
         """What is listed of one pair, as it stands; the converse can be asked for."""
         codes: Iterable[int] = range(len(column.names))
         if column.listed == "one":

@@ -184,7 +184,7 @@ class RelationTable(Sequence[Relation]):
             listed = [q for q in part.columns.each if q.listed != "none"]
             for k, pair in enumerate(self._pairs):
                 for column in listed:
-                    yield from part.told(column, pair, k)
+                    yield from part.listed_of(column, pair, k)
         yield from self.extra
 
     def __len__(self) -> int:

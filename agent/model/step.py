@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from visup.agent.model.display import drawn
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Alert, Directive, Event
 from visup.agent.model.mind import Mind
 from visup.agent.model.records import Frame, Observation, Report
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
+from visup.agent.model.suggestions import did_you_mean
 
 Values = dict[str, dict[str, Any]]
 """Name of a behaviour -> its settings."""
@@ -121,12 +121,11 @@ def _has(model: Any, key: str) -> bool:
 
 
 def _unknown(key: str, known: Mapping[str, object], name: str) -> VisupError:
-    near = get_close_matches(key, known, n=1)
     return SettingsError(
         f"behaviour '{name}' has no setting '{key}'",
         where=f"{name}.{key}",
         expected=f"one of: {', '.join(known)}" if known else "none",
-        hint=f"did you mean '{near[0]}'?" if near else None,
+        hint=did_you_mean(key, known),
     )
 
 

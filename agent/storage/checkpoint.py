@@ -31,14 +31,14 @@ _Node = Any
 
 
 class StateError(TypeError):
-    """A value is of a kind that cannot be kept."""
+    """A value is of a kind that cannot be saved."""
 
 
 def dump_state(value: Any) -> bytes:
     """A state as bytes.
 
     Raises:
-        StateError: It holds something that cannot be kept, such as a function or an open file.
+        StateError: It holds something that cannot be saved, such as a function or an open file.
     """
     writer = _StateWriter()
     root = writer.node(value)
@@ -62,7 +62,7 @@ def load_state(data: bytes) -> Any:
         table, root, shapes = json.loads(tree)
         return _StateReader(table, _arrays(shapes, body)).value(root)
     except (struct.error, ValueError, TypeError, KeyError, IndexError, AttributeError) as fault:
-        raise OutputError(f"a kept state cannot be read ({fault})") from fault
+        raise OutputError(f"a saved state cannot be read ({fault})") from fault
 
 
 @dataclass(slots=True)

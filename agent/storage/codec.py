@@ -54,7 +54,7 @@ def pack_observation(observation: Observation) -> bytes:
     """An observation as bytes.
 
     Args:
-        observation: What was perceived of one frame; times that behaviours took are not kept.
+        observation: What was perceived of one frame; times that behaviours took are left out.
 
     Returns:
         A compressed JSON document.
@@ -92,14 +92,14 @@ def to_document(observation: Observation) -> dict[str, Any]:
     }
 
 
-def from_document(told: Mapping[str, Any]) -> Observation:
-    """The observation of a document; reports whose values could not be kept have rested."""
-    width, height = told["frame_size"]
+def from_document(written: Mapping[str, Any]) -> Observation:
+    """The observation of a document; reports whose values could not be recorded have rested."""
+    width, height = written["frame_size"]
     return Observation(
-        int(told["frame_index"]),
-        float(told["time"]),
+        int(written["frame_index"]),
+        float(written["time"]),
         (int(width), int(height)),
-        tuple(_told_report(r) for r in told["reports"]),
+        tuple(_report_of(r) for r in written["reports"]),
     )
 
 
@@ -118,17 +118,17 @@ def _percept(p: Percept) -> list[Any]:
     return [p.kind, encode(p.value), encode(p.time), p.source, encode(p.confidence)]
 
 
-def _told_report(told: Mapping[str, Any]) -> Report:
-    gives = tuple(str(k) for k in told["gives"])
-    if "lost" in told:
-        error = f"its percepts were not recorded: {told['lost']}"
-        return Report(str(told["behaviour"]), ReportState.RESTED, gives, error=error)
+def _report_of(written: Mapping[str, Any]) -> Report:
+    gives = tuple(str(k) for k in written["gives"])
+    if "lost" in written:
+        error = f"its percepts were not recorded: {written['lost']}"
+        return Report(str(written["behaviour"]), ReportState.RESTED, gives, error=error)
     percepts = tuple(
         Percept(str(kind), decode(value), decode(time), str(source), decode(confidence))
-        for kind, value, time, source, confidence in told["percepts"]
+        for kind, value, time, source, confidence in written["percepts"]
     )
-    state = ReportState(told["state"])
-    return Report(str(told["behaviour"]), state, gives, percepts, str(told.get("error", "")))
+    state = ReportState(written["state"])
+    return Report(str(written["behaviour"]), state, gives, percepts, str(written.get("error", "")))
 
 
 def encode(value: Any) -> Any:
@@ -179,9 +179,9 @@ def decode(value: Any) -> Any:
     if tag is None:
         return {k: decode(v) for k, v in value.items()}
     if tag == "Region":
-        return _told_region(value)
+        return _region_of(value)
     if tag in _TYPES:
-        return _told_record(_TYPES[tag], value)
+        return _record_of(_TYPES[tag], value)
     return _OTHERS[tag](value)
 
 
@@ -200,10 +200,10 @@ def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
     return {"$": "map" if type(value) is dict else "frozenmap", "of": pairs}
 
 
-def _told_record(kind: type, told: Mapping[str, Any]) -> Any:
+def _record_of(kind: type, written: Mapping[str, Any]) -> Any:
     if kind not in _FIELDS:
-        return kind(told["of"])
-    given = {n: v if type(v) in _PLAIN else decode(v) for n, v in told.items()}
+        return kind(written["of"])
+    given = {n: v if type(v) in _PLAIN else decode(v) for n, v in written.items()}
     del given["$"]
     return kind(**given)
 
@@ -219,24 +219,24 @@ def _array(value: NDArray[Any] | np.generic) -> dict[str, Any]:
     }
 
 
-def _told_array(told: Mapping[str, Any]) -> NDArray[Any]:
-    dtype = np.dtype(str(told["dtype"]))
+def _array_of(written: Mapping[str, Any]) -> NDArray[Any]:
+    dtype = np.dtype(str(written["dtype"]))
     if dtype.kind not in "biufc":
         raise ValueError(f"an array of {dtype}")
-    flat = np.frombuffer(base64.b64decode(told["of"]), dtype)
+    flat = np.frombuffer(base64.b64decode(written["of"]), dtype)
     # As arrays are made in memory: writable, and of the machine's own byte order.
-    return flat.astype(dtype.newbyteorder("=")).reshape([int(n) for n in told["shape"]])
+    return flat.astype(dtype.newbyteorder("=")).reshape([int(n) for n in written["shape"]])
 
 
 _OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
-    "tuple": lambda told: tuple([v if type(v) in _PLAIN else decode(v) for v in told["of"]]),
-    "set": lambda told: {decode(v) for v in told["of"]},
-    "frozenset": lambda told: frozenset(decode(v) for v in told["of"]),
-    "map": lambda told: {decode(k): decode(v) for k, v in told["of"]},
-    "frozenmap": lambda told: MappingProxyType({decode(k): decode(v) for k, v in told["of"]}),
-    "bytes": lambda told: base64.b64decode(told["of"]),
-    "array": _told_array,
-    "scalar": lambda told: _told_array(told)[()],
+    "tuple": lambda written: tuple([v if type(v) in _PLAIN else decode(v) for v in written["of"]]),
+    "set": lambda written: {decode(v) for v in written["of"]},
+    "frozenset": lambda written: frozenset(decode(v) for v in written["of"]),
+    "map": lambda written: {decode(k): decode(v) for k, v in written["of"]},
+    "frozenmap": lambda written: MappingProxyType({decode(k): decode(v) for k, v in written["of"]}),
+    "bytes": lambda written: base64.b64decode(written["of"]),
+    "array": _array_of,
+    "scalar": lambda written: _array_of(written)[()],
 }
 
 
@@ -256,12 +256,12 @@ def _region(r: Region) -> dict[str, Any]:
     return out
 
 
-def _told_region(told: Mapping[str, Any]) -> Region:
-    x, y, w, h = (int(n) for n in told["bbox"])
-    given = {n: decode(v) for n, v in told.items() if n not in ("$", "bbox", "mask", "contour")}
-    mask = runs_to_mask(told["mask"], (h, w))
+def _region_of(written: Mapping[str, Any]) -> Region:
+    x, y, w, h = (int(n) for n in written["bbox"])
+    given = {n: decode(v) for n, v in written.items() if n not in ("$", "bbox", "mask", "contour")}
+    mask = runs_to_mask(written["mask"], (h, w))
     return Region(
-        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decode(told["contour"])), **given
+        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decode(written["contour"])), **given
     )
 
 
@@ -306,12 +306,12 @@ def _chain(contour: NDArray[np.float32]) -> Any:
     return {"$": "chain", "from": first, "of": digits.tobytes().decode()}
 
 
-def _unchained(told: Mapping[str, Any]) -> NDArray[np.float32]:
-    digits = np.frombuffer(told["of"].encode(), np.uint8) - ord("0")
+def _contour_of_chain(written: Mapping[str, Any]) -> NDArray[np.float32]:
+    digits = np.frombuffer(written["of"].encode(), np.uint8) - ord("0")
     if len(digits) and digits.max() > 7:
         raise ValueError("a chain code has digits from 0 to 7")
-    x, y = told["from"]
+    x, y = written["from"]
     return chain_points(int(x), int(y), digits, _CHAIN)
 
 
-_OTHERS["chain"] = _unchained
+_OTHERS["chain"] = _contour_of_chain

@@ -3,7 +3,7 @@
 Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step
 up to the last one that was committed, and can be read while the run goes on. A run of days goes on in
 further files (segments) beside the first one. What was perceived is kept in full, so that a run can be
-reasoned about again without its video. Read next: `recording.py`, which reads all this back.
+reasoned about again without its video. Read next: `journal_reader.py`, which reads all this back.
 """
 
 from __future__ import annotations

@@ -58,27 +58,27 @@ class Recording:
         return {key: self._loaded(value) for _, (key, value) in rows}
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """Events as lines of `events.jsonl`, in the order in which they were told."""
+        """Events as lines of `events.jsonl`, in the order in which they happened."""
         rows = self._rows("SELECT record FROM events ORDER BY number")
         return (self._record(record) for _, (record,) in rows)
 
     def answers(self) -> dict[int, dict[int, str]]:
         """What the operator said: frame index -> object id -> model name."""
-        told: dict[int, dict[int, str]] = {}
+        found: dict[int, dict[int, str]] = {}
         for _, (text,) in self._rows("SELECT record FROM events WHERE kind = 'answer'"):
             event = self._record(text)
             try:
                 number, name = int(event["objects"][0]), str(event["data"]["name"])
-                told.setdefault(int(event["frame_index"]), {})[number] = name
+                found.setdefault(int(event["frame_index"]), {})[number] = name
             except (KeyError, IndexError, TypeError, ValueError) as fault:
                 raise _damaged(str(self.path), "an answer is not as it should be") from fault
-        return told
+        return found
 
     def alerts(self) -> dict[int, dict[str, Any]]:
         """Alerts by id, as they were last."""
         rows = self._rows("SELECT record FROM alerts ORDER BY id")
-        told = [self._record(record) for _, (record,) in rows]
-        return {a["id"]: a for a in told if isinstance(a.get("id"), int)}
+        found = [self._record(record) for _, (record,) in rows]
+        return {a["id"]: a for a in found if isinstance(a.get("id"), int)}
 
     def summaries(self) -> Iterator[dict[str, Any]]:
         """What was believed after each step, in short, with frame index and time."""
@@ -144,25 +144,6 @@ class Recording:
             raise _damaged(str(self.path), str(fault)) from fault
 
 
-def read_events(path: Path) -> Iterator[dict[str, Any]]:
-    """Events of a journal, in the order in which they were told.
-
-    Raises:
-        OutputError: The file is not a journal.
-    """
-    return Recording.open(path).events()
-
-
-def read_facts(path: Path) -> Mapping[str, Any]:
-    """Facts about the run, as given to `Journal.note`."""
-    return Recording.open(path).facts()
-
-
-def read_steps(path: Path) -> Iterator[dict[str, Any]]:
-    """Summaries of all steps, in order, with frame index and time."""
-    return Recording.open(path).summaries()
-
-
 def export_events(journal: Path, target: Path) -> None:
     """Write `events.jsonl` from a journal: one event a line.
 
@@ -171,7 +152,7 @@ def export_events(journal: Path, target: Path) -> None:
     """
     try:
         with target.open("w", encoding="utf-8") as out:
-            for event in read_events(journal):
+            for event in Recording.open(journal).events():
                 out.write(event_text(event) + "\n")
     except OSError as fault:
         raise OutputError(f"cannot write: {fault.strerror}", where=str(target)) from fault

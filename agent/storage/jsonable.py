@@ -59,7 +59,7 @@ def to_jsonable(value: Any) -> Any:
 
 @cache
 def _shown(kind: Any) -> tuple[str, ...]:
-    """The fields of a kind of record that are told."""
+    """The fields of a kind of record that are shown."""
     hidden = _HIDDEN.get(kind, frozenset())
     return tuple(f.name for f in fields(kind) if f.name not in hidden)
 
@@ -71,7 +71,7 @@ _HIDDEN: Mapping[type, frozenset[str]] = {
 
 
 def _number(x: float) -> float | str:
-    """JSON knows no infinity and no NaN; they are told in words."""
+    """JSON knows no infinity and no NaN; they are written as words."""
     return round(x, 6) if isfinite(x) else str(x)
 
 

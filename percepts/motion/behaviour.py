@@ -25,19 +25,19 @@ class MotionBehaviour:
 
     def __init__(self, settings: MotionSettings | None = None) -> None:
         self._segmenter = MotionSegmenter(settings)
-        self._back = BackwardTracker()
+        self._backward = BackwardTracker()
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return {"segmenter": self._segmenter.save(), "back": self._back}
+        return {"segmenter": self._segmenter.save(), "back": self._backward}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a behaviour of the same settings remembered."""
         self._segmenter.load(state["segmenter"])
-        self._back = state["back"]
+        self._backward = state["back"]
 
     def missed(self, observation: Observation) -> None:
-        """Be told of regions reported since the state that was taken on: their ids are used."""
+        """Take note of regions reported since the state that was taken on: their ids are used."""
         for region in observation.of("region"):
             self._segmenter.used(region.id)
 
@@ -59,7 +59,7 @@ class MotionBehaviour:
         # Tracks live on over frames that are left out, but not over black ones taken for sight.
         if any(p.confidence < 1.0 or p.value.status in HARMED for p in health):
             return []
-        regions = self._back.step(frame, self._segmenter.step(frame, directives))
+        regions = self._backward.step(frame, self._segmenter.step(frame, directives))
         if any(p.value.status is not HealthStatus.OK for p in health):
             return []
         return [Percept("region", r, frame.time, self.contract.name, r.confidence) for r in regions]

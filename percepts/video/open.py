@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from visup.agent.model.errors import SettingsError, SourceError
+from visup.agent.model.suggestions import closest
 from visup.percepts.video.capture import (
     Capture,
     CaptureFactory,
@@ -138,11 +139,9 @@ def _open_path(path: Path, opening: _Opening) -> VideoSource:
 
 def _nearest(path: Path) -> str:
     """The file of the same folder whose name comes closest, if one does."""
-    import difflib
-
     try:
         names = [p.name for p in path.parent.iterdir()]
     except OSError:
         return f"there is no folder {path.parent} that can be read"
-    close = difflib.get_close_matches(path.name, names, n=1)
-    return f"did you mean {path.parent / close[0]}?" if close else "check the name"
+    near = closest(path.name, names)
+    return f"did you mean {path.parent / near}?" if near else "check the name"

@@ -15,7 +15,7 @@ from visup.rules.formula.terms import (
     Term,
     WindowFunction,
 )
-from visup.rules.formula.units import Number, Span, Unit
+from visup.rules.formula.units import NOWHERE, Number, Span, Unit
 
 ZERO = Number(0.0, Unit.S)
 
@@ -37,7 +37,7 @@ class Predicate:
 
     name: str
     words: tuple[str, ...]
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.name}({', '.join(self.words)})"
@@ -51,7 +51,7 @@ class Comparison:
     operator: str
     right: Term
     leave: Number | None = None
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         leave = "" if self.leave is None else f" leave {self.leave}"
@@ -63,6 +63,7 @@ class Not:
     """`not f`."""
 
     part: Formula
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"not {_wrapped(self.part, *_LOOSER)}"
@@ -73,6 +74,7 @@ class And:
     """`f and g`."""
 
     parts: tuple[Formula, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return " and ".join(_wrapped(p, And, Or) for p in self.parts)
@@ -83,6 +85,7 @@ class Or:
     """`f or g`."""
 
     parts: tuple[Formula, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return " or ".join(_wrapped(p, Or) for p in self.parts)
@@ -118,7 +121,7 @@ class FutureOperator:
     kind: str
     part: Formula
     window: TimeWindow | None
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.kind}{self.window or ''} {_wrapped(self.part, *_LOOSER)}"
@@ -144,7 +147,7 @@ class Until:
     left: Formula
     right: Formula
     window: TimeWindow | None
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         left, right = (_wrapped(p, *_LOOSER) for p in (self.left, self.right))
@@ -158,7 +161,7 @@ class MOfN:
     part: Formula
     least: Number
     of: Number
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     @property
     def counts_samples(self) -> bool:
@@ -197,7 +200,7 @@ class Quantified:
     variable: str
     part: Formula
     may_repeat: bool = False
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         repeat = " may repeat" if self.may_repeat else ""
@@ -247,7 +250,7 @@ class Rule:
     hold: Number | None = None
     cooldown: Number | None = None
     may_repeat: tuple[str, ...] = ()
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
     file: str = field(default="", compare=False, repr=False)
 
     def __str__(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from visup.rules.formula.units import Number, Span
+from visup.rules.formula.units import NOWHERE, Number, Span
 
 POINTWISE = ("abs", "min", "max")
 """Functions of quantities of one moment."""
@@ -18,7 +18,7 @@ class Measure:
 
     name: str
     words: tuple[str, ...] = ()
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.name}({', '.join(self.words)})"
@@ -31,7 +31,7 @@ class Arithmetic:
     left: Term
     operator: str
     right: Term
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         loose = ("+", "-") if self.operator in "*/" else ()
@@ -43,7 +43,7 @@ class Negative:
     """`-gap(a, b)`; the negative of a number is a number."""
 
     part: Term
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"-{_wrapped(self.part, '+-*/')}"
@@ -55,7 +55,7 @@ class PointwiseFunction:
 
     name: str
     parts: tuple[Term, ...]
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.name}({', '.join(map(str, self.parts))})"
@@ -68,7 +68,7 @@ class WindowFunction:
     name: str
     part: Term
     duration: Number
-    span: Span = field(default=Span(), compare=False, repr=False)
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.name}({self.part}, {self.duration})"

@@ -8,11 +8,29 @@ from enum import StrEnum
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Where a node stands in its file: line and column from 1, length in characters."""
+    """Where a node stands: lines and columns counted from 1, the end column exclusive.
 
-    line: int = 1
-    column: int = 1
-    length: int = 1
+    Attributes:
+        file: The included file in which it stands; empty for the file itself.
+    """
+
+    line: int = 0
+    column: int = 0
+    end_line: int = 0
+    end_column: int = 0
+    file: str = ""
+
+    def to(self, last: Span) -> Span:
+        """From the beginning of this place to the end of another."""
+        return Span(self.line, self.column, last.end_line, last.end_column)
+
+    @property
+    def length(self) -> int:
+        """Characters on its line; of a node that runs over several lines, 1."""
+        return self.end_column - self.column if self.end_line == self.line else 1
+
+
+NOWHERE = Span()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +93,10 @@ class Unit(StrEnum):
     """What a number counts."""
 
     NONE = ""
-    S = "s"
     MS = "ms"
+    S = "s"
     MIN = "min"
+    H = "h"
     PX = "px"
     PX_S = "px/s"
     PX_S2 = "px/s2"
@@ -87,11 +106,12 @@ class Unit(StrEnum):
     PER_S = "/s"
 
 
-UNITS = {
+UNITS: dict[str, tuple[Dimension, float]] = {
     Unit.NONE: (SHARE, 1.0),
-    Unit.S: (TIME, 1.0),
     Unit.MS: (TIME, 0.001),
+    Unit.S: (TIME, 1.0),
     Unit.MIN: (TIME, 60.0),
+    Unit.H: (TIME, 3600.0),
     Unit.PX: (LENGTH, 1.0),
     Unit.PX_S: (SPEED, 1.0),
     Unit.PX_S2: (ACCELERATION, 1.0),
@@ -119,11 +139,16 @@ def units_of(dimension: Dimension) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """`20 s`: a number with its unit."""
+    """`20 s`: a number with its unit.
+
+    Attributes:
+        value: The number, in its unit.
+        unit: One of `UNITS`; of a task file that is not checked yet perhaps another word.
+    """
 
     value: float
-    unit: Unit = Unit.NONE
-    span: Span = field(default=Span(), compare=False, repr=False)
+    unit: str = Unit.NONE
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     @property
     def base(self) -> float:
@@ -136,5 +161,11 @@ class Number:
         return UNITS[self.unit][0]
 
     def __str__(self) -> str:
-        digits = f"{self.value:.10f}".rstrip("0").rstrip(".")
-        return f"{digits} {self.unit}".rstrip()
+        return f"{number_text(self.value)} {self.unit}".rstrip()
+
+
+def number_text(number: float) -> str:
+    """A number as one writes it: whole ones without a point."""
+    if number == float("inf"):
+        return "1e999"
+    return str(int(number)) if number == int(number) and abs(number) < 1e15 else repr(number)

@@ -309,7 +309,7 @@ def fit_motion(
 
     Args:
         times: (T,) seconds.
-        support: (T, M, K) pixels; see `History`.
+        support: (T, M, K) pixels; see `SampleWindow`.
         free: (T, M, K).
         separation: (T, M, M) pixels.
         directions: (K, 2) unit vectors.

@@ -1,9 +1,8 @@
 """Qualitative states that do not flicker: a change must last before it is believed.
 
-One latch holds many states at once (such as the trend of every pair of objects), as arrays. The
-noise thresholds of entering and leaving a state are the caller's, who knows the quantity behind
-it (`judge_loops.hold_sign` serves for quantities that are compared with zero); the latch adds the least
-duration.
+Many states are held at once (such as the trend of every pair of objects), as arrays. The noise
+thresholds of entering and leaving a state are the caller's, who knows the quantity behind it
+(`signs_with_hysteresis` serves for quantities that are compared with zero); the least duration is added here.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from visup.compiled import compiled
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
 UNKNOWN = -1
-"""The code of a state of which nothing is known; every latch starts there."""
+"""The code of a state of which nothing is known; every state starts there."""
 BELOW, WITHIN, ABOVE = 0, 1, 2
 """Codes of a sign."""
 
@@ -40,7 +39,7 @@ class HysteresisState:
     pending_since: Floats
 
     def select(self, places: NDArray[np.intp], now: float) -> HysteresisState:
-        """The latch of other pairs.
+        """The states of other pairs.
 
         Args:
             places: (N,) where each of the new pairs stood before along the last axis, -1 for new
@@ -48,7 +47,7 @@ class HysteresisState:
             now: Seconds.
 
         Returns:
-            A latch whose last axis has length N; new pairs start unknown.
+            States whose last axis has length N; new pairs start unknown.
         """
         blank = unknown_states((*self.state.shape[:-1], len(places)), now)
         known = places >= 0
@@ -63,13 +62,13 @@ class HysteresisState:
 
 
 def unknown_states(shape: tuple[int, ...], now: float) -> HysteresisState:
-    """A latch of which nothing is known yet."""
+    """States of which nothing is known yet."""
     codes = np.full(shape, UNKNOWN, dtype=np.int8)
     return HysteresisState(codes, np.full(shape, now), codes, np.full(shape, now))
 
 
 def advance(
-    latch: HysteresisState, wanted: Codes, now: float, minimum_s: float | Floats
+    states: HysteresisState, wanted: Codes, now: float, minimum_s: float | Floats
 ) -> HysteresisState:
     """Move every state towards what the latest measurement wants.
 
@@ -77,7 +76,7 @@ def advance(
     unknown takes no time, since nothing is claimed by it.
 
     Args:
-        latch: The states before.
+        states: The states before.
         wanted: Codes of the same shape, what the measurement says now.
         now: Seconds.
         minimum_s: Least duration, seconds; one for all, or one for each row.
@@ -85,15 +84,15 @@ def advance(
     Returns:
         The states after; `since` is when the believed state began to show.
     """
-    if _alike(wanted, latch.pending) and _alike(wanted, latch.state):
-        return latch  # Nothing wants to change, as nearly always.
+    if _alike(wanted, states.pending) and _alike(wanted, states.state):
+        return states  # Nothing wants to change, as nearly always.
     lasts = np.atleast_1d(np.asarray(minimum_s, dtype=float)).reshape(-1)
     rows, shape = (len(lasts), -1), wanted.shape
     state, since, pending, waiting = _advanced(
-        latch.state.reshape(rows),
-        latch.since.reshape(rows),
-        latch.pending.reshape(rows),
-        latch.pending_since.reshape(rows),
+        states.state.reshape(rows),
+        states.since.reshape(rows),
+        states.pending.reshape(rows),
+        states.pending_since.reshape(rows),
         wanted.reshape(rows),
         now,
         lasts,

@@ -62,7 +62,7 @@ class PreparedOutline:
 
     @cached_property
     def boxes(self) -> Floats:
-        """Of the runs of `points`; see `outline_loops.py`."""
+        """Of the runs of `points`; see `_outlines_jit.py`."""
         return run_boxes(self.points)
 
     @cached_property

@@ -299,7 +299,7 @@ class IdentityReasoner:
             yield at_least("votes of the best name", most, s.known_votes)
             yield at_least("votes of the best name, beside none of the models,", most, votes.none)
         name = belief.name
-        yield Condition(f"it was not identified as {name} before", votes.reported != name)
+        yield Condition("it was not identified so before", votes.reported != name)
         yield at_least(f"likelihood of {name}", belief.confidence, s.settle)
         yield at_least("leads for", mind.time - votes.leads_since, s.settle_s, " s", slack=1e-9)
         yield Condition("it has entered", belief.confirmed)

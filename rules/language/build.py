@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from visup.agent import Severity
+from visup.agent.model.errors import RuleError
 from visup.rules.formula.nodes import (
     ZERO,
     And,
@@ -45,7 +46,7 @@ from visup.rules.formula.terms import (
     WindowFunction,
 )
 from visup.rules.formula.units import Number, Unit
-from visup.rules.language.parser import raise_all
+from visup.rules.language.diagnostics import raise_all
 from visup.rules.language.typecheck import TypeChecker
 
 
@@ -291,7 +292,7 @@ def rule(
         None if cooldown is None else _number(cooldown),
         tuple(may_repeat.split()),
     )
-    raise_all(list(TypeChecker(str(made), f"<rule {name}>").rule(made)))
+    raise_all(list(TypeChecker(str(made), f"<rule {name}>").rule(made)), RuleError)
     return made
 
 

@@ -47,7 +47,7 @@ def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
     if dimension and leave.dimension != dimension:
         yield leave.span, f"'leave' wants {units_of(dimension)}", None, None
     elif not isinstance(node.right, Number):
-        what = "'leave' wants a number before it too"
+        what = "'leave' needs a number before it too"
         yield leave.span, what, "such as speed(a) > 5 px/s leave 3 px/s", None
     elif (leave.base - node.right.base) * (1 if ">" in node.operator else -1) > 0:
         what = f"'leave {leave}' ends it where it does not yet begin"

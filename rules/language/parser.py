@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -12,8 +10,10 @@ from typing import cast
 
 from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 
-from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
+from visup.agent.model.errors import RuleError
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import Formula, Rule
+from visup.rules.language.diagnostics import Diagnostic, Source, either, raise_all
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
 from visup.rules.predicates.vocabulary import RULES, Vocabulary
@@ -27,7 +27,7 @@ _WANTED = {
     "SEVERITY": "info, warning or critical",
     "NAME": "a name",
     "NUMBER": "a number",
-    "UNIT": "a unit (s, ms, min, px, px/s, px/s2, %, deg, deg/s, /s)",
+    "UNIT": "a unit (ms, s, min, h, px, px/s, px/s2, %, deg, deg/s, /s)",
     "STRING": "a sentence in double quotes on one line",
     "OPERATOR": "<, <=, > or >=",
     "LSQB": "'['",
@@ -61,21 +61,21 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
             hides nothing of the others.
     """
     checker = TypeChecker(text, file)
-    errors: list[VisupError] = []
+    errors: list[Diagnostic] = []
     rules: list[Rule] = []
     sound: list[Rule] = []
     for block in _blocks(text):
         try:
             tree = _parser().parse(block, start="start")
         except UnexpectedInput as fault:
-            errors.append(_syntax_error(fault, text, file))
+            errors.append(_syntax_error(fault, text, checker.source))
             continue
         found, faults = read_tree(tree, file)
         errors += [checker.fault(*f) for f in faults]
         rules += found
         sound += () if faults else found
     errors += [*checker.twice(rules), *(fault for rule in sound for fault in checker.rule(rule))]
-    raise_all(errors)
+    raise_all(sorted(errors, key=_position), RuleError)
     return tuple(rules)
 
 
@@ -97,20 +97,12 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
     try:
         tree = _parser().parse(text, start="formula")
     except UnexpectedInput as fault:
-        raise _syntax_error(fault, text, file) from None
+        raise _syntax_error(fault, text, Source(text, file)).error(RuleError) from None
     checker = TypeChecker(text, file, vocabulary)
     found, faults = read_tree(tree, file)
-    raise_all([checker.fault(*f) for f in faults] or list(checker.formula(found)))
+    errors = [checker.fault(*f) for f in faults] or list(checker.formula(found))
+    raise_all(sorted(errors, key=_position), RuleError)
     return cast("Formula", found)
-
-
-def raise_all(errors: Sequence[VisupError]) -> None:
-    """Raise what is wrong: one error as itself, several as one, none not at all."""
-    errors = list(errors)
-    if len(errors) == 1:
-        raise errors[0]
-    if errors:
-        raise ErrorGroup(sorted(errors, key=_place))
 
 
 def load_rules(path: str | Path) -> tuple[Rule, ...]:
@@ -160,12 +152,11 @@ def _blocks(text: str) -> list[str]:
     return ["\n" * text.count("\n", 0, s) + text[s:e] for s, e in zip(starts, ends, strict=True)]
 
 
-def _place(error: VisupError) -> tuple[int, int]:
-    where = error.where
-    return (where.line, where.column) if isinstance(where, SourceLocation) else (0, 0)
+def _position(found: Diagnostic) -> tuple[int, int]:
+    return found.place.line, found.place.column
 
 
-def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
+def _syntax_error(fault: UnexpectedInput, text: str, source: Source) -> Diagnostic:
     lines = text.splitlines() or [""]
     if isinstance(fault, UnexpectedEOF) or fault.line < 1:
         line, column, found = len(lines), len(lines[-1]) + 1, ""
@@ -179,9 +170,9 @@ def _syntax_error(fault: UnexpectedInput, text: str, file: str) -> RuleError:
         line, column = _end_before(lines, line)
     wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
     wanted = wanted or getattr(fault, "allowed", set()) or set()
-    where = SourceLocation(file, line, column, lines[line - 1], max(1, len(found)))
+    place = source.place(line, column, max(1, len(found)))
     what = f"'{found}' does not belong here" if found else "the rule ends too early"
-    return RuleError(what, where=where, expected=_expected(wanted), hint=_slip(found, wanted))
+    return Diagnostic("", what, place, _expected(wanted), _slip(found, wanted))
 
 
 def _end_before(lines: list[str], line: int) -> tuple[int, int]:
@@ -192,12 +183,10 @@ def _end_before(lines: list[str], line: int) -> tuple[int, int]:
 
 
 def _expected(wanted: set[str]) -> str:
-    words = sorted({_WANTED.get(w, f"'{w.lower()}'") for w in wanted})
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
+    return either(sorted({_WANTED.get(w, f"'{w.lower()}'") for w in wanted}))
 
 
 def _slip(found: str, wanted: set[str]) -> str | None:
     known = [w.lower() for w in wanted if w not in _WANTED]
     known += ["info", "warning", "critical"] if "SEVERITY" in wanted else []
-    close = get_close_matches(found.lower(), known, 1, 0.6) if found else []
-    return f"did you mean '{close[0]}'?" if close else None
+    return did_you_mean(found, known) if found else None

@@ -107,7 +107,7 @@ class CallResolver:
             return Measure(node.name, self._words(node), node.span)
         if isinstance(node, Term):
             return node
-        what = f"'{node}' is true or false, and no quantity"
+        what = f"'{node}' is true or false, not a quantity"
         self.fault((_place(node), what, "a quantity or a number", None))
         return Number(0.0, span=_place(node))
 
@@ -130,7 +130,7 @@ class CallResolver:
 
     def _unworded(self, argument: Any) -> Any:
         if isinstance(argument, NameArgument):
-            what = f"'{argument.name}' is a name, and no quantity"
+            what = f"'{argument.name}' is a name, not a quantity"
             self.fault((argument.span, what, "a quantity or a number", None))
             return Number(0.0, span=argument.span)
         return argument
@@ -145,9 +145,8 @@ def _place(node: Any) -> Span:
 
 
 def _span_of(meta: Any) -> Span:
-    """The place of a node of Lark's tree; of one that runs over several lines, its beginning."""
-    one_line = meta.end_line == meta.line
-    return Span(meta.line, meta.column, meta.end_column - meta.column if one_line else 1)
+    """The place of a node of Lark's tree."""
+    return Span(meta.line, meta.column, meta.end_line, meta.end_column)
 
 
 def read_tree(tree: Tree[Token], file: str) -> tuple[Any, list[Fault]]:
@@ -197,7 +196,7 @@ class _RuleBuilder(Transformer[Token, Any]):
             hold=hold,
             cooldown=cooldown,
             may_repeat=tuple(v for v, repeats in variables if repeats),
-            span=Span(name.line, name.column, len(name)),
+            span=_span_of(name),
             file=self.file,
         )
 
@@ -226,13 +225,13 @@ class _RuleBuilder(Transformer[Token, Any]):
         return str(parts[0])[1:-1]
 
     def or_(self, meta: Any, parts: list[Any]) -> Or:
-        return Or(tuple(map(self.meaning.formula, parts)))
+        return Or(tuple(map(self.meaning.formula, parts)), _span_of(meta))
 
     def and_(self, meta: Any, parts: list[Any]) -> And:
-        return And(tuple(map(self.meaning.formula, parts)))
+        return And(tuple(map(self.meaning.formula, parts)), _span_of(meta))
 
     def not_(self, meta: Any, parts: list[Any]) -> Not:
-        return Not(self.meaning.formula(parts[0]))
+        return Not(self.meaning.formula(parts[0]), _span_of(meta))
 
     def since(self, meta: Any, parts: list[Any]) -> Since:
         left, window, right = parts
@@ -245,7 +244,7 @@ class _RuleBuilder(Transformer[Token, Any]):
 
     def quantified(self, meta: Any, parts: list[Any]) -> Quantified:
         kind, (variable, repeats), part = parts
-        place = Span(kind.line, kind.column, len(kind))
+        place = _span_of(kind)
         return Quantified(str(kind), variable, self.meaning.formula(part), repeats, place)
 
     def past(self, meta: Any, parts: list[Any]) -> PastOperator:
@@ -254,7 +253,7 @@ class _RuleBuilder(Transformer[Token, Any]):
 
     def future(self, meta: Any, parts: list[Any]) -> FutureOperator:
         kind, window, part = parts
-        place = Span(kind.line, kind.column, len(kind))
+        place = _span_of(kind)
         return FutureOperator(str(kind), self.meaning.formula(part), window, place)
 
     def formula(self, meta: Any, parts: list[Any]) -> Formula:

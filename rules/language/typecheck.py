@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from difflib import get_close_matches
 
-from visup.agent.model.errors import RuleError, SourceLocation
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,
@@ -25,6 +24,7 @@ from visup.rules.formula.nodes import (
 from visup.rules.formula.terms import Measure, WindowFunction
 from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.dimensions import check_dimensions
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.snapshot import RELATION_NAMES
@@ -75,17 +75,14 @@ class TypeChecker:
     """
 
     def __init__(self, text: str, file: str, vocabulary: Vocabulary = RULES) -> None:
-        self.lines = text.splitlines() or [""]
-        self.file = file
+        self.source = Source(text, file)
         self.vocabulary = vocabulary
 
-    def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> RuleError:
-        """A fault as an error with its line."""
-        line = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
-        where = SourceLocation(self.file, span.line, span.column, line, span.length)
-        return RuleError(what, where=where, expected=expected, hint=hint)
+    def fault(self, span: Span, what: str, expected: str | None, hint: str | None) -> Diagnostic:
+        """An error at the place of a node."""
+        return self.source.fault("", what, span, expected, hint)
 
-    def twice(self, rules: Iterable[Rule]) -> Iterator[RuleError]:
+    def twice(self, rules: Iterable[Rule]) -> Iterator[Diagnostic]:
         """Rules that bear one name."""
         names: set[str] = set()
         for rule in rules:
@@ -94,12 +91,12 @@ class TypeChecker:
                 yield self.fault(rule.span, what, None, "rename one of them")
             names.add(rule.name)
 
-    def formula(self, formula: Formula) -> Iterator[RuleError]:
+    def formula(self, formula: Formula) -> Iterator[Diagnostic]:
         """The faults of a formula that stands by itself."""
         for fault in _FormulaChecker(self.vocabulary, ()).node(formula):
             yield self.fault(*fault)
 
-    def rule(self, rule: Rule) -> Iterator[RuleError]:
+    def rule(self, rule: Rule) -> Iterator[Diagnostic]:
         """The faults of one rule."""
         reader = _FormulaChecker(self.vocabulary, rule.variables)
         found = [f for formula in rule.formulas for f in reader.node(formula)]
@@ -119,7 +116,7 @@ class TypeChecker:
             yield rule.span, f"a variable of '{rule.name}' is named twice", "distinct names", None
         for word in (rule.name, *rule.variables):
             if word in KEYWORDS:
-                yield rule.span, f"'{word}' is a word of the language", "another name", None
+                yield rule.span, f"'{word}' is a reserved word", "another name", None
         for word in mentions(rule.say):
             if word != "is" and word not in rule.variables:
                 what = f"the sentence of '{rule.name}' mentions '{word}', which is not one of its variables"
@@ -178,7 +175,7 @@ class _FormulaChecker:
         if name in outer:
             yield node.span, f"'{name}' is already the name of an object", "another name", None
         if name in KEYWORDS:
-            yield node.span, f"'{name}' is a word of the language", "another name", None
+            yield node.span, f"'{name}' is a reserved word", "another name", None
         self.scope = (*outer, name)
         found = list(self.node(node.part))
         yield from found
@@ -195,7 +192,7 @@ class _FormulaChecker:
         table = words if fact else quantities
         kind = "relation or fact" if fact else "quantity"
         if call.name not in table:
-            hint = _close(call.name, table)
+            hint = did_you_mean(call.name, table)
             if call.name in (quantities if fact else words):
                 hint = "compare it with a number" if fact else "it is true or false"
             yield call.span, f"there is no {kind} '{call.name}'", _listed(table), hint
@@ -209,7 +206,7 @@ class _FormulaChecker:
             yield from self.argument(call, wanted, word)
         names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
         if len(set(names)) < len(names):
-            yield call.span, f"'{call.name}' is asked of one object twice", None, None
+            yield call.span, f"'{call.name}' is given the same object twice", None, None
 
     def argument(self, call: Predicate | Measure, wanted: str, word: str) -> Iterator[Fault]:
         known: Iterable[str] = {
@@ -218,10 +215,10 @@ class _FormulaChecker:
             "kind": (*PERCEPT_KINDS, word),
         }.get(wanted, (word,))
         if word not in known:
-            what = f"'{word}' is no {'variable of the rule' if wanted == 'object' else wanted}"
-            yield call.span, what, _listed(known), _close(word, known)
+            what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
+            yield call.span, what, _listed(known), did_you_mean(word, known)
         elif wanted != "object" and word in self.scope:
-            what = f"'{word}' is a variable of the rule, and '{call.name}' wants a {wanted}"
+            what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
             yield call.span, what, None, "rename the variable"
 
 
@@ -229,15 +226,15 @@ def _time(number: Number | None, word: str) -> Iterator[Fault]:
     if number is None:
         return
     if number.dimension != TIME:
-        yield number.span, f"'{word}' wants a time", "such as 2 s", None
+        yield number.span, f"'{word}' needs a time", "such as 2 s", None
     elif number.value <= 0:
-        yield number.span, f"'{word}' wants a time above 0", None, None
+        yield number.span, f"'{word}' needs a time above 0", None, None
 
 
 def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
     yield from _time(window.high, word)
     if window.low.dimension != TIME:
-        yield window.low.span, f"'{word}' wants a time", "such as 2 s", None
+        yield window.low.span, f"'{word}' needs a time", "such as 2 s", None
     elif window.high.dimension == TIME and 0 < window.high.base <= window.low.base:
         what = f"a window from {window.low} to {window.high} is empty"
         yield window.high.span, what, "the shorter time first", None
@@ -253,12 +250,7 @@ def _often(node: MOfN) -> Iterator[Fault]:
         return
     yield from _time(of, "of")
     if least.dimension != SHARE or not 0 < least.base <= 1:
-        yield least.span, f"'{least}' is no share of a time", "such as 60 %", None
-
-
-def _close(word: str, known: Iterable[str]) -> str | None:
-    close = get_close_matches(word, list(known), 1, 0.6)
-    return f"did you mean '{close[0]}'?" if close else None
+        yield least.span, f"'{least}' is not a share of a time", "such as 60 %", None
 
 
 def _listed(words: Iterable[str]) -> str:

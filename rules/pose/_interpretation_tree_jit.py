@@ -1,4 +1,4 @@
-"""One level more of an interpretation tree, compiled; `interpretation.py` says what it is for."""
+"""One level more of an interpretation tree, compiled; `interpretation_tree.py` says what it is for."""
 
 from __future__ import annotations
 

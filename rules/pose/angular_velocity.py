@@ -1,9 +1,9 @@
 """How fast an object turns, from the orientations that its views tell.
 
 Over a window of time the object turns at one rate: R(t) = turned(w * (t - m)) R(m). Rate w and
-orientation R(m) are fitted together by least squares (Gauss-Newton on rotations, `spin_fit.py`). Where
-the orientations jump (to that of a symmetric object's twin), both sides have an R(m) of their own
-and share w, which is the same for twins.
+orientation R(m) are fitted together by least squares (Gauss-Newton on rotations,
+`angular_velocity_fit.py`). Where the orientations jump (to that of a symmetric object's twin), both sides
+have an R(m) of their own and share w, which is the same for twins.
 
 An object may be hit. Against the one rate stand two, one before and one after a change at a time that is
 fitted too; the orientation is continuous there, so that what was known before helps to measure what

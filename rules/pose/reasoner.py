@@ -1,9 +1,9 @@
 """Which way objects face and how they turn: the interpretation trees of each object, and what comes of them.
 
-Every object has a tree for each model that was hypothesised for it lately (`interpretation.py`). The cheapest
-path of the most likely model tells the view, since when, and the orientations from which the spin is
-measured (`spin.py`). How much dearer the paths of other models are tells who the object cannot be:
-`pose_support`, which the votes heed in the next step.
+Every object has a tree for each model that was hypothesised for it lately (`interpretation_tree.py`).
+The cheapest path of the most likely model gives the view, since when, and the orientations from which the
+spin is measured (`angular_velocity.py`). How much dearer the paths of other models are says who the object
+cannot be: `pose_support`, which the votes heed in the next step.
 """
 
 from __future__ import annotations

@@ -12,7 +12,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent import Mind, ObjectBelief, Truth
+from visup.agent import Mind, ObjectBelief
+from visup.rules.formula.truth import NO, YES
 from visup.rules.predicates._snapshot_jit import pair_quantities
 from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.reasoner import NAMES, kinematics
@@ -20,8 +21,6 @@ from visup.rules.wording.sentences import short
 
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
-YES, MAYBE, NO = 1, 0, -1
-TRUTH_CODE = {Truth.TRUE: YES, Truth.UNKNOWN: MAYBE, Truth.FALSE: NO}
 
 ITSELF = frozenset({"equal", "outlines_equal"})
 SIGMAS = 1.0

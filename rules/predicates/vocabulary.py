@@ -11,16 +11,13 @@ from typing import Any
 import numpy as np
 
 from visup.agent import HealthStatus, ObjectBelief, Presence, Region
+from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
 from visup.rules.formula.units import ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.snapshot import (
-    MAYBE,
-    NO,
     RELATION_NAMES,
     SIGMAS,
-    TRUTH_CODE,
-    YES,
     Codes,
     Floats,
     Snapshot,
@@ -237,7 +234,7 @@ def in_forbidden_zone(facts: Snapshot) -> Codes:
 
 def _zone(question: str) -> Callable[[Snapshot, str], Codes]:
     return lambda facts, zone: facts.each(
-        lambda b: TRUTH_CODE[zone_truth(facts.mind, question, b.id, zone)]
+        lambda b: CODE_OF[zone_truth(facts.mind, question, b.id, zone)]
     )
 
 

@@ -42,7 +42,8 @@ def _check_hiding(context: StepContext, belief: ObjectBelief) -> None:
     hiding = context.decide("occlusion", belief.id, _occlusion_conditions(context, belief))
     leaving = context.decide("exit", belief.id, _exit_conditions(context, track, hiding))
     if not (hiding or leaving):
-        context.put(belief, partial_since=None)
+        if track.partial_since is not None:
+            context.put(belief, partial_since=None)
         return
     since = context.now if track.partial_since is None else track.partial_since
     context.put(belief, partial_since=since)
@@ -78,7 +79,8 @@ def _check_reappearance(context: StepContext, belief: ObjectBelief) -> None:
     if not context.decide(
         "reappearance", belief.id, _reappearance_conditions(context, belief, track)
     ):
-        context.put(belief, clear_since=None)
+        if track.clear_since is not None:
+            context.put(belief, clear_since=None)
         return
     since = context.now if track.clear_since is None else track.clear_since
     context.put(belief, clear_since=since)

@@ -1,4 +1,4 @@
-"""From fits to quantities of all objects and pairs, compiled; see `measure.py`."""
+"""From fits to quantities of all objects and pairs, compiled; see `kinematics.py`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
+from visup.rules.relations.rows import PairQuantity
 
 Floats = NDArray[np.float64]
-
-GAP, RATE, SIGMA, RELATIVE, CONTACT = range(5)
-"""Tables of all pairs; see `Measured`."""
 
 
 @compiled
@@ -85,7 +83,7 @@ def separation_speeds(support: Floats, seen: Floats, directions: Floats) -> tupl
 
 @compiled
 def time_to_contact(gap: float, rate: float) -> float:
-    """Seconds until a gap is closed at a rate; see `Measured.time_to_contact`."""
+    """Seconds until a gap is closed at a rate; see `Kinematics.time_to_contact`."""
     if np.isnan(gap) or np.isnan(rate):
         return np.nan
     if gap <= 0.0:
@@ -140,13 +138,16 @@ def pair_tables(
                     known = np.hypot(seen[a, 3], seen[b, 3])
                     if speed > strong and speed > sigmas * known and rate < speed:
                         rate, wide = speed, known
-                found[GAP, a, b], found[SIGMA, a, b] = gaps[number], wide
-                found[RATE, a, b] = np.nan if stale else rate
+                found[PairQuantity.GAP, a, b] = gaps[number]
+                found[PairQuantity.SIGMA, a, b] = wide
+                found[PairQuantity.RATE, a, b] = np.nan if stale else rate
     for i in range(count):
         x, y = velocity[i, 0], velocity[i, 1]
         speeds[i] = np.sqrt(x * x + y * y)
         for j in range(count):
             x, y = velocity[i, 0] - velocity[j, 0], velocity[i, 1] - velocity[j, 1]
-            found[RELATIVE, i, j] = np.sqrt(x * x + y * y)
-            found[CONTACT, i, j] = time_to_contact(found[GAP, i, j], found[RATE, i, j])
+            found[PairQuantity.RELATIVE_SPEED, i, j] = np.sqrt(x * x + y * y)
+            found[PairQuantity.TIME_TO_CONTACT, i, j] = time_to_contact(
+                found[PairQuantity.GAP, i, j], found[PairQuantity.RATE, i, j]
+            )
     return found, speeds

@@ -2,28 +2,91 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
 from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Floats
+from visup.rules.relations.rows import PairQuantity, StateRow, TableRow, ValueRow
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
 
 COUPLED, MERGED = 1, 2
 """Marks of pairs that are one body, or are seen as one region."""
 
-GAP, RATE, SIGMA, RELATIVE = range(4)
-"""Of the tables of `Measured`."""
+COPIED = (
+    (TableRow.TREND, StateRow.TREND),
+    (TableRow.TOUCH, StateRow.TOUCH),
+    (TableRow.TOGETHER, StateRow.TOGETHER),
+    (TableRow.DEPTH, StateRow.DEPTH),
+    (TableRow.FIRST_AWAY, StateRow.FIRST_AWAY),
+    (TableRow.SECOND_AWAY, StateRow.SECOND_AWAY),
+    (TableRow.FIRST_SIDE, StateRow.FIRST_SIDE),
+    (TableRow.SECOND_SIDE, StateRow.SECOND_SIDE),
+    (TableRow.DISTANCE, StateRow.DISTANCE),
+    (TableRow.DIRECTION, StateRow.DIRECTION),
+)
+"""Rows of the table, and the rows of states that they are taken from."""
 
 
-TABLE_ROWS = (0, 1, 2, 8, 9, 10, 11, 12, 13, 14)
-STATE_ROWS = (14, 15, 16, 17, 10, 11, 12, 13, 9, 8)
-"""Rows of what is told, and the rows of the latch that they are taken from."""
+class MotionLimits(NamedTuple):
+    """Thresholds of trend, touch and moving together.
+
+    Attributes:
+        rates: To enter and to leave a trend, pixels per second.
+        sigmas: In deviations, to want a trend and to go on wanting it.
+        touch: Gaps to begin and to keep a touch, pixels; shares of depth by which it ends and begins to
+            be none.
+        rest: Relative speed of rest, pixels per second; the same in halves of the window; by how much
+            more it may be while it goes on; share of the speed that is asked for at which it does.
+    """
+
+    rates: tuple[float, float]
+    sigmas: tuple[float, float]
+    touch: tuple[float, float, float, float]
+    rest: tuple[float, float, float, float]
+
+
+class PairMotion(NamedTuple):
+    """What trend, touch and moving together are judged by.
+
+    Attributes:
+        tables: (5, M, M); see `PairQuantity`.
+        motion: (3, M, 2) velocities over the window and in its halves, pixels per second.
+        speed: (M,) pixels per second.
+        depth: (M,); NaN unknown.
+        gap: (P,) of the outlines, smoothed, pixels.
+        marks: (P,) `COUPLED` or `MERGED` pairs.
+    """
+
+    tables: Floats
+    motion: Floats
+    speed: Floats
+    depth: Floats
+    gap: Floats
+    marks: Codes
+
+
+class PairBeliefs(NamedTuple):
+    """States of pairs, and since when they hold.
+
+    Attributes:
+        state: (ROWS, P); see `StateRow`.
+        since: (ROWS, P) seconds.
+        rcc8: (2, P) of boxes and of outlines.
+        rcc8_since: (2, P) seconds.
+    """
+
+    state: Codes
+    since: Floats
+    rcc8: Codes
+    rcc8_since: Floats
 
 
 @compiled
 def smoothed_value(before: float, now: float, share: float, jump: float) -> float:
-    """One value, smoothed; see `smooth.py`."""
+    """One value, smoothed; see `ema.py`."""
     step = now - before
     return share * step + before if abs(step) <= jump else now
 
@@ -41,8 +104,8 @@ def smoothed_boxes(
     Args:
         boxes: (M, 4) before, pixels.
         gaps: (P,) of the outlines before, pixels.
-        seen: (M, 8) how bodies were seen; see `measure_loops.near_pairs`.
-        tables: (5, M, M); see `Measured`.
+        seen: (M, 8) how bodies were seen; see `hull_gaps`.
+        tables: (5, M, M); see `Kinematics`.
         numbers: Share of what is new; differences of edges, and of gaps, beyond which a mean begins anew,
             pixels; for how long a box stands for a body out of sight, seconds; gap up to which outlines
             may meet, pixels.
@@ -60,7 +123,9 @@ def smoothed_boxes(
     number = count = 0
     for i in range(len(boxes)):
         for j in range(i + 1, len(boxes)):
-            apart[number] = smoothed_value(gaps[number], tables[GAP, i, j], share, wide)
+            apart[number] = smoothed_value(
+                gaps[number], tables[PairQuantity.GAP, i, j], share, wide
+            )
             if apart[number] <= near:
                 asked[count] = number
                 count += 1
@@ -209,119 +274,94 @@ def _together(
 
 @compiled
 def classify_motion(
-    state: Codes,
-    pending: Codes,
-    tables: Floats,
-    motion: Floats,
-    speed: Floats,
-    depth: Floats,
-    gap: Floats,
-    marks: Codes,
-    limits: tuple[
-        tuple[float, float],
-        tuple[float, float],
-        tuple[float, float, float, float],
-        tuple[float, float, float, float],
-    ],
-    codes: Codes,
+    state: Codes, pending: Codes, now: PairMotion, limits: MotionLimits, codes: Codes
 ) -> None:
     """Trend, touch and moving together of all pairs.
 
     Args:
         state: (3, P) of these so far.
         pending: (3, P) what wanted to be believed so far.
-        tables: (5, M, M); see `Measured`.
-        motion: (3, M, 2) pixels per second.
-        speed: (M,) pixels per second.
-        depth: (M,); NaN unknown.
-        gap: (P,) of the outlines, smoothed, pixels.
-        marks: (P,) `COUPLED` or `MERGED` pairs.
-        limits: Rates to enter and to leave a trend; in deviations, to want it and to go on wanting it;
-            gaps to begin and to keep a touch, shares of depth by which it ends and begins to be none;
-            relative speed of rest, the same in halves of the window, by how much more it may be while
-            it goes on, share of the speed that is asked for at which it does. Pixels, seconds.
+        now: What they are judged by.
+        limits: Thresholds.
         codes: (4, P) written but for the last row, the trend of depth, which is read.
     """
-    rates, sigmas, touch, rest = limits
-    count, k = len(speed), -1
-    for i in range(count):
-        for j in range(i + 1, count):
+    rates, tables, depth, k = limits.rates, now.tables, now.depth, -1
+    for i in range(len(now.speed)):
+        for j in range(i + 1, len(now.speed)):
             k += 1
-            found = classify_trend(
-                tables[RATE, i, j], tables[SIGMA, i, j], state[0, k], pending[0, k], rates, sigmas
-            )
+            rate, sigma = tables[PairQuantity.RATE, i, j], tables[PairQuantity.SIGMA, i, j]
+            found = classify_trend(rate, sigma, state[0, k], pending[0, k], rates, limits.sigmas)
             found = combined_trend(found, codes[3, k])
-            touching = _touching(gap[k], (depth[i], depth[j]), state[1, k], touch)
-            halves = _length(motion[1], i, j), _length(motion[2], i, j)
-            slower = min(speed[i], speed[j])
-            codes[2, k] = _together(tables[RELATIVE, i, j], halves, slower, state[2, k], rest)
-            if marks[k] & COUPLED and touching == 1 and found == DIVERGING:
+            touching = _touching(now.gap[k], (depth[i], depth[j]), state[1, k], limits.touch)
+            halves = _length(now.motion[1], i, j), _length(now.motion[2], i, j)
+            relative, slower = (
+                tables[PairQuantity.RELATIVE_SPEED, i, j],
+                min(now.speed[i], now.speed[j]),
+            )
+            codes[2, k] = _together(relative, halves, slower, state[2, k], limits.rest)
+            if now.marks[k] & COUPLED and touching == 1 and found == DIVERGING:
                 # One body that turns changes its outline; it parts when its parts no longer touch.
                 found = KEEPING
-            if marks[k] & MERGED:
+            if now.marks[k] & MERGED:
                 found, touching = UNKNOWN, 1
             codes[0, k], codes[1, k] = found, touching
 
 
 @compiled
+def _certainties(rate: float, sigma: float, cap: float, floor: float) -> tuple[float, float]:
+    """Of most relations, and of a trend that is so many deviations from zero."""
+    sure = abs(rate / np.hypot(sigma, floor))
+    sure = 0.0 if np.isnan(sure) else 1.0 - 0.5 * np.exp(-sure / 3.0)
+    return min(cap, 0.9), min(cap, sure)
+
+
+@compiled
 def relation_rows(
-    state: Codes,
-    since: Floats,
-    rcc8: Codes,
-    rcc8_since: Floats,
+    beliefs: PairBeliefs,
     tables: Floats,
     depth: Floats,
-    converse: Codes,
-    opposite: Codes,
+    converses: tuple[Codes, Codes],
     numbers: tuple[float, float, float],
 ) -> tuple[Codes, Floats, Floats]:
-    """What a table of relations says of all pairs; its rows are those of `relations.QUESTIONS`.
+    """What a table of relations says of all pairs; its rows are those of `TableRow`.
 
     Args:
-        state: (R, P) of the latch; see `relations.py`.
-        since: (R, P) seconds.
-        rcc8: (2, P) of boxes and of outlines.
-        rcc8_since: (2, P) seconds.
-        tables: (5, M, M); see `Measured`.
+        beliefs: States of the pairs.
+        tables: (5, M, M); see `PairQuantity`.
         depth: (M,); NaN unknown.
-        converse: RCC-8 of (a, b) -> that of (b, a).
-        opposite: The same of directions.
+        converses: RCC-8 of (a, b) -> that of (b, a); the same of directions.
         numbers: Seconds now; most that is believed without depth; noise of a trend that is never believed
             to be less, pixels per second.
 
     Returns:
-        (16, P) codes and (16, P) seconds; (7, P) certainty of what cannot be doubted, of most others and
-        of trends, then gap, trend, its deviation and relative speed.
+        (16, P) codes and (16, P) seconds since when; (7, P) numbers; see `ValueRow`.
     """
+    state, since, rcc8, rcc8_since = beliefs
     now, image_only, floor = numbers
-    count, pairs = len(depth), state.shape[1]
-    codes, moments, values = (
-        np.empty((16, pairs), np.int8),
-        np.empty((16, pairs)),
-        np.empty((7, pairs)),
-    )
-    for n in range(len(TABLE_ROWS)):
-        for k in range(pairs):
-            codes[TABLE_ROWS[n], k], moments[TABLE_ROWS[n], k] = (
-                state[STATE_ROWS[n], k],
-                since[STATE_ROWS[n], k],
-            )
-    for k in range(pairs):
-        codes[3, k], codes[6, k], moments[15, k] = rcc8[0, k], rcc8[1, k], since[8, k]
-        moments[3, k] = moments[4, k] = rcc8_since[0, k]
-        moments[6, k] = moments[7, k] = rcc8_since[1, k]
-    k = -1
-    for i in range(count):
-        for j in range(i + 1, count):
+    converse, opposite = converses
+    pairs, k = state.shape[1], -1
+    codes, moments = np.empty((16, pairs), np.int8), np.empty((16, pairs))
+    values = np.empty((7, pairs))
+    for row, source in COPIED:
+        codes[row], moments[row] = state[source], since[source]
+    codes[TableRow.BOXES], codes[TableRow.OUTLINES] = rcc8[0], rcc8[1]
+    moments[TableRow.BOXES] = moments[TableRow.BOXES_CONVERSE] = rcc8_since[0]
+    moments[TableRow.OUTLINES] = moments[TableRow.OUTLINES_CONVERSE] = rcc8_since[1]
+    moments[TableRow.DIRECTION_CONVERSE] = since[StateRow.DIRECTION]
+    moments[TableRow.GAP], values[ValueRow.CERTAIN] = now, 1.0
+    for i in range(len(depth)):
+        for j in range(i + 1, len(depth)):
             k += 1
-            codes[4, k], codes[7, k] = converse[rcc8[0, k]], converse[rcc8[1, k]]
-            codes[15, k] = opposite[state[8, k]]
-            gap, rate, sigma = tables[GAP, i, j], tables[RATE, i, j], tables[SIGMA, i, j]
-            codes[5, k], moments[5, k] = (UNKNOWN if np.isnan(gap) else 0), now
+            codes[TableRow.BOXES_CONVERSE, k] = converse[rcc8[0, k]]
+            codes[TableRow.OUTLINES_CONVERSE, k] = converse[rcc8[1, k]]
+            codes[TableRow.DIRECTION_CONVERSE, k] = opposite[state[StateRow.DIRECTION, k]]
+            gap = tables[PairQuantity.GAP, i, j]
+            rate, sigma = tables[PairQuantity.RATE, i, j], tables[PairQuantity.SIGMA, i, j]
+            codes[TableRow.GAP, k] = UNKNOWN if np.isnan(gap) else 0
             cap = 1.0 if np.isfinite(depth[i]) and np.isfinite(depth[j]) else image_only
-            sure = abs(rate / np.hypot(sigma, floor))
-            sure = 0.0 if np.isnan(sure) else 1.0 - 0.5 * np.exp(-sure / 3.0)
-            values[0, k], values[1, k], values[2, k] = 1.0, min(cap, 0.9), min(cap, sure)
-            values[3, k], values[4, k], values[5, k] = gap, rate, sigma
-            values[6, k] = tables[RELATIVE, i, j]
+            most, trend = _certainties(rate, sigma, cap, floor)
+            values[ValueRow.MOST, k], values[ValueRow.TREND_CERTAINTY, k] = most, trend
+            values[ValueRow.GAP, k], values[ValueRow.RATE, k] = gap, rate
+            values[ValueRow.SIGMA, k] = sigma
+            values[ValueRow.RELATIVE_SPEED, k] = tables[PairQuantity.RELATIVE_SPEED, i, j]
     return codes, moments, values

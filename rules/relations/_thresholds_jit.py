@@ -1,7 +1,7 @@
 """Qualitative states of all pairs from what is measured, compiled: one pair after another.
 
 The calculi are explained in `rcc8.py`, `direction.py`, `distance.py`, `qtc.py` and `trend.py`, the
-thresholds in `judge.py`. Every question has one function of one pair; NaN is unknown, and every
+thresholds in `thresholds.py`. Every question has one function of one pair; NaN is unknown, and every
 comparison with it fails.
 """
 
@@ -65,7 +65,7 @@ def beyond(value: float, least: float, share: float) -> float:
 def moving_signs(
     speeds: Floats, sigma: Floats, before: Codes, limits: tuple[float, float, float, float]
 ) -> Codes:
-    """(P,) signs of speeds; limits as the last four of `judge.limits`."""
+    """(P,) signs of speeds; limits as the last four of `thresholds.limits`."""
     enter, leave, sure, still = limits
     codes = np.empty(len(speeds), np.int8)
     for k in range(len(speeds)):
@@ -249,12 +249,12 @@ def classify_boxes(
     """Order of edges, direction, class of distance and movements of all pairs of boxes.
 
     Args:
-        before: (R, P) codes so far, of which those of `judge.py` come first.
+        before: (R, P) codes so far, of which those of `thresholds.py` come first.
         boxes: (M, 4) x, y, width, height, pixels; NaN for what is not seen.
         velocities: (M, 2) of their centres, pixels per second; NaN unknown.
         spread: (M,) standard deviation of a component.
-        limits: See `judge.limits`.
-        codes: (R, P) written: what is wanted now, the rows of `judge.py`.
+        limits: See `thresholds.limits`.
+        codes: (R, P) written: what is wanted now, the rows of `thresholds.py`.
     """
     level, level_out, near, far, cone, noise, slack, enter, leave, sure, still = limits
     count, number = len(boxes), -1

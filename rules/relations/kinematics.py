@@ -12,16 +12,8 @@ from visup.rules.geometry._fit_jit import fit_motion
 from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
 from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, image_diagonal
-from visup.rules.relations._kinematics_jit import (
-    CONTACT,
-    GAP,
-    RATE,
-    RELATIVE,
-    SIGMA,
-    hull_gaps,
-    pair_tables,
-    time_to_contact,
-)
+from visup.rules.relations._kinematics_jit import hull_gaps, pair_tables, time_to_contact
+from visup.rules.relations.rows import PairQuantity
 from visup.rules.relations.samples import SampleWindow
 from visup.rules.relations.thresholds import ThresholdSettings
 
@@ -118,22 +110,22 @@ class Kinematics:
     @property
     def gap(self) -> Floats:
         """(M, M) distance of the outlines, pixels."""
-        return self._table(GAP)
+        return self._table(PairQuantity.GAP)
 
     @property
     def rate(self) -> Floats:
         """(M, M) trend of the distance, pixels per second, negative when closing."""
-        return self._table(RATE)
+        return self._table(PairQuantity.RATE)
 
     @property
     def rate_sigma(self) -> Floats:
         """(M, M) its standard deviation."""
-        return self._table(SIGMA)
+        return self._table(PairQuantity.SIGMA)
 
     @property
     def relative_speed(self) -> Floats:
         """(M, M) pixels per second."""
-        return self._table(RELATIVE)
+        return self._table(PairQuantity.RELATIVE_SPEED)
 
     @property
     def time_to_contact(self) -> Floats:
@@ -141,9 +133,9 @@ class Kinematics:
 
         0 where they meet, infinite where they do not close in.
         """
-        return self._table(CONTACT)
+        return self._table(PairQuantity.TIME_TO_CONTACT)
 
-    def _table(self, number: int) -> Floats:
+    def _table(self, number: PairQuantity) -> Floats:
         found: Floats = self.tables[number]
         return found
 
@@ -288,7 +280,7 @@ def _moved(table: Floats, old: tuple[int, ...], new: tuple[int, ...]) -> Floats:
 
 
 def sightings(objects: tuple[ObjectBelief, ...], now: float) -> Floats:
-    """(M, 8) how bodies were seen; see `measure_loops.py`."""
+    """(M, 8) how bodies were seen; see `hull_gaps`."""
     rows = []
     for b in objects:
         r = b.region

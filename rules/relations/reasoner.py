@@ -52,6 +52,9 @@ from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations._pair_states_jit import (
     COUPLED,
     MERGED,
+    MotionLimits,
+    PairBeliefs,
+    PairMotion,
     classify_motion,
     relation_rows,
     smoothed_boxes,
@@ -74,8 +77,21 @@ from visup.rules.relations.rcc8 import (
     from_signs,
     outline_differences,
 )
+from visup.rules.relations.rows import (
+    AWAY,
+    BOX_ROWS,
+    MOTION,
+    MOTION_AND_DEPTH,
+    ORDER,
+    OUTLINE,
+    ROWS,
+    SIDE,
+    StateRow,
+)
+from visup.rules.relations.rows import TableRow as T
+from visup.rules.relations.rows import ValueRow as V
 from visup.rules.relations.samples import SampleWindow, covers_window, sampled
-from visup.rules.relations.thresholds import AWAY, BOX_ROWS, ORDER, SIDE, least_durations, limits
+from visup.rules.relations.thresholds import least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 
 DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
@@ -98,35 +114,29 @@ NAMES = tuple(
     for name in names
     if name
 )
-"""Every relation of two objects that is judged here; `coupled` is judged by `coupling.py`."""
+"""Every relation of two objects that is judged here; `coupled` is judged by `coupling/reasoner.py`."""
 
-TREND, TOUCH, TOGETHER, DEPTH = range(BOX_ROWS, BOX_ROWS + 4)
-OUTLINE = slice(BOX_ROWS + 4, BOX_ROWS + 7)
-ROWS = BOX_ROWS + 7
-"""Rows of codes: those of `judge.py`, then trend, touch, moving together, depth, outlines (3)."""
-
-_SURE, _MOSTLY, _TREND, _GAP, _RATE, _SIGMA, _RELATIVE = range(7)
 COLUMNS = ColumnLayout(
     (
-        Column(TREND_NAMES, (0, 0), _TREND, _RATE, _SIGMA),
-        Column(("", "touching"), (1, 1), _MOSTLY, _GAP),
-        Column(("", "moving_together"), (2, 2), _MOSTLY, _RELATIVE),
-        Column(RCC8, (3, 4), _SURE, listed="one"),
-        Column(("distance",), (5, 5), _SURE, _GAP),
-        Column(OUTLINE_NAMES, (6, 7), _SURE, listed="none"),
-        Column(DEPTH_NAMES, (8, 8), _MOSTLY, listed="none"),
-        Column(TOWARDS_NAMES, (9, 10), _MOSTLY, listed="none"),
-        Column(SIDE_NAMES, (11, 12), _MOSTLY, listed="none"),
-        Column(CLASS_NAMES, (13, 13), _SURE, _GAP, listed="none"),
-        Column(DIRECTION_NAMES, (14, 15), _SURE),
+        Column(TREND_NAMES, (T.TREND, T.TREND), V.TREND_CERTAINTY, V.RATE, V.SIGMA),
+        Column(("", "touching"), (T.TOUCH, T.TOUCH), V.MOST, V.GAP),
+        Column(("", "moving_together"), (T.TOGETHER, T.TOGETHER), V.MOST, V.RELATIVE_SPEED),
+        Column(RCC8, (T.BOXES, T.BOXES_CONVERSE), V.CERTAIN, listed="one"),
+        Column(("distance",), (T.GAP, T.GAP), V.CERTAIN, V.GAP),
+        Column(OUTLINE_NAMES, (T.OUTLINES, T.OUTLINES_CONVERSE), V.CERTAIN, listed="none"),
+        Column(DEPTH_NAMES, (T.DEPTH, T.DEPTH), V.MOST, listed="none"),
+        Column(TOWARDS_NAMES, (T.FIRST_AWAY, T.SECOND_AWAY), V.MOST, listed="none"),
+        Column(SIDE_NAMES, (T.FIRST_SIDE, T.SECOND_SIDE), V.MOST, listed="none"),
+        Column(CLASS_NAMES, (T.DISTANCE, T.DISTANCE), V.CERTAIN, V.GAP, listed="none"),
+        Column(DIRECTION_NAMES, (T.DIRECTION, T.DIRECTION_CONVERSE), V.CERTAIN),
     )
 )
-"""What the rows of `relation_loops.told` stand for."""
+"""What the rows of `relation_rows` stand for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothedGeometry:
-    """Places of objects, smoothed a little; see `smooth.py`.
+    """Places of objects, smoothed a little; see `ema.py`.
 
     Attributes:
         time: Seconds of the last step.
@@ -152,14 +162,14 @@ class RelationMemory:
     Attributes:
         history: Samples that lines are fitted to.
         measured: Quantities of the last step.
-        latch: (ROWS, P) states of the pairs of the history's objects.
+        states: (ROWS, P) states of the pairs of the history's objects.
         rcc8: (2, P) RCC-8 of boxes and of outlines, which follow from some of these states.
         smooth: What states of place are judged by.
     """
 
     history: SampleWindow = field(default_factory=SampleWindow)
     measured: Kinematics = field(default_factory=Kinematics)
-    latch: HysteresisState = field(default_factory=lambda: unknown_states((ROWS, 0), 0.0))
+    states: HysteresisState = field(default_factory=lambda: unknown_states((ROWS, 0), 0.0))
     rcc8: HysteresisState = field(default_factory=lambda: unknown_states((2, 0), 0.0))
     smooth: SmoothedGeometry = field(default_factory=lambda: _no_smooth())
 
@@ -198,7 +208,7 @@ def qtc(mind: Mind, a: int, b: int) -> str | None:
     if k < 0:
         return None
     order = slice(None, None, -1) if turned else slice(None)
-    state = kept.latch.state
+    state = kept.states.state
     return text(*(int(c) for rows in (AWAY, SIDE) for c in state[rows, k][order]))
 
 
@@ -222,14 +232,14 @@ class RelationReasoner:
         seen = sightings(objects, mind.time)
         now = KinematicsEstimator(s)(history, objects, seen, mind, kept.measured)
         smooth = self._smooth(before.smooth, now, objects, seen, mind)
-        wants = self._wanted(before.latch, history, now, smooth, mind)
-        latch = advance(before.latch, wants, mind.time, self._lasts)
+        wants = self._wanted(before.states, history, now, smooth, mind)
+        states = advance(before.states, wants, mind.time, self._lasts)
         rcc8 = before.rcc8
-        if latch is not before.latch:  # else these follow from what is as it was
-            state = latch.state
+        if states is not before.states:  # else these follow from what is as it was
+            state = states.state
             held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
             rcc8 = advance(rcc8, held, mind.time, 0.0)
-        kept = RelationMemory(history, now, latch, rcc8, smooth)
+        kept = RelationMemory(history, now, states, rcc8, smooth)
         table = RelationTable(now.ids, (self._cells(kept, mind),))
         return Outcome(mind.remember(RELATIONS, kept, relations=table))
 
@@ -237,7 +247,7 @@ class RelationReasoner:
         s = self.settings
         lasts = np.full((ROWS, 1), s.touch_minimum_s)
         lasts[:BOX_ROWS] = least_durations(s.judge)
-        lasts[[TREND, TOGETHER, DEPTH]] = s.trend_minimum_s
+        lasts[[StateRow.TREND, StateRow.TOGETHER, StateRow.DEPTH]] = s.trend_minimum_s
         return lasts
 
     def _wanted(
@@ -252,36 +262,28 @@ class RelationReasoner:
         codes = np.empty(before.state.shape, dtype=np.int8)
         bounds = limits(s.judge, diagonal)
         classify_boxes(before.state, smooth.boxes, now.velocity, now.velocity_sigma, bounds, codes)
-        codes[DEPTH] = self._depth_trend(h)
+        codes[StateRow.DEPTH] = self._depth_trend(h)
+        motion = PairMotion(
+            now.tables, now.motion, now.speed, now.depth, smooth.gap, _marks(h.ids, mind)
+        )
         classify_motion(
-            before.state[TREND:DEPTH],
-            before.pending[TREND:DEPTH],
-            now.tables,
-            now.motion,
-            now.speed,
-            now.depth,
-            smooth.gap,
-            _marks(h.ids, mind),
+            before.state[MOTION],
+            before.pending[MOTION],
+            motion,
             self._limits(diagonal),
-            codes[TREND : DEPTH + 1],
+            codes[MOTION_AND_DEPTH],
         )
         level = s.judge.level_enter * diagonal, s.judge.level_exit * diagonal
         codes[OUTLINE] = signs_with_hysteresis(smooth.outlines, before.state[OUTLINE], *level)
         return codes
 
-    def _limits(self, diagonal: float) -> PairLimits:
-        """Thresholds as `relation_loops.wanted` takes them."""
+    def _limits(self, diagonal: float) -> MotionLimits:
         s = self.settings
-        return (
+        return MotionLimits(
             (s.rate_enter * diagonal, s.rate_exit * diagonal),
             (s.sigmas, s.pending_sigmas),
             (s.touch_enter * diagonal, s.touch_exit * diagonal, s.apart_exit, s.apart_depth),
-            (
-                s.still_speed * diagonal,
-                s.still_half * diagonal,
-                s.together_exit,
-                s.moving_exit,
-            ),
+            (s.still_speed * diagonal, s.still_half * diagonal, s.together_exit, s.moving_exit),
         )
 
     def _smooth(
@@ -329,26 +331,17 @@ class RelationReasoner:
     def _cells(self, kept: RelationMemory, mind: Mind) -> RelationBlock:
         s, now = self.settings, kept.measured
         floor = s.rate_enter * image_diagonal(mind.frame_size) / 3.0
+        beliefs = PairBeliefs(
+            kept.states.state, kept.states.since, kept.rcc8.state, kept.rcc8.since
+        )
         found = relation_rows(
-            kept.latch.state,
-            kept.latch.since,
-            kept.rcc8.state,
-            kept.rcc8.since,
+            beliefs,
             now.tables,
             now.depth,
-            CONVERSE,
-            DIRECTION_CONVERSE,
+            (CONVERSE, DIRECTION_CONVERSE),
             (mind.time, s.image_only_confidence, floor),
         )
         return RelationBlock(COLUMNS, *found)
-
-
-PairLimits = tuple[
-    tuple[float, float],
-    tuple[float, float],
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-]
 
 
 def _reindexed_memory(kept: RelationMemory, ids: tuple[int, ...], now: float) -> RelationMemory:
@@ -362,8 +355,8 @@ def _reindexed_memory(kept: RelationMemory, ids: tuple[int, ...], now: float) ->
         np.append(kept.smooth.gap, np.nan)[numbers],
         np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1).take(numbers, axis=1),
     )
-    latch, rcc8 = kept.latch.select(numbers, now), kept.rcc8.select(numbers, now)
-    return replace(kept, latch=latch, rcc8=rcc8, smooth=smooth)
+    states, rcc8 = kept.states.select(numbers, now), kept.rcc8.select(numbers, now)
+    return replace(kept, states=states, rcc8=rcc8, smooth=smooth)
 
 
 def _marks(ids: tuple[int, ...], mind: Mind) -> Codes:

@@ -1,8 +1,8 @@
 """From quantities of pairs to qualitative states: thresholds above the noise, with hysteresis.
 
-Shared by the relations of an agent's objects (`relations.py`) and those of plain boxes
-(`boxes.py`). All states of all pairs stand in one array of codes, a row for each question, so that
-one latch holds them all.
+Shared by the relations of an agent's objects (`reasoner.py`) and those of plain boxes
+(`visup/evaluation/reasoning/boxes.py`). All states of all pairs stand in one array of codes, a row for
+each question; see `rows.py`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,7 @@ from math import radians
 import numpy as np
 
 from visup.rules.geometry.hysteresis import Floats
-
-ORDER, DIRECTION, DISTANCE = slice(0, 8), 8, 9
-AWAY, SIDE = slice(10, 12), slice(12, 14)
-MOVEMENT = slice(10, 14)
-BOX_ROWS = 14
-"""Rows of codes: order of edges (8), direction, distance class, QTC-B (2) and its sides (2)."""
+from visup.rules.relations.rows import BOX_ROWS, MOVEMENT
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +55,7 @@ Limits = tuple[float, float, float, float, float, float, float, float, float, fl
 
 
 def limits(s: ThresholdSettings, diagonal: float) -> Limits:
-    """Thresholds as `judge_loops.judged` takes them.
+    """Thresholds as `classify_boxes` takes them.
 
     Args:
         s: Settings.

@@ -67,7 +67,7 @@ class ZoneMemory:
     Attributes:
         ids: (M,) object ids.
         names: (Z,) zones.
-        latch: (4, Z * M) states, zone by zone: the signs of how far centre, nearest and farthest
+        states: (4, Z * M) states, zone by zone: the signs of how far centre, nearest and farthest
             part are outside the polygon, and of how far the depth is outside its range.
         outside: (Z, M) pixels of the centre, negative inside.
         smooth: (4, Z * M) how far outside, smoothed; what states are judged by.
@@ -76,7 +76,7 @@ class ZoneMemory:
 
     ids: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
-    latch: HysteresisState = field(default_factory=lambda: unknown_states((4, 0), 0.0))
+    states: HysteresisState = field(default_factory=lambda: unknown_states((4, 0), 0.0))
     outside: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     smooth: Floats = field(default_factory=lambda: np.zeros((4, 0)))
     time: float = 0.0
@@ -98,7 +98,7 @@ class ZoneReasoner:
         s, objects = self.settings, mind.present()
         old = mind.recall(ZONES)
         ids, names = tuple(b.id for b in objects), tuple(z.name for z in mind.zones)
-        latch, smooth = self._before(old, ids, names, mind.time)
+        states, smooth = self._before(old, ids, names, mind.time)
         apart = np.array([[self._apart(z, b, mind) for b in objects] for z in mind.zones])
         apart = apart.reshape(len(names), len(ids), 4)
         flat = apart.reshape(-1, 4).T
@@ -110,9 +110,9 @@ class ZoneReasoner:
         flat = np.append(
             exponential_mean(smooth[:3], flat[:3], mind.time - old.time, jump), flat[3:], axis=0
         )
-        wanted = edge_sign(flat, latch.state, band)
-        latch = advance(latch, wanted, mind.time, s.minimum_s)
-        kept = ZoneMemory(ids, names, latch, apart[:, :, 0], flat, mind.time)
+        wanted = edge_sign(flat, states.state, band)
+        states = advance(states, wanted, mind.time, s.minimum_s)
+        kept = ZoneMemory(ids, names, states, apart[:, :, 0], flat, mind.time)
         told = tuple(
             _relation(kept, question, i, name)
             for name in names
@@ -125,12 +125,12 @@ class ZoneReasoner:
         self, old: ZoneMemory, ids: tuple[int, ...], names: tuple[str, ...], now: float
     ) -> tuple[HysteresisState, Floats]:
         if old.ids == ids and old.names == names:
-            return old.latch, old.smooth
+            return old.states, old.smooth
         known = ((z, i) for z in old.names for i in old.ids)
         place = {which: k for k, which in enumerate(known)}
         places = np.array([place.get((z, i), -1) for z in names for i in ids], dtype=np.intp)
         smooth = np.append(old.smooth, np.full((4, 1), np.nan), axis=1)[:, places]
-        return old.latch.select(places, now), smooth
+        return old.states.select(places, now), smooth
 
     def _apart(self, zone: Zone, belief: ObjectBelief, mind: Mind) -> tuple[float, ...]:
         """Outside the zone: centre, nearest part, farthest part, depth; NaN unknown."""
@@ -226,11 +226,11 @@ def _relation(kept: ZoneMemory, question: str, object_id: int, zone: str) -> Rel
     """In the image and in depth: what is outside in either is outside, whatever is unknown."""
     k = kept.names.index(zone) * len(kept.ids) + kept.ids.index(object_id)
     rows = [QUESTIONS.index(question), 3]
-    codes = [int(c) for c in kept.latch.state[rows, k]]
-    since = float(kept.latch.since[rows, k].max())
+    codes = [int(c) for c in kept.states.state[rows, k]]
+    since = float(kept.states.since[rows, k].max())
     if ABOVE in codes:
         # Outside since the first of the two says so.
-        told = [t for c, t in zip(codes, kept.latch.since[rows, k], strict=True) if c == ABOVE]
+        told = [t for c, t in zip(codes, kept.states.since[rows, k], strict=True) if c == ABOVE]
         return Relation(f"{question} {zone}", (object_id,), Truth.FALSE, float(min(told)))
     if UNKNOWN in codes:
         return Relation(f"{question} {zone}", (object_id,), Truth.UNKNOWN, since, 0.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from itertools import product
 
 from visup.agent import Mind, Truth
 from visup.agent.model.errors import RuleError
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import Rule
 from visup.rules.monitoring.intervals import verdict
 from visup.rules.predicates.snapshot import Snapshot
@@ -58,8 +58,7 @@ def rule_named(values: Evaluation, name: str) -> Rule:
     """
     rules = {rule.name: rule for rule in values.prepared.rules}
     if name not in rules:
-        close = get_close_matches(name, list(rules), 1, 0.6)
-        hint = f"did you mean '{close[0]}'?" if close else None
+        hint = did_you_mean(name, rules)
         what = f"no rule '{name}' was judged"
         raise RuleError(what, expected=f"one of {', '.join(rules)}", hint=hint)
     return rules[name]

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from visup.rules.formula.nodes import Rule
+from visup.rules.formula.truth import MAYBE
 from visup.rules.monitoring.compiler import ValueRef
 from visup.rules.monitoring.intervals import Interval
 from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.states import States
 from visup.rules.monitoring.vm import Codes, Floats, Ints, find_true
 from visup.rules.predicates.inputs_missing import inputs_missing
-from visup.rules.predicates.snapshot import MAYBE, Snapshot
+from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.compiled_rules import AlarmKey, CompiledRules
 
 

@@ -224,7 +224,7 @@ def _loaded(point: EntryPoint) -> ActionDefinition:
         ) from fault
     if not isinstance(made, ActionDefinition):
         expected = f"a `ActionDefinition` (entry point group `{GROUP}`)"
-        raise TaskError(f"`{point.name}` is no action", where=point.value, expected=expected)
+        raise TaskError(f"`{point.name}` is not an action", where=point.value, expected=expected)
     return made
 
 

@@ -14,34 +14,22 @@ from types import MappingProxyType
 import numpy as np
 
 from visup.agent import Truth
-from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
+from visup.rules.formula.truth import NEGATION, TRUTH_OF, truth_if
 from visup.rules.predicates.inputs_missing import inputs_missing
-from visup.rules.predicates.snapshot import MAYBE, NO, YES, Snapshot
+from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.relations.zones import contains, zone_truth
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
-from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
-from visup.tasks.grammar.nodes import Action, Actors, Task, walk
+from visup.tasks.grammar.conditions import Fact, action_of, bound_of, facts_of
+from visup.tasks.grammar.nodes import Action, Actors, Comparison, Task, walk
 from visup.tasks.grammar.statement import RESERVED_WORDS as RESERVED
 from visup.tasks.grammar.structure import fact_key
-from visup.tasks.grammar.units import value
+from visup.tasks.grammar.units import MEASURES, value
 
 OF_TASKS = frozenset({"unexpected", "expected", "actor"})
 """Words of rules that speak of tasks themselves: a task that asked for them would ask for itself."""
 
 DEPTHS = frozenset({"region", "hypothesis", "depth"})
-
-MEASURES: Mapping[Dimension, str] = {
-    TIME: "time",
-    LENGTH: "length",
-    SPEED: "speed",
-    SHARE: "share",
-    ANGLE: "angle",
-    ANGULAR_SPEED: "angular_speed",
-}
-"""Dimension of a quantity of rules -> what tasks call it; see `units.py`."""
-
-TRUTHS = {YES: Truth.TRUE, MAYBE: Truth.UNKNOWN, NO: Truth.FALSE}
 
 FactEvaluator = Callable[[Snapshot, tuple[int, ...]], Truth]
 """Whether something holds between objects, by id, in a mind as rules see it."""
@@ -108,11 +96,11 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             continue
         text = actions[name].text
         if isinstance(fact, Comparison):
-            amount = task.amount(fact.amount)
-            looks[key] = _comparison(name, fact.sign, value(amount))
-            text = f"at a {name.replace('_', ' ')} {SIGNS[fact.sign]} {amount}"
+            amount = task.amount(bound_of(fact))
+            looks[key] = _comparison(name, fact.operator, value(amount))
+            text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {amount}"
         else:
-            zone = next(str(a) for a in fact.actors if str(a) in zones)
+            zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
             text = f"{text} {zone}"
         takes = tuple(k for k in actions[name].kinds if k == "object")
@@ -141,7 +129,7 @@ def _word(name: str) -> FactEvaluator:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        return TRUTHS[int(PREDICATES[name].look(facts)[rows])]
+        return TRUTH_OF[int(PREDICATES[name].look(facts)[rows])]
 
     return look
 
@@ -169,7 +157,7 @@ def _comparison(name: str, sign: str, bound: float) -> FactEvaluator:
             return Truth.UNKNOWN
         low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
         told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
-        return Truth.UNKNOWN if len(told) > 1 else _truth(told.pop())
+        return Truth.UNKNOWN if len(told) > 1 else truth_if(told.pop())
 
     return look
 
@@ -189,16 +177,9 @@ def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
             centre = np.array([region.centroid])
             points = centre if name == "inside" else np.asarray(region.contour, dtype=float)
             within = contains(points, polygon)
-            told = _truth(bool(within.all() if name == "wholly_inside" else within.any()))
+            told = truth_if(bool(within.all() if name == "wholly_inside" else within.any()))
         else:
             told = zone_truth(facts.mind, question, ids[0], zone)
-        return OPPOSITE[told] if name == "outside" else told
+        return NEGATION[told] if name == "outside" else told
 
     return look
-
-
-OPPOSITE = {Truth.TRUE: Truth.FALSE, Truth.FALSE: Truth.TRUE, Truth.UNKNOWN: Truth.UNKNOWN}
-
-
-def _truth(holds: bool) -> Truth:
-    return Truth.TRUE if holds else Truth.FALSE

@@ -53,6 +53,11 @@ class Transition:
     carried: tuple[int, ...]
     share: float
 
+    @property
+    def begun(self) -> tuple[int, ...]:
+        """Positions in the target of the steps that begin by it."""
+        return tuple(i for i, c in enumerate(self.carried) if c == NEW)
+
 
 class Automaton:
     """The states of a task and the ways between them.

@@ -29,21 +29,21 @@ class Backpointer:
 
 @dataclass(frozen=True, slots=True)
 class Revision:
-    """A step that was told to be over and is now believed not to have been.
+    """A step that was reported to be over and is now believed not to have been.
 
     Attributes:
         step: The step.
-        told: When it was believed to have ended, seconds.
+        reported: When it was believed to have ended, seconds.
         revised: When that was taken back, seconds.
     """
 
     step: TaskStep
-    told: float
+    reported: float
     revised: float
 
     def __str__(self) -> str:
         return (
-            f"`{self.step.stage}`, told done at {self.told:.1f} s, "
+            f"`{self.step.stage}`, reported complete at {self.reported:.1f} s, "
             f"is now believed not to have happened"
         )
 
@@ -59,6 +59,13 @@ def extended(
     if backpointer is not None and backpointer.length % MOST_BEHIND == 0:
         return _cut(backpointer, MOST_BEHIND)
     return backpointer
+
+
+def steps_behind(backpointer: Backpointer | None) -> Iterator[TaskStep]:
+    """The steps that lie behind, the last first, as far as they are remembered."""
+    while backpointer is not None:
+        yield backpointer.step
+        backpointer = backpointer.before
 
 
 def _cut(backpointer: Backpointer, most: int) -> Backpointer:

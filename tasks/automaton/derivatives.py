@@ -63,7 +63,7 @@ class TaskStep:
     """One action that a course asks for.
 
     Attributes:
-        action: Its name; for a comparison or a zone its key (see `structure.keyed`).
+        action: Its name; for a comparison or a zone its key (see `structure.fact_key`).
         actors: Who should do it.
         stage: The innermost stage that asks for it.
         hold_s: Seconds for which it must hold, or None when the course does not say.
@@ -192,7 +192,7 @@ def begin(task: Task) -> Continuation:
 
 
 def enter(
-    task: Task, continuation: Continuation, payload: W, now: float, depth: int = 0
+    task: Task, continuation: Continuation, payload: W, now: float
 ) -> Iterator[State[W] | None]:
     """All ways in which a course can begin.
 
@@ -201,51 +201,11 @@ def enter(
         continuation: The course.
         payload: What each step starts with.
         now: Seconds, from which each `within` counts.
-        depth: How many references were followed without a step; a guard.
 
     Yields:
         States; None where the course may be left out whole.
     """
-    if depth > DEEPEST:
-        return
-    match continuation.course:
-        case Action() | Comparison():
-            yield from _enter_fact(task, continuation, continuation.course, payload)
-        case Reference(stage=name):
-            yield from _enter_stage(
-                task, replace(continuation, stage=name), continuation.stage, payload, now, depth
-            )
-        case Sequence(items=items):
-            rest = items[1] if len(items) == 2 else Sequence(items[1:])
-            yield from _enter_then(task, continuation, items[0], rest, payload, now, depth)
-        case Choice(options=options):
-            for option in options:
-                yield from enter(task, replace(continuation, course=option), payload, now, depth)
-        case Together(parts=parts):
-            yield from _enter_together(task, continuation, parts, payload, now, depth)
-        case AnyOrder(items=items):
-            for i, item in enumerate(items):
-                others = (*items[:i], *items[i + 1 :])
-                rest = others[0] if len(others) == 1 else AnyOrder(others)
-                yield from _enter_then(task, continuation, item, rest, payload, now, depth)
-        case Timed(item=item, clauses=clauses):
-            timed = _timed(task, replace(continuation, course=item), clauses, now)
-            yield from enter(task, timed, payload, now, depth)
-        case Conditioned(item=item, conditions=conditions):
-            kinds = {c.kind for c in conditions}
-            kept = tuple(c for c in continuation.conditions if c.kind not in kinds)
-            judged = replace(continuation, course=item, conditions=(*kept, *conditions))
-            yield from enter(task, judged, payload, now, depth)
-        case Counted():
-            yield from _enter_counted(task, continuation, continuation.course, payload, now, depth)
-        case Repeated(item=item, mark=mark):
-            if mark == "?":
-                yield from enter(task, replace(continuation, course=item), payload, now, depth)
-            else:
-                again = Repeated(item, "*")
-                yield from _enter_then(task, continuation, item, again, payload, now, depth)
-            if mark != "+":
-                yield None
+    return _Entrance(task, payload, now).states(continuation)
 
 
 def derivatives(task: Task, state: State[W], payload: W, now: float) -> Iterator[Derivative[W]]:
@@ -272,95 +232,113 @@ def derivatives(task: Task, state: State[W], payload: W, now: float) -> Iterator
             yield from _parallel_derivatives(task, parts, payload, now)
 
 
-def _enter_fact(
-    task: Task, continuation: Continuation, fact: Fact, payload: W
-) -> Iterator[State[W] | None]:
-    key, actors = fact_key(task, fact)
-    step = TaskStep(
-        key,
-        actors,
-        continuation.stage,
-        continuation.hold_s,
-        continuation.deadlines,
-        continuation.conditions,
-        continuation.inside,
-    )
-    yield Leaf(step, payload)
-    if any(task.actor(a).optional for a in actors):
-        yield None
+@dataclass(frozen=True, slots=True)
+class _Entrance(Generic[W]):
+    """How courses begin at one moment.
 
+    Attributes:
+        task: The task whose stages references mean.
+        payload: What each step starts with.
+        now: Seconds, from which each `within` counts.
+        depth: How many references were followed without a step; a guard.
+    """
 
-def _enter_counted(
-    task: Task, continuation: Continuation, counted: Counted, payload: W, now: float, depth: int
-) -> Iterator[State[W] | None]:
-    """Once, and after it as often as is left to do."""
-    if counted.most == 0:
-        yield None
-        return
-    if counted.most == 1:
-        yield from enter(task, replace(continuation, course=counted.item), payload, now, depth)
-    else:
-        most = None if counted.most is None else counted.most - 1
-        again = Counted(counted.item, max(0, counted.least - 1), most)
-        yield from _enter_then(task, continuation, counted.item, again, payload, now, depth)
-    if counted.least == 0:
-        yield None
+    task: Task
+    payload: W
+    now: float
+    depth: int = 0
 
+    def states(self, todo: Continuation) -> Iterator[State[W] | None]:
+        """All ways in which a course can begin; see `enter`."""
+        if self.depth > DEEPEST:
+            return
+        match todo.course:
+            case Action() | Comparison() as fact:
+                yield from self._fact(todo, fact)
+            case Reference(stage=name):
+                yield from self._stage(replace(todo, stage=name), todo.stage)
+            case Sequence(items=items):
+                rest = items[1] if len(items) == 2 else Sequence(items[1:])
+                yield from self._then(todo, items[0], rest)
+            case Choice(options=options):
+                for option in options:
+                    yield from self.states(replace(todo, course=option))
+            case Together(parts=parts):
+                yield from self._together(todo, parts)
+            case AnyOrder(items=items):
+                yield from self._any_order(todo, items)
+            case Timed() | Conditioned() as clauses:
+                yield from self.states(_surrounded(self.task, todo, clauses, self.now))
+            case Counted() as counted:
+                yield from self._counted(todo, counted)
+            case Repeated() as repeated:
+                yield from self._repeated(todo, repeated)
 
-def _enter_stage(
-    task: Task, continuation: Continuation, asked_in: str, payload: W, now: float, depth: int
-) -> Iterator[State[W] | None]:
-    stage = task.stage(continuation.stage)
-    if stage is None:
-        return
-    if not isinstance(stage.body, Actors):
-        continuation = replace(continuation, inside=continuation.inside | {stage.name})
-    if isinstance(stage.body, Actors):
-        # An action in the strict form is asked for by the stage that refers to it.
-        action = Action(stage.name, stage.body.names)
-        yield from enter(
-            task, replace(continuation, course=action, stage=asked_in), payload, now, depth + 1
-        )
-    else:
-        yield from enter(task, replace(continuation, course=stage.body), payload, now, depth + 1)
-
-
-def _enter_then(
-    task: Task,
-    continuation: Continuation,
-    first: Course,
-    rest: Course,
-    payload: W,
-    now: float,
-    depth: int,
-) -> Iterator[State[W] | None]:
-    later = replace(continuation, course=rest)
-    for state in enter(task, replace(continuation, course=first), payload, now, depth):
-        if state is None:
-            # `first` is left out; a repetition of nothing would never end.
-            if not isinstance(rest, Repeated | Counted) or rest.item != first:
-                yield from enter(task, later, payload, now, depth)
-        else:
-            yield SequenceState(state, later)
-
-
-def _enter_together(
-    task: Task,
-    continuation: Continuation,
-    parts: tuple[Course, ...],
-    payload: W,
-    now: float,
-    depth: int,
-) -> Iterator[State[W] | None]:
-    transitions = [
-        tuple(enter(task, replace(continuation, course=p), payload, now, depth)) for p in parts
-    ]
-    for transition in product(*transitions):
-        under_way = tuple(s for s in transition if s is not None)
-        if not under_way:
+    def _fact(self, todo: Continuation, fact: Fact) -> Iterator[State[W] | None]:
+        key, actors = fact_key(self.task, fact)
+        around = (todo.stage, todo.hold_s, todo.deadlines, todo.conditions, todo.inside)
+        yield Leaf(TaskStep(key, actors, *around), self.payload)
+        if any(self.task.actor(a).optional for a in actors):
             yield None
+
+    def _stage(self, todo: Continuation, asked_in: str) -> Iterator[State[W] | None]:
+        stage = self.task.stage(todo.stage)
+        if stage is None:
+            return
+        deeper = replace(self, depth=self.depth + 1)
+        if isinstance(stage.body, Actors):
+            # An action in the strict form is asked for by the stage that refers to it.
+            action = Action(stage.name, stage.body.names)
+            yield from deeper.states(replace(todo, course=action, stage=asked_in))
         else:
-            yield under_way[0] if len(under_way) == 1 else ParallelState(under_way)
+            inside = todo.inside | {stage.name}
+            yield from deeper.states(replace(todo, course=stage.body, inside=inside))
+
+    def _then(self, todo: Continuation, first: Course, rest: Course) -> Iterator[State[W] | None]:
+        later = replace(todo, course=rest)
+        for state in self.states(replace(todo, course=first)):
+            if state is not None:
+                yield SequenceState(state, later)
+            # `first` is left out; a repetition of nothing would never end.
+            elif not isinstance(rest, Repeated | Counted) or rest.item != first:
+                yield from self.states(later)
+
+    def _together(self, todo: Continuation, parts: tuple[Course, ...]) -> Iterator[State[W] | None]:
+        for way in product(*(tuple(self.states(replace(todo, course=p))) for p in parts)):
+            under_way = tuple(s for s in way if s is not None)
+            if not under_way:
+                yield None
+            else:
+                yield under_way[0] if len(under_way) == 1 else ParallelState(under_way)
+
+    def _any_order(
+        self, todo: Continuation, items: tuple[Course, ...]
+    ) -> Iterator[State[W] | None]:
+        for i, item in enumerate(items):
+            others = (*items[:i], *items[i + 1 :])
+            yield from self._then(todo, item, others[0] if len(others) == 1 else AnyOrder(others))
+
+    def _counted(self, todo: Continuation, counted: Counted) -> Iterator[State[W] | None]:
+        """Once, and after it as often as is left to do."""
+        if counted.most == 0:
+            yield None
+            return
+        if counted.most == 1:
+            yield from self.states(replace(todo, course=counted.item))
+        else:
+            most = None if counted.most is None else counted.most - 1
+            again = Counted(counted.item, max(0, counted.least - 1), most)
+            yield from self._then(todo, counted.item, again)
+        if counted.least == 0:
+            yield None
+
+    def _repeated(self, todo: Continuation, repeated: Repeated) -> Iterator[State[W] | None]:
+        if repeated.mark == "?":
+            yield from self.states(replace(todo, course=repeated.item))
+        else:
+            yield from self._then(todo, repeated.item, Repeated(repeated.item, "*"))
+        if repeated.mark != "+":
+            yield None
 
 
 def _parallel_derivatives(
@@ -378,6 +356,18 @@ def _parallel_derivatives(
                 )
     for together in product(*ends):
         yield Derivative(None, tuple(leaf for m in together for leaf in m.left))
+
+
+def _surrounded(
+    task: Task, todo: Continuation, course: Timed | Conditioned, now: float
+) -> Continuation:
+    """The course inside clauses or conditions, which surround each of its steps."""
+    todo = replace(todo, course=course.item)
+    if isinstance(course, Timed):
+        return _timed(task, todo, course.clauses, now)
+    kinds = {c.kind for c in course.conditions}
+    outer = tuple(c for c in todo.conditions if c.kind not in kinds)
+    return replace(todo, conditions=(*outer, *course.conditions))
 
 
 def _timed(

@@ -9,7 +9,6 @@ with the probability of its mass. Summed over time that bounds how often the tru
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
@@ -23,7 +22,7 @@ class Weighted(Generic[H]):
     """What is remembered by a hypothesis, with its weights.
 
     Attributes:
-        what: The hypothesis, with what the best way to it remembers.
+        value: The hypothesis, with what the best way to it remembers.
         mass: Probability, given all that was seen.
         best: Probability of the best way to it, relative to the best of all.
     """
@@ -38,7 +37,7 @@ class Pruned(Generic[K, H]):
     """The belief after one step.
 
     Attributes:
-        kept: Hypotheses by key; their masses sum to 1. Empty when nothing has any mass.
+        retained: Hypotheses by key; their masses sum to 1. Empty when nothing has any mass.
         dropped: Share of the mass that was dropped in this step.
         evidence: Mass before it was made to sum to 1: how likely what was seen is, given all that
             was seen before.
@@ -56,34 +55,33 @@ def merged(grown: Iterable[tuple[K, H, float, float]]) -> dict[K, Weighted[H]]:
         grown: (key, what is remembered, mass, probability of the best way) of each way.
     """
     found: dict[K, tuple[H, float, float]] = {}
-    for key, what, mass, best in grown:
+    for key, value, mass, best in grown:
         other = found.get(key)
         if other is None:
-            found[key] = (what, mass, best)
+            found[key] = (value, mass, best)
         elif best > other[2]:
-            found[key] = (what, mass + other[1], best)
+            found[key] = (value, mass + other[1], best)
         else:
             found[key] = (other[0], mass + other[1], other[2])
     return {key: Weighted(*values) for key, values in found.items()}
 
 
 def pruned(found: Mapping[K, Weighted[H]], most: int, least: float) -> Pruned[K, H]:
-    """The heaviest hypotheses, with masses that sum to 1.
+    """The heaviest hypotheses, the heaviest first, with masses that sum to 1.
 
     Args:
         found: All of them.
-        most: How many are kept at most.
+        most: How many are retained at most.
         least: What has a smaller share of the mass than this is dropped.
     """
     total = sum(w.mass for w in found.values())
     if total <= 0.0:
         return Pruned()
-    kept = {k: w for k, w in found.items() if w.mass >= least * total}
-    if len(kept) > most:
-        heavy = heapq.nlargest(most, kept.items(), key=lambda item: item[1].mass)
-        kept = dict(heavy)
-    remains = sum(w.mass for w in kept.values())
-    highest = max(w.best for w in kept.values())
+    retained = [(k, w) for k, w in found.items() if w.mass >= least * total]
+    retained.sort(key=lambda item: -item[1].mass)
+    del retained[most:]
+    remains = sum(w.mass for _, w in retained)
+    highest = max(w.best for _, w in retained)
     scale = 1.0 / highest if highest > 0.0 else 0.0
-    even = {k: Weighted(w.value, w.mass / remains, w.best * scale) for k, w in kept.items()}
+    even = {k: Weighted(w.value, w.mass / remains, w.best * scale) for k, w in retained}
     return Pruned(even, max(0.0, 1.0 - remains / total), total)

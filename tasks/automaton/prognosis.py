@@ -109,4 +109,4 @@ class Prognosis:
 def begun_by(automaton: Automaton, transition: Transition) -> list[TaskStep]:
     """The steps that begin by a way."""
     steps = automaton.steps(transition.target)
-    return [s for s, c in zip(steps, transition.carried, strict=True) if c < 0]
+    return [steps[i] for i in transition.begun]

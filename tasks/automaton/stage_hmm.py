@@ -171,6 +171,13 @@ class StageHmm:
             ratio = (confidence * going[seen] + blur) / whole
         return float(ratio ** (dt / self.look_s))
 
+    def false_alarm(self, confidence: float) -> float:
+        """How much likelier it is that what held for a look was a false alarm than that it was so.
+
+        A false alarm lasts as long as it lasts, so that it counts once and not at every look.
+        """
+        return 1.0 - confidence * (1.0 - self.spurious / (1.0 - self.spurious))
+
     def fate(self, step: TaskStep, phase: int) -> float:
         """Probability that a step in a phase is left at all, and not lost before."""
         return self._fates(step.hold_s)[phase]

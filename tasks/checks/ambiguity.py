@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
+from visup.rules.formula.units import Span
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
 from visup.tasks.grammar.graphs import dependencies_first
@@ -22,7 +23,6 @@ from visup.tasks.grammar.nodes import (
     Reference,
     Repeated,
     Sequence,
-    Span,
     Task,
     Timed,
     Together,

@@ -7,8 +7,8 @@ from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
 
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition, contradict
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
 from visup.tasks.grammar.graphs import reachable
@@ -97,7 +97,7 @@ class CourseCheck:
                 if len(clauses) > 1:
                     span = clauses[1].span
                     yield self.source.fault(
-                        "E208", f"`{word}` is said twice", span, f"one `{word}`"
+                        "E208", f"`{word}` is given twice", span, f"one `{word}`"
                     )
             least = self.grammar.min_duration(course)
             for deadline in deadlines[:1]:
@@ -133,7 +133,7 @@ class CourseCheck:
         one, other = self.actions.get(a.name), self.actions.get(b.name)
         if one is None or other is None:
             return False
-        return {str(x) for x in a.actors} == {str(x) for x in b.actors} and contradict(one, other)
+        return set(a.words) == set(b.words) and contradict(one, other)
 
     def invariants(self) -> Iterator[Diagnostic]:
         """Invariants that the task itself breaks."""
@@ -159,7 +159,7 @@ class CourseCheck:
         if not isinstance(said, Action) or not isinstance(fact, Action):
             return invariant.when == "never" and str(said) == str(fact)
         if invariant.when == "never":
-            return (fact.name, {*fact.actors}) == (said.name, {*said.actors})
+            return (fact.name, {*fact.words}) == (said.name, {*said.words})
         return self.contradict(said, fact)
 
     def conditions(self) -> Iterator[Diagnostic]:
@@ -170,7 +170,7 @@ class CourseCheck:
             told: set[str] = set()
             for sign in course.conditions:
                 if sign.kind in told:
-                    what = f"`{sign.kind} when` is said twice"
+                    what = f"`{sign.kind} when` is given twice"
                     hint = "join the conditions with `or` or `and`"
                     yield self.source.fault(
                         "E235", what, sign.span, f"one `{sign.kind} when`", hint

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from collections.abc import Set as AnySet
 
-from visup.agent.model.errors import ErrorGroup, TaskError, VisupError
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.files import read_beside
 from visup.tasks.checks.semantics import check_semantics
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.diagnostics.includes import Read, join_included
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import parse
@@ -55,17 +54,3 @@ def diagnose(
 def _order(fault: Diagnostic, files: Mapping[str, int]) -> tuple[int, int, int, str]:
     place = fault.place
     return files.get(place.file, 0), place.line, place.column, fault.code
-
-
-def raise_all(faults: Sequence[TaskError]) -> None:
-    """Raise some mistakes, if there are any.
-
-    Raises:
-        TaskError: The mistake, when there is one.
-        ManyErrors: All of them, when there are several.
-    """
-    if len(faults) == 1:
-        raise faults[0]
-    if faults:
-        many: list[VisupError] = list(faults)
-        raise ErrorGroup(many)

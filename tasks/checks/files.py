@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib.resources import files
 from os.path import normpath
 from pathlib import Path
 
 from visup.agent.model.errors import TaskError
+from visup.agent.model.suggestions import closest
 
 
 def read_text(path_or_name: str | Path) -> str:
@@ -23,7 +23,7 @@ def read_text(path_or_name: str | Path) -> str:
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for
             raise TaskError(
-                "cannot be read: it is no file", where=str(path), expected="a task file"
+                "cannot be read: it is not a file", where=str(path), expected="a task file"
             )
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -70,12 +70,8 @@ def _no_such(name: str) -> TaskError:
     known = (
         [*shipped, *(p.name for p in sorted(beside.glob("*.task")))] if beside.is_dir() else shipped
     )
-    close = get_close_matches(Path(name).name, known, n=1, cutoff=0.75) or get_close_matches(
-        Path(name).stem, shipped, n=1
-    )
-    hint = None
-    if close:
-        what = "the shipped task" if close[0] in shipped else "the file"
-        hint = f"did you mean {what} `{close[0]}`?"
+    near = closest(Path(name).name, known, 0.75) or closest(Path(name).stem, shipped)
+    what = "the shipped task" if near in shipped else "the file"
+    hint = f"did you mean {what} `{near}`?" if near else None
     expected = f"a file, or a shipped task: {', '.join(shipped)}"
     return TaskError("there is no such task file", where=name, expected=expected, hint=hint)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from visup.agent.model.errors import TaskError
+from visup.rules.language.diagnostics import raise_all
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.checks.diagnose import diagnose, raise_all
+from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_text, shipped_tasks
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import tasks_of
@@ -34,7 +35,7 @@ def parse_task(
         ManyErrors: When it has several; all are told at once, in the order of the text.
     """
     task, faults = diagnose(text, file, actions)
-    raise_all(faults)
+    raise_all(faults, TaskError)
     return task
 
 

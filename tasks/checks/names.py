@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isinf
 
+from visup.agent.model.suggestions import did_you_mean
+from visup.rules.formula.nodes import Comparison
+from visup.rules.formula.units import Number, Span
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, did_you_mean
 from visup.tasks.diagnostics.recovery import ParsedFile
-from visup.tasks.grammar.conditions import Amount, Comparison, Name, Span, facts_of
+from visup.tasks.grammar.conditions import Amount, Name, ParameterRef, action_of, bound_of, facts_of
 from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
 from visup.tasks.grammar.units import MEANT, SIZE, TIME, UNITS, dimension, units_of
 
@@ -76,13 +79,13 @@ class NameCheck:
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
         for comparison in self.comparisons:
-            meaning = self.actions.get(comparison.quantity.name)
-            yield comparison.amount, meaning.measures if meaning else ""
+            meaning = self.actions.get(action_of(comparison).name)
+            yield bound_of(comparison), meaning.measures if meaning else ""
 
     def amounts(self) -> Iterator[Diagnostic]:
         """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
         for parameter in self.task.parameters:
-            if parameter.amount.parameter:
+            if isinstance(parameter.amount, ParameterRef):
                 what = f"parameter `{parameter.name}` is not given a number"
                 expected = "a number and a unit, such as `90 s`"
                 yield self.source.fault("E132", what, parameter.amount.span, expected)
@@ -90,18 +93,18 @@ class NameCheck:
                 yield from self.amount(parameter.amount, "")
         known = {p.name: p.amount for p in self.task.parameters}
         for amount, wanted in self.used():
-            if not amount.parameter:
+            if isinstance(amount, Number):
                 yield from self.amount(amount, wanted)
-            elif amount.parameter not in known:
-                if not self.parsed.lacking and amount.parameter not in self.parsed.defined:
-                    hint = did_you_mean(amount.parameter, known) if len(known) < MANY else None
-                    what = f"parameter `{amount.parameter}` is not declared"
-                    expected = f"`parameter {amount.parameter} is 90 s`"
+            elif amount.name not in known:
+                if not self.parsed.lacking and amount.name not in self.parsed.defined:
+                    hint = did_you_mean(amount.name, known, "`{}`") if len(known) < MANY else None
+                    what = f"parameter `{amount}` is not declared"
+                    expected = f"`parameter {amount} is 90 s`"
                     yield self.source.fault("E223", what, amount.span, expected, hint)
             else:
-                yield from self.of_kind(known[amount.parameter], wanted, amount)
+                yield from self.of_kind(self.task.amount(amount), wanted, amount)
 
-    def amount(self, amount: Amount, wanted: str) -> Iterator[Diagnostic]:
+    def amount(self, amount: Number, wanted: str) -> Iterator[Diagnostic]:
         """What is wrong with one amount that is not a parameter."""
         if amount.unit not in UNITS:
             meant = MEANT.get(amount.unit.casefold())
@@ -111,30 +114,30 @@ class NameCheck:
             what = f"`{amount.unit}` is not a unit{' of time' if wanted == TIME else ''}"
             expected = units_of(wanted) if wanted in _MEASURED else ", ".join(UNITS)
             yield self.source.fault("E218", what, amount.span, expected, hint)
-        elif isinf(amount.number):
+        elif isinf(amount.value):
             yield self.source.fault(
                 "E217", "the number is too large", amount.span, "a smaller number"
             )
-        elif amount.number <= 0 and wanted == TIME:
-            yield self.source.fault("E217", f"`{amount}` is no time at all", amount.span)
-        elif amount.number <= 0 and wanted == SIZE:
-            yield self.source.fault("E217", f"`{amount}` is no size at all", amount.span)
+        elif amount.value <= 0 and wanted == TIME:
+            yield self.source.fault("E217", f"`{amount}` is not a positive duration", amount.span)
+        elif amount.value <= 0 and wanted == SIZE:
+            yield self.source.fault("E217", f"`{amount}` is not a positive size", amount.span)
         else:
             yield from self.of_kind(amount, wanted, amount)
 
-    def of_kind(self, amount: Amount, wanted: str, used: Amount) -> Iterator[Diagnostic]:
+    def of_kind(self, amount: Number, wanted: str, used: Amount) -> Iterator[Diagnostic]:
         """A fault when an amount does not measure what is wanted where it is used."""
         measured = dimension(amount)
         if wanted in _MEASURED and measured and measured != wanted:
-            what = f"`{used}` is no {WORDS.get(wanted, wanted)}"
-            if used.parameter:
-                what = f"parameter `{used}` is `{amount}`, which is no {WORDS.get(wanted, wanted)}"
+            what = f"`{used}` is not {_a(WORDS.get(wanted, wanted))}"
+            if isinstance(used, ParameterRef):
+                what = f"parameter `{used}` is `{amount}`, which is not {_a(WORDS.get(wanted, wanted))}"
             hint = "did you mean `min`?" if (wanted, amount.unit) == (TIME, "m") else None
             yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
 
     def compared(self) -> Iterator[Diagnostic]:
         """Quantities that are not compared, comparisons of what is none."""
-        compared = {id(c.quantity.span) for c in self.comparisons}
+        compared = {id(action_of(c).span) for c in self.comparisons}
         for name, _, span in self.asked:
             meaning = self.actions.get(name)
             if meaning is None:
@@ -143,7 +146,7 @@ class NameCheck:
                 what = f"`{name}` is a quantity and is not compared with anything"
                 yield self.source.fault("E227", what, span, f"such as `{written(meaning)}`")
             elif not meaning.measures and id(span) in compared:
-                what = f"`{name}` is no quantity, so it cannot be compared"
+                what = f"`{name}` is not a quantity, so it cannot be compared"
                 some = sorted(m.name for m in self.actions.values() if m.measures)
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
@@ -158,11 +161,11 @@ class NameCheck:
                 said = str(actor)
                 known = said in zones or said in self.parsed.defined or self.parsed.lacking
                 if kind == "zone" and not known:
-                    what = f"`{name}` speaks of a zone, and `{said}` is none"
-                    hint = did_you_mean(said, zones)
+                    what = f"`{name}` takes a zone, but `{said}` is not one"
+                    hint = did_you_mean(said, zones, "`{}`")
                     yield self.source.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
                 elif kind == "object" and said in zones:
-                    what = f"`{said}` is a zone, and `{name}` speaks of an actor here"
+                    what = f"`{said}` is a zone, but `{name}` takes an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
 
     def declared(self) -> Iterator[Diagnostic]:
@@ -180,7 +183,7 @@ class NameCheck:
         if self.parsed.faults:
             return
         named = {str(a) for _, actors, _ in self.asked for a in actors}
-        named |= {a.parameter for a, _ in self.used()}
+        named |= {a.name for a, _ in self.used() if isinstance(a, ParameterRef)}
         for kind, declared in (("zone", self.task.zones), ("parameter", self.task.parameters)):
             for one in declared:
                 if one.name not in named and not one.span.file:
@@ -207,3 +210,7 @@ WORDS = {
     "size": "real size",
 }
 _MEASURED = frozenset(d for d, _ in UNITS.values())
+
+
+def _a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"

@@ -13,14 +13,16 @@ from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
+from visup.agent.model.suggestions import closest, did_you_mean
+from visup.rules.formula.units import Span
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.courses import CourseCheck
 from visup.tasks.checks.names import NameCheck
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, closest, did_you_mean
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
-from visup.tasks.grammar.conditions import action_of, facts_of
+from visup.tasks.grammar.conditions import action_of, actors_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
@@ -29,7 +31,6 @@ from visup.tasks.grammar.nodes import (
     Course,
     Name,
     Reference,
-    Span,
     Stage,
     walk,
 )
@@ -87,8 +88,7 @@ class _Semantics:
         signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
         facts += [f for c in conditions for f in facts_of(c)]
-        actions = map(action_of, facts)
-        asked = [(a.name, a.actors, a.span) for a in actions]
+        asked = [(action_of(f).name, actors_of(f), action_of(f).span) for f in facts]
         asked += [
             (s.name, s.body.names, s.span)
             for s in task.stages
@@ -164,7 +164,7 @@ class _Semantics:
         named += [Name(a.name, a.span) for a in task.declared]
         for name in named:
             if str(name) in RESERVED_WORDS:
-                what = f"`{name}` is a word of the language"
+                what = f"`{name}` is a reserved word"
                 yield self.source.fault("E123", what, name.span, "another name")
 
     def unknown_actions(self) -> Iterator[Diagnostic]:
@@ -180,7 +180,7 @@ class _Semantics:
             hint = f"did you mean `{near}`?" if near else None
             what = f"unknown action `{name}`"
             if self.is_head(span):
-                what = f"`<{name}>` is given actors, but `{name}` is no action"
+                what = f"`<{name}>` is given actors, but `{name}` is not an action"
             yield self.source.fault("E201", what, at, shown, hint)
 
     def is_head(self, span: Span) -> bool:
@@ -268,9 +268,9 @@ class _Semantics:
         roots = self.parsed.task.roots
         for stage in self.grammar.unreachable():
             if stage.name not in missing | misread and not stage.span.file:
-                what = f"task `{roots[0]}` never comes to stage `<{stage.name}>`"
+                what = f"task `{roots[0]}` never reaches stage `<{stage.name}>`"
                 if len(roots) > 1:
-                    what = f"no task of the file comes to stage `<{stage.name}>`"
+                    what = f"no task of the file reaches stage `<{stage.name}>`"
                 hint = "refer to it from another stage, or take it out; the first rule is the task"
                 yield self.source.fault("E204", what, stage.span, hint=hint)
 
@@ -301,7 +301,7 @@ class _Semantics:
                 continue  # an included file may offer more than is used
             if not any(_slip(n, actor.name) for n in named):
                 what = f"actor `{actor.name}` is declared but takes no part"
-                hint = did_you_mean(actor.name, named)
+                hint = did_you_mean(actor.name, named, "`{}`")
                 yield self.source.fault("E213", what, actor.span, "an action with this actor", hint)
 
 

@@ -1,6 +1,6 @@
 """Diagnostics of task files: each error has a stable code, a place, and advice.
 
-Read in this order: `diagnostic.py` (codes and the record), `normalise.py` (characters), `recovery.py`
+Read in this order: `codes.py` (every code), `normalise.py` (characters), `recovery.py`
 (statement by statement, where a file does not parse), `error_patterns.py` and
 `course_error_patterns.py` (errors that people often make), `includes.py` (files within files),
 `explain.py` with `explanations.txt` (each code at length).

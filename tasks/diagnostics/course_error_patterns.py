@@ -27,7 +27,7 @@ def brackets(text: str) -> RecognisedError | None:
     """Brackets of the wrong kind, not closed, or not opened."""
     m = re.search(r"[\[\]{}]", text)
     if m is not None:
-        what = f"`{m[0]}` is no bracket of the language"
+        what = f"`{m[0]}` is not a bracket of the language"
         hint = "what may be left out is written `( ... )?`, what is repeated `( ... )*`"
         return RecognisedError(
             "E112", m.start(), 1, what, "`(` and `)` for groups and actors", hint
@@ -70,7 +70,7 @@ def operators(text: str) -> RecognisedError | None:
         )
     m = re.search(r"[>)\w]\s+(/)\s+[<(\w]", text)
     if m is not None:
-        return RecognisedError("E122", m.start(1), 1, "`/` does not part alternatives", "`|`")
+        return RecognisedError("E122", m.start(1), 1, "`/` does not separate alternatives", "`|`")
     return None
 
 
@@ -143,7 +143,7 @@ def commas(text: str) -> RecognisedError | None:
     """Commas missing between actors, or standing where none belongs."""
     m = re.search(rf"{NAME}[ ]*\([^()]*?({NAME})[ ]+({NAME})[^()]*\)", text)
     if m is not None:
-        what = f"actors `{m[1]}` and `{m[2]}` are not parted by a comma"
+        what = f"actors `{m[1]}` and `{m[2]}` are not separated by a comma"
         length = m.end(2) - m.start(1)
         return RecognisedError("E117", m.start(1), length, what, f"`{m[1]}, {m[2]}`")
     m = re.search(r"\([^()]*?(,\s*)(?=[,)])|\(\s*(,)", text)
@@ -215,7 +215,7 @@ def any_order(text: str) -> RecognisedError | None:
         return None
     what = f"`{' '.join(m[0].split())}` stands without a list in brackets"
     if re.match(r"\s*\(", text[m.end() :]):
-        what = "`any order` needs at least two things, parted by commas"
+        what = "`any order` needs at least two things, separated by commas"
     if m[0].startswith("in"):
         what = "`in` does not stand before `any order`"
     return RecognisedError("E135", m.start(), len(m[0]), what, "`any order (<a>, <b>)`")

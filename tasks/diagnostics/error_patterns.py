@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.diagnostics.course_error_patterns import (
     action_in_angles,
     any_order,
@@ -26,7 +27,6 @@ from visup.tasks.diagnostics.course_error_patterns import (
     signs,
     times,
 )
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
 from visup.tasks.grammar.statement import (
     NAME,
     RESERVED_WORDS,
@@ -149,9 +149,7 @@ def _word_as_name(text: str) -> RecognisedError | None:
         return None
     word = m[1] or m[2]
     start = m.start(1) if m[1] else m.start(2)
-    return RecognisedError(
-        "E123", start, len(word), f"`{word}` is a word of the language", "another name"
-    )
+    return RecognisedError("E123", start, len(word), f"`{word}` is a reserved word", "another name")
 
 
 def _actor(text: str) -> RecognisedError | None:
@@ -167,7 +165,7 @@ def _actor(text: str) -> RecognisedError | None:
         what = "`size` is not followed by a number and a unit"
         return RecognisedError("E124", size.start(), 4, what, "such as `size 1.6 m`")
     if m[2] == "is":
-        hint = "several models are parted by `or`" if re.search(r"[,|/]|\band\b", text) else None
+        hint = "several models are separated by `or`" if re.search(r"[,|/]|\band\b", text) else None
         spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
         if hint is None and spaced is not None:
             hint = f"the name of a model has no blanks, such as `{spaced[1]}_{spaced[2]}`"
@@ -194,7 +192,7 @@ def _zone(text: str) -> RecognisedError | None:
     what = "the name of the zone is missing"
     if m[2]:
         corners = len(re.findall(r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)", text))
-        what = f"zone `{m[2]}` is drawn with something that is no corner"
+        what = f"zone `{m[2]}` is drawn with something that is not a corner"
         what = f"zone `{m[2]}` has fewer than three corners" if corners < 3 else what
         what = what if m[3] else f"`is` is missing after zone `{m[2]}`"
     start = m.start(2) if m[2] else m.start(1)

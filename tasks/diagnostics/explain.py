@@ -7,7 +7,8 @@ from functools import lru_cache
 from importlib.resources import files
 
 from visup.agent.model.errors import TaskError
-from visup.tasks.diagnostics.diagnostic import CODES, did_you_mean
+from visup.agent.model.suggestions import did_you_mean
+from visup.tasks.diagnostics.codes import CODES
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ def explain(code: str) -> CodeExplanation:
         expected = (
             f"`{next(iter(CODES))}` to `{list(CODES)[-1]}`, as messages show them in brackets"
         )
-        hint = did_you_mean(code.upper(), CODES)
+        hint = did_you_mean(code.upper(), CODES, "`{}`")
         raise TaskError(f"there is no code `{code}`", expected=expected, hint=hint)
     return found
 

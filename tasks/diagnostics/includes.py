@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from visup.agent.model.errors import TaskError
-from visup.tasks.diagnostics.diagnostic import Source
+from visup.rules.language.diagnostics import Source
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import ParsedFile, parse
 from visup.tasks.grammar.nodes import Include, Task

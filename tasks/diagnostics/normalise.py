@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from visup.agent.model.errors import SourceLocation
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source
+from visup.rules.language.diagnostics import Diagnostic, Source
 
 COMMENT = re.compile(r"#.*")
 TEXT = re.compile(r"""(?:::=|\binclude\b)\s*("[^"\n]*"|[“”„«][^“”»"\n]*[“”»])""")

@@ -10,7 +10,8 @@ from itertools import pairwise
 
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from visup.tasks.diagnostics.diagnostic import Diagnostic, Source, did_you_mean
+from visup.agent.model.suggestions import did_you_mean
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.diagnostics.error_patterns import recognise_error
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import collect, read, read_statements
@@ -210,7 +211,7 @@ def _unexpected(error: UnexpectedInput, chunk: StatementText, source: Source) ->
         what,
         source.place(line, column, max(1, len(found))),
         expected=_said(allowed or set()),
-        hint=did_you_mean(found, KEYWORDS) if _slipped(found) else None,
+        hint=did_you_mean(found, KEYWORDS, "`{}`") if _slipped(found) else None,
     )
 
 

@@ -163,7 +163,7 @@ class Grammar:
                 fact = self._as_fact(course)
                 return name in stages if fact is None else self._empty(fact, stages)
             case Action() | Comparison():
-                return any(str(a) in self._optional for a in action_of(course).actors)
+                return any(a in self._optional for a in action_of(course).words)
             case Choice(options=options):
                 return any(self._empty(o, stages) for o in options)
             case Sequence(items=parts) | Together(parts=parts) | AnyOrder(items=parts):

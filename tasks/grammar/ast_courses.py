@@ -9,7 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from visup.tasks.grammar.conditions import NOWHERE, Action, Amount, Comparison, Condition, Span
+from visup.rules.formula.nodes import Comparison
+from visup.rules.formula.units import NOWHERE, Span
+from visup.tasks.grammar.conditions import Action, Amount, Condition
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from visup.rules.formula.nodes import Comparison
+from visup.rules.formula.units import NOWHERE, Number, Span, number_text
 from visup.tasks.grammar.ast_courses import (
     AnyOrder,
     Choice,
@@ -29,16 +31,7 @@ from visup.tasks.grammar.ast_courses import (
     children,
     walk,
 )
-from visup.tasks.grammar.conditions import (
-    NOWHERE,
-    Action,
-    Amount,
-    Comparison,
-    Condition,
-    Name,
-    Span,
-    number_text,
-)
+from visup.tasks.grammar.conditions import Action, Amount, Condition, Name, ParameterRef
 
 __all__ = [
     "NOWHERE",
@@ -59,7 +52,9 @@ __all__ = [
     "Include",
     "Invariant",
     "Name",
+    "Number",
     "Parameter",
+    "ParameterRef",
     "Reference",
     "Repeated",
     "Sequence",
@@ -236,12 +231,12 @@ class Task:
         """Models that an actor may be: as declared, else the one of the actor's own name."""
         return self.actor(actor).models or (actor,)
 
-    def amount(self, amount: Amount) -> Amount:
-        """What an amount stands for: itself, or what its parameter is."""
-        if not amount.parameter:
+    def amount(self, amount: Amount) -> Number:
+        """What an amount stands for: itself, or what its parameter is; 0 when nobody knows."""
+        if isinstance(amount, Number):
             return amount
-        found = (p.amount for p in self.parameters if p.name == amount.parameter)
-        return next(found, amount)
+        found = next((p.amount for p in self.parameters if p.name == amount.name), None)
+        return found if isinstance(found, Number) else Number(0.0)
 
     def __str__(self) -> str:
         said = (*self.includes, *self.parameters, *self.actors, *self.zones)

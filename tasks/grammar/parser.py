@@ -10,7 +10,10 @@ from typing import Any, Literal, Protocol, TypeVar, cast
 
 from lark import Lark, Token, Transformer
 
-from visup.tasks.grammar.conditions import And, Condition, Fact, Not, Or
+from visup.rules.formula.nodes import And, Not, Or
+from visup.rules.formula.terms import Measure, Term
+from visup.rules.formula.units import Span
+from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -28,11 +31,12 @@ from visup.tasks.grammar.nodes import (
     Include,
     Invariant,
     Name,
+    Number,
     Parameter,
+    ParameterRef,
     Reference,
     Repeated,
     Sequence,
-    Span,
     Stage,
     StageCondition,
     Task,
@@ -135,13 +139,13 @@ class _TaskBuilder(Transformer[Token, Any]):
         return Stage(_bare(head), rest[-1], text, marked, _of(head))
 
     def actors(self, items: list[Token]) -> Actors:
-        return Actors(_names(items), _over(_of(items[0]), _of(items[-1])))
+        return Actors(_names(items), _of(items[0]).to(_of(items[-1])))
 
     def actor(self, items: list[Any]) -> Actor:
         optional = items[0].type == "OPTIONAL"
         name, *rest = items[1:] if optional else items
         models = next((i for i in rest if isinstance(i, tuple)), ())
-        size = next((i for i in rest if isinstance(i, Amount)), None)
+        size = next((i for i in rest if isinstance(i, Number | ParameterRef)), None)
         return Actor(str(name), models, size, optional, _of(name))
 
     def models(self, items: list[Token]) -> tuple[str, ...]:
@@ -166,7 +170,7 @@ class _TaskBuilder(Transformer[Token, Any]):
         when = cast('Literal["never", "always"]', str(items[0]))
         lasting = next((i for i in items if isinstance(i, Hold)), None)
         during = next((i for i in items if isinstance(i, tuple)), ())
-        span = _over(_of(items[0]), during[-1].span if during else items[-1].span)
+        span = _of(items[0]).to(during[-1].span if during else items[-1].span)
         return Invariant(when, items[1], lasting, during, span)
 
     def during(self, items: list[Reference]) -> tuple[Reference, ...]:
@@ -183,7 +187,7 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def any_order(self, items: list[Any]) -> AnyOrder:
         first, *courses, last = items
-        return AnyOrder(tuple(courses), _over(_of(first), _of(last)))
+        return AnyOrder(tuple(courses), _of(first).to(_of(last)))
 
     def judged(self, items: list[Any]) -> Conditioned:
         return Conditioned(items[0], tuple(items[1:]), _all(items))
@@ -193,7 +197,7 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def counted(self, items: list[Any]) -> Counted:
         bounds = {word: number for word, number, _ in items[1:]}
-        span = _over(items[0].span, items[-1][2])
+        span = items[0].span.to(items[-1][2])
         return Counted(items[0], bounds.get("least", 1), bounds.get("most"), span)
 
     def at_least(self, items: list[Token]) -> tuple[str, int, Span]:
@@ -204,45 +208,45 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def repeated(self, items: list[Any]) -> Repeated:
         mark = cast('Literal["?", "*", "+"]', str(items[1]))
-        return Repeated(items[0], mark, _over(items[0].span, _of(items[1])))
+        return Repeated(items[0], mark, items[0].span.to(_of(items[1])))
 
     def hold(self, items: list[Any]) -> Hold:
-        return Hold(items[1], _over(_of(items[0]), items[1].span))
+        return Hold(items[1], _of(items[0]).to(items[1].span))
 
     def deadline(self, items: list[Any]) -> Deadline:
-        return Deadline(items[1], _over(_of(items[0]), items[1].span))
+        return Deadline(items[1], _of(items[0]).to(items[1].span))
 
     def sign(self, items: list[Any]) -> StageCondition:
         kind = cast('Literal["begins", "ends", "progresses", "fails"]', str(items[0]))
         lasting = items[2] if len(items) > 2 else None
-        return StageCondition(kind, items[1], lasting, _over(_of(items[0]), items[-1].span))
+        return StageCondition(kind, items[1], lasting, _of(items[0]).to(items[-1].span))
 
     def amount(self, items: list[Token]) -> Amount:
-        span = _over(_of(items[0]), _of(items[-1]))
+        span = _of(items[0]).to(_of(items[-1]))
         if len(items) == 1:
-            return Amount(0.0, "", str(items[0]), span)
-        return Amount(float(items[0]), str(items[1]), "", span)
+            return ParameterRef(str(items[0]), span)
+        return Number(float(items[0]), str(items[1]), span)
 
     def action(self, items: list[Token]) -> Action:
         name, *actors, last = items
-        return Action(str(name), _names(actors), _over(_of(name), _of(last)))
+        return Action(str(name), _names(actors), _of(name).to(_of(last)))
 
     def comparison(self, items: list[Any]) -> Comparison:
-        sign = cast('Literal["<", "<=", ">", ">="]', str(items[1]))
-        return Comparison(items[0], sign, items[2], _over(items[0].span, items[2].span))
+        quantity = Measure(items[0].name, items[0].words, items[0].span)
+        span = quantity.span.to(items[2].span)
+        return Comparison(quantity, str(items[1]), cast("Term", items[2]), span=span)
 
     def reference(self, items: list[Token]) -> Reference:
         return Reference(_bare(items[0]), _of(items[0]))
 
-    def either(self, items: list[Condition]) -> Or:
+    def or_(self, items: list[Condition]) -> Or:
         return Or(tuple(items), _all(items))
 
-    def both(self, items: list[Condition]) -> And:
+    def and_(self, items: list[Condition]) -> And:
         return And(tuple(items), _all(items))
 
-    def denied(self, items: list[Any]) -> Not:
-        item = cast("Fact", items[1])
-        return Not(item, _over(_of(items[0]), item.span))
+    def not_(self, items: list[Any]) -> Not:
+        return Not(items[1], _of(items[0]).to(items[1].span))
 
 
 def _names(tokens: list[Token]) -> tuple[Name, ...]:
@@ -265,13 +269,8 @@ def _of(token: Token) -> Span:
     return Span(line, column, line, column + width)
 
 
-def _over(first: Span, last: Span) -> Span:
-    """From the beginning of one place to the end of another."""
-    return Span(first.line, first.column, last.end_line, last.end_column)
-
-
 def _all(items: Several[_Placed]) -> Span:
-    return _over(items[0].span, items[-1].span)
+    return items[0].span.to(items[-1].span)
 
 
 def relocated(task: Task, file: str) -> Task:
@@ -282,6 +281,8 @@ def relocated(task: Task, file: str) -> Task:
 def _moved(node: object, file: str) -> object:
     if isinstance(node, Span):
         return replace(node, file=file)
+    if isinstance(node, Name):
+        return Name(node, replace(node.span, file=file))
     if isinstance(node, tuple):
         return tuple(_moved(n, file) for n in node)
     fields = getattr(node, "__dataclass_fields__", None)

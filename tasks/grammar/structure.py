@@ -7,7 +7,8 @@ from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
 
-from visup.tasks.grammar.conditions import Comparison, Fact, action_of, facts_of
+from visup.rules.formula.nodes import Comparison
+from visup.tasks.grammar.conditions import Fact, action_of, bound_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
@@ -118,10 +119,10 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     action on a zone the zone.
     """
     action, zones = action_of(fact), {z.name for z in task.zones}
-    actors = tuple(str(a) for a in action.actors if str(a) not in zones)
-    key = " ".join([action.name, *(str(a) for a in action.actors if str(a) in zones)])
+    actors = tuple(str(a) for a in action.words if a not in zones)
+    key = " ".join([action.name, *(a for a in action.words if a in zones)])
     if isinstance(fact, Comparison):
-        key = f"{key} {fact.sign} {task.amount(fact.amount)}"
+        key = f"{key} {fact.operator} {task.amount(bound_of(fact))}"
     return key, actors
 
 

@@ -1,12 +1,14 @@
-"""Units of amounts: what each measures, and how many of the base unit it is."""
+"""Units of amounts in tasks: those of rules, and real sizes."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 
-from visup.tasks.grammar.conditions import Amount
+from visup.rules.formula import units as of_rules
+from visup.rules.formula.units import Dimension, Number, Unit
 
-TIME, LENGTH, SPEED, SHARE, ANGLE, TURN, SIZE = (
+TIME, LENGTH, SPEED, SHARE, ANGLE, ANGULAR_SPEED, SIZE = (
     "time",
     "length",
     "speed",
@@ -16,21 +18,27 @@ TIME, LENGTH, SPEED, SHARE, ANGLE, TURN, SIZE = (
     "size",
 )
 
+MEASURES: Mapping[Dimension, str] = MappingProxyType(
+    {
+        of_rules.TIME: TIME,
+        of_rules.LENGTH: LENGTH,
+        of_rules.SPEED: SPEED,
+        of_rules.SHARE: SHARE,
+        of_rules.ANGLE: ANGLE,
+        of_rules.ANGULAR_SPEED: ANGULAR_SPEED,
+    }
+)
+"""Dimension of a quantity of rules -> what tasks call it."""
+
+_SIZES = {"mm": (SIZE, 0.001), "cm": (SIZE, 0.01), "m": (SIZE, 1.0)}
+
 UNITS = MappingProxyType(
     {
-        "ms": (TIME, 0.001),
-        "s": (TIME, 1.0),
-        "min": (TIME, 60.0),
-        "h": (TIME, 3600.0),
-        "px": (LENGTH, 1.0),
-        "px/s": (SPEED, 1.0),
-        "%": (SHARE, 0.01),
-        "deg": (ANGLE, 1.0),
-        "deg/s": (TURN, 1.0),
-        "mm": (SIZE, 0.001),
-        "cm": (SIZE, 0.01),
-        "m": (SIZE, 1.0),
+        unit: (MEASURES[measured], factor)
+        for unit, (measured, factor) in of_rules.UNITS.items()
+        if unit != Unit.NONE and measured in MEASURES
     }
+    | _SIZES
 )
 """Unit -> (what it measures, how many of the base unit one of it is)."""
 
@@ -48,12 +56,12 @@ MEANT = MappingProxyType(
 """What people write -> the unit that they mean."""
 
 
-def value(amount: Amount) -> float:
+def value(amount: Number) -> float:
     """An amount in the base unit of what it measures; an unknown unit counts as the base unit."""
-    return amount.number * UNITS.get(amount.unit, ("", 1.0))[1]
+    return amount.value * UNITS.get(amount.unit, ("", 1.0))[1]
 
 
-def dimension(amount: Amount) -> str:
+def dimension(amount: Number) -> str:
     """What an amount measures; empty when its unit is unknown."""
     return UNITS.get(amount.unit, ("", 1.0))[0]
 

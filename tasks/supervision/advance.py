@@ -1,151 +1,195 @@
-"""The ways on from a state of a course, with what is kept about its steps.
-
-They are worked out once for each node of the automaton. Where a task says `within`, each entry to a
-stage has its own time at which it runs out, so that ways on are worked out anew each time.
-"""
+"""When a hypothesis goes on: which transitions what is seen speaks for, and how probable each is."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from visup.tasks.automaton.automaton import END, NEW, Automaton, with_payloads
-from visup.tasks.automaton.derivatives import (
-    Leaf,
-    State,
-    TaskStep,
-    begin,
-    derivatives,
-    enter,
-    leaves,
-)
-from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
-from visup.tasks.verification.step_monitor import StepMonitor, entered
+from visup.agent import Relation, StageBelief, Status
+from visup.agent.model.fast_replace import replace
+from visup.tasks.automaton.backpointers import extended
+from visup.tasks.automaton.derivatives import Leaf, TaskStep, leaves, with_leaves
+from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
+from visup.tasks.supervision.open_transitions import OpenTransition
+from visup.tasks.supervision.sentences import outcome
+from visup.tasks.supervision.step_model import StepModel
+from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
+
+WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
+
+Observe = Callable[[TaskStep], ActionObservation]
+"""What is seen now of a step."""
+
+Supported = Sequence[tuple[OpenTransition, Support]]
 
 
-@dataclass(frozen=True, slots=True)
-class Onward:
-    """One way on.
+@dataclass(frozen=True)
+class Advance:
+    """How hypotheses go on in one time step.
 
     Attributes:
-        left: The steps that are over by it.
-        entered: The steps that begin by it.
-        share: Its share among the ways that leave the same steps.
-        state: Where it leads, with the position of each step that is carried over and `NEW` for
-            those that begin; None at the end of the course.
-        node: The number of that state, or `END`.
-        fresh: Positions of the steps that begin by it.
+        steps: What is read off the monitors of steps.
+        observe: What is seen now of a step.
+        now: Seconds.
+        dt: Seconds since the last time.
     """
 
-    left: tuple[Leaf[StepMonitor], ...]
-    entered: tuple[TaskStep, ...]
-    share: float
-    state: State[int] | None
-    node: int
-    fresh: tuple[int, ...]
+    steps: StepModel
+    observe: Observe
+    now: float
+    dt: float
 
-    @property
-    def ends(self) -> bool:
-        """Whether it is the end of the course."""
-        return self.state is None
+    def outcomes(
+        self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
+    ) -> Iterator[tuple[TaskHypothesis, float]]:
+        """A hypothesis and those that come out of it by leaving a step, with their probabilities."""
+        hypothesis = replace(hypothesis, met=self._met(hypothesis, transitions))
+        ends = any(t.ends and _may_end(t) for t in transitions)
+        if ends and hypothesis.finished is None:
+            hypothesis = replace(hypothesis, finished=self.now)
+        found = ((t, self._support(hypothesis, t)) for t in transitions if not t.ends)
+        supported = [(t, support) for t, support in found if support]
+        # Where the steps are over by themselves, nothing is left to stay for but the end.
+        forced = not ends and any(s >= Support.OVER and self._all_over(t) for t, s in supported)
+        gone = 0.0
+        for transition, chance in self._chances(hypothesis, supported, ends, forced):
+            if chance > 0.0:
+                gone += chance
+                yield self._moved(hypothesis, transition), chance
+        if not forced:
+            considered = tuple((t.entered, support) for t, support in supported)
+            yield replace(hypothesis, considered=considered), max(0.0, 1.0 - gone)
 
+    def _chances(
+        self, hypothesis: TaskHypothesis, supported: Supported, ends: bool, forced: bool
+    ) -> Iterator[tuple[OpenTransition, float]]:
+        shares = sum(t.share for t, _ in supported) or 1.0
+        for transition, support in supported:
+            if forced:
+                yield transition, transition.share / shares * self._skipped(transition)
+            else:
+                chance = self._chance(hypothesis, transition, support, ends)
+                yield transition, chance * transition.share / shares
 
-@dataclass(frozen=True, slots=True)
-class _Way:
-    left: tuple[int, ...]
-    entered: tuple[TaskStep, ...]
-    share: float
-    state: State[int] | None
-    node: int
-    fresh: tuple[int, ...]
+    def _all_over(self, transition: OpenTransition) -> bool:
+        return all(self.steps.over(x) for x in transition.left)
 
+    def _support(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> Support:
+        """How strongly something speaks for a transition."""
+        finished = self._all_over(transition)
+        if not finished and all(_goes_on(s, transition.left) for s in transition.entered):
+            return Support.NONE
+        if transition.entered and self._opens(hypothesis, transition):
+            return Support.BEGUN
+        if finished:
+            return Support.OVER
+        nearer = all(self._nearer(s) for s in transition.entered)
+        return Support.NEARER if nearer else Support.NONE
 
-class Paths:
-    """The ways on in one task.
+    def _chance(
+        self, hypothesis: TaskHypothesis, transition: OpenTransition, support: Support, ends: bool
+    ) -> float:
+        """Probability that the course goes on now by a transition that is supported."""
+        hmm, skipped = self.steps.hmm, self._skipped(transition)
+        if support <= dict(hypothesis.considered).get(transition.entered, Support.NONE):
+            # What was weighed already counts once; but what was seen to begin may begin later on.
+            late = -math.expm1(-hmm.leave * self.dt)
+            return skipped * late if support is Support.BEGUN else 0.0
+        if support is Support.BEGUN:
+            return skipped * (1.0 - hmm.spurious)
+        if support is Support.OVER:
+            return 0.5 if ends else 1.0
+        return skipped * hmm.unseen
 
-    Args:
-        task: The task.
-        automaton: Its states.
-    """
+    def _opens(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
+        """Whether all that a transition enters was seen to begin, and nothing says "not yet"."""
+        if any(self.observe(s).not_yet for s in transition.entered):
+            return False
+        met = dict(hypothesis.met).get(transition.entered, -math.inf)
+        return self.now - met <= self.steps.settings.contact_s
 
-    def __init__(self, task: Task, automaton: Automaton) -> None:
-        self._task = task
-        self._automaton = automaton
-        self._timed = any(_within(task))
-        self._known: dict[int, list[_Way]] = {}
-        self._starts: list[tuple[State[int], int]] = []
+    def _met(
+        self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
+    ) -> tuple[tuple[tuple[TaskStep, ...], float], ...]:
+        """When the entry to each transition was last seen, with what is seen now."""
+        met = dict(hypothesis.met)
+        for transition in transitions:
+            entries = (self.observe(s).entry for s in transition.entered)
+            if transition.entered and all(self._lasted(entry) for entry in entries):
+                met[transition.entered] = self.now
+        return tuple(met.items())
 
-    def begin(self, now: float) -> list[tuple[State[StepMonitor], int]]:
-        """The states in which the task may begin now, each with its number."""
-        fresh = entered(now)
-        return [
-            (with_payloads(state, [Leaf(x.step, fresh) for x in leaves(state)]), node)
-            for state, node in self._beginnings(now)
+    def _lasted(self, relation: Relation | None) -> bool:
+        """Whether a relation by which a step begins has lasted long enough."""
+        if relation is None:
+            return False
+        return self.now - relation.since >= self.steps.settings.enter_s - 1e-9
+
+    def _nearer(self, step: TaskStep) -> bool:
+        """Whether a step comes nearer; one whose course says when it begins only begins."""
+        return step.condition("begins") is None and self._lasted(self.observe(step).helps)
+
+    def _skipped(self, transition: OpenTransition) -> float:
+        """Probability that the steps that a transition leaves are left as they stand."""
+        return math.prod(self._passed_over(x) for x in transition.left)
+
+    def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
+        if leaf.payload.fulfilled:
+            return 1.0
+        lasts = self.steps.actions[leaf.step.action].lasts
+        missed = not lasts and not leaf.payload.held and leaf.payload.broken_since is not None
+        return self.steps.hmm.pass_over ** (2 if missed else 1)
+
+    def _moved(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> TaskHypothesis:
+        opened = self._opens(hypothesis, transition)
+        state = transition.taken(leaves(hypothesis.state), entered(self.now))
+        begun = set(transition.transition.begun)
+        under_way = [
+            self._begun(x, opened) if i in begun else x for i, x in enumerate(leaves(state))
         ]
-
-    def first_steps(self) -> Iterator[TaskStep]:
-        """The steps with which the task may begin."""
-        return (x.step for state, _ in self._beginnings(0.0) for x in leaves(state))
-
-    def _beginnings(self, now: float) -> list[tuple[State[int], int]]:
-        if self._starts:
-            return self._starts
-        states = enter(self._task, begin(self._task), NEW, now)
-        found = [(s, self._automaton.node(s)) for s in states if s is not None]
-        if not self._timed:
-            self._starts = found
-        return found
-
-    def onward(self, state: State[StepMonitor], node: int, now: float) -> list[Onward]:
-        """All ways on from a state.
-
-        Args:
-            state: The state.
-            node: Its number.
-            now: Seconds, from which each `within` counts.
-        """
-        transitions = self._known.get(node)
-        if transitions is None:
-            transitions = self._worked_out(state, now)
-            if not self._timed:
-                self._known[node] = transitions
-        here = leaves(state)
-        return [
-            Onward(tuple(here[i] for i in w.left), w.entered, w.share, w.state, w.node, w.fresh)
-            for w in transitions
-        ]
-
-    def taken(
-        self, transition: Onward, state: State[StepMonitor], fresh: StepMonitor
-    ) -> tuple[State[StepMonitor], int]:
-        """Where a way leads that is no end, with what is kept of the steps carried over."""
-        assert transition.state is not None
-        here = leaves(state)
-        new = (
-            Leaf(x.step, fresh) if x.payload == NEW else here[x.payload]
-            for x in leaves(transition.state)
+        left = tuple(x.step for x in transition.left)
+        return TaskHypothesis(
+            with_leaves(state, iter(under_way)),
+            transition.transition.target,
+            self._past(hypothesis, transition, {x.step.stage for x in under_way}),
+            backpointer=extended(hypothesis.backpointer, left, self.now),
+            gone_on=True,
         )
-        return with_payloads(transition.state, list(new)), transition.node
 
-    def _worked_out(self, state: State[StepMonitor], now: float) -> list[_Way]:
-        places = iter(range(len(leaves(state))))
-        numbered = with_payloads(state, [Leaf(x.step, next(places)) for x in leaves(state)])
-        found = []
-        for derivative in derivatives(self._task, numbered, NEW, now):
-            after = leaves(derivative.state) if derivative.state is not None else ()
-            fresh = tuple(i for i, x in enumerate(after) if x.payload == NEW)
-            node = END if derivative.state is None else self._automaton.node(derivative.state)
-            begun = tuple(after[i].step for i in fresh)
-            left = tuple(x.payload for x in derivative.left)
-            found.append(_Way(left, begun, 1.0, derivative.state, node, fresh))
-        alike = Counter(w.left for w in found)
-        return [
-            _Way(w.left, w.entered, 1.0 / alike[w.left], w.state, w.node, w.fresh) for w in found
-        ]
+    def _begun(self, leaf: Leaf[StepMonitor], opened: bool) -> Leaf[StepMonitor]:
+        """A step that begins now, with what is seen of it at once."""
+        if opened:
+            leaf = replace(leaf, payload=replace(leaf.payload, opened=True))
+        return self.steps.looked_at(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
+
+    def _past(
+        self, hypothesis: TaskHypothesis, transition: OpenTransition, under_way: set[str]
+    ) -> tuple[StageBelief, ...]:
+        """The latest word on the stages that lie behind, once a transition is taken."""
+        found = {p.stage: p for p in hypothesis.past}
+        endings = sorted((self._ending(x) for x in transition.left), key=lambda e: WORSE[e.status])
+        for ending in endings:
+            failed = ending.status is Status.FAILED
+            before = found.get(ending.stage)
+            if before is not None and before.status is Status.FAILED:
+                continue  # there is no way back from that
+            if ending.stage not in under_way or failed:
+                found[ending.stage] = ending
+        return tuple(found.values())
+
+    def _ending(self, leaf: Leaf[StepMonitor]) -> StageBelief:
+        """How the stage of a step ends when it ends with this step."""
+        meaning = self.steps.actions[leaf.step.action]
+        status, why = outcome(leaf.step, meaning, leaf.payload, self.now)
+        return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
 
-def _within(task: Task) -> list[Deadline]:
-    bodies = [s.body for s in task.stages if not isinstance(s.body, Actors)]
-    timed = (c for body in bodies for c in walk(body) if isinstance(c, Timed))
-    return [c for t in timed for c in t.clauses if isinstance(c, Deadline)]
+def _may_end(transition: OpenTransition) -> bool:
+    return all(x.payload.fulfilled and x.payload.status not in BAD for x in transition.left)
+
+
+def _goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
+    """Whether a step asks for what is going on already: it can only begin once that ceased."""
+    return any(step.same_as(x.step) and not x.payload.ceased for x in left)

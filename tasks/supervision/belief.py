@@ -1,165 +1,100 @@
-"""From hypotheses to belief: stages, what is under way, what is expected, the verdict."""
+"""From hypotheses to belief: stages, what is under way, what is expected, the verdict.
+
+What is told are marginals: how a stage stands, and whether the task has succeeded, is as likely as
+all hypotheses together by which it is so. The words are those of the likeliest of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from visup.agent import (
-    Binding,
     Expectation,
-    Mind,
     Prospect,
     StageBelief,
     Status,
     TaskBelief,
-    Truth,
     Verdict,
 )
 from visup.agent.model.fast_replace import replace
-from visup.tasks.automaton.derivatives import Leaf, TaskStep, leaves
-from visup.tasks.grammar.conditions import Condition
-from visup.tasks.grammar.nodes import Hold
 from visup.tasks.grammar.structure import stage_names
-from visup.tasks.supervision.hypotheses import HypothesisTracker, TaskHypothesis, confidence
+from visup.tasks.supervision.hypotheses import (
+    NOT_BEGUN,
+    WORST_FIRST,
+    Progress,
+    Standing,
+    TaskHypotheses,
+    TaskHypothesis,
+    standings,
+    under_way,
+)
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.sentences import evidence, outcome
+from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.task_inference import TaskActivity
-from visup.tasks.verification.observe import NEVER, ActionObservation, RelationLookup, observe
-from visup.tasks.verification.stage_conditions import ConditionEvaluator
-from visup.tasks.verification.step_monitor import BAD, StepMonitor
+from visup.tasks.verification.step_monitor import BAD
 
 NEAR = 0.01  # hypotheses that are so likely against the best have a say in what is expected
+DIGITS = 9  # probabilities that differ by less are the same
+# A stage is told to be further on only where that is likelier by so many digits: of two stages that
+# may come next alike, neither is told to have begun.
+TELLING_DIGITS = 2
 
 LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # there is no way back from these
 
-# Of several steps of one stage the first of these speaks for the stage.
-WORST_FIRST = (
-    Status.FAILED,
-    Status.FAILING,
-    Status.UNKNOWN,
-    Status.STALLED,
-    Status.ACTIVE,
-    Status.PROGRESSING,
-)
-
-
-class TaskSnapshot:
-    """One task at one moment: who plays its actors, and what is seen of its actions.
-
-    Args:
-        mind: What is believed.
-        bindings: Who plays which actor.
-        tracker: The task with the meanings of its actions.
-        before: Since when what is no plain relation of the mind has been true, by key.
-    """
-
-    def __init__(
-        self,
-        mind: Mind,
-        bindings: tuple[Binding, ...],
-        tracker: HypothesisTracker,
-        before: Mapping[str, float] = NEVER,
-    ) -> None:
-        self.mind = mind
-        self.bindings = bindings
-        self._actions = tracker.actions
-        self._objects = {b.actor: b.object_id for b in bindings}
-        self._relations = RelationLookup(mind, tracker.looks, before)
-        self._conditions = ConditionEvaluator(tracker.task, self._holds, self._relations)
-        self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
-        self._judged: dict[TaskStep, ActionObservation] = {}
-
-    def see(self, step: TaskStep) -> ActionObservation:
-        """What is seen now of a step."""
-        if not step.conditions:
-            return self._look(step.action, step.actors)
-        if step not in self._judged:
-            seen = self._look(step.action, step.actors)
-            self._judged[step] = self._conditions.apply(step, seen)
-        return self._judged[step]
-
-    def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
-        """Whether a condition holds, and has for as long as it must."""
-        return self._conditions.relation(condition, lasting).truth
-
-    @property
-    def since(self) -> tuple[tuple[str, float], ...]:
-        """Since when what is no plain relation of the mind has been true, for the next step."""
-        return tuple(self._relations.after.items())
-
-    def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
-        key = (action, actors)
-        if key not in self._seen:
-            objects = tuple(self._objects.get(a) for a in actors)
-            self._seen[key] = observe(self._actions[action], objects, self._relations)
-        return self._seen[key]
-
-    def _holds(self, action: str, actors: tuple[str, ...]) -> Truth:
-        return self._look(action, actors).holds
-
-    def found(self, actors: tuple[str, ...]) -> bool:
-        """Whether each of some actors is played by an object."""
-        return all(self._objects.get(a) is not None for a in actors)
-
-    def objects(self, actors: tuple[str, ...]) -> tuple[int, ...]:
-        """Ids of the objects that play some actors; those not found are left out."""
-        ids = (self._objects.get(a) for a in actors)
-        return tuple(i for i in ids if i is not None)
-
 
 def task_belief(
-    tracker: HypothesisTracker,
-    scene: TaskSnapshot,
-    hypotheses: tuple[TaskHypothesis, ...],
+    model: MonitoredPhases,
+    snapshot: TaskSnapshot,
+    posterior: TaskHypotheses | None,
     interrupted: str,
 ) -> TaskBelief:
     """What is believed of a task.
 
     Args:
-        tracker: The task with its settings.
-        scene: What is seen now.
-        hypotheses: Likeliest first; empty while the task has not begun.
+        model: The task with its filter.
+        snapshot: What is seen now.
+        posterior: The hypotheses; None while the task has not begun.
         interrupted: Why it is interrupted, or empty.
 
     Returns:
         The belief; `unexplained` is left to the caller.
     """
-    name, now = tracker.task.name, scene.mind.time
-    if not hypotheses:
-        verdict = Verdict.INTERRUPTED if interrupted else Verdict.UNKNOWN
+    name = model.task.name
+    if posterior is None:
         return TaskBelief(
             name,
-            verdict,
-            tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(tracker.task)),
-            bindings=scene.bindings,
-            expected=_expected(tracker, scene, tracker.start(now)),
-            evidence=interrupted or _missing(tracker, scene),
+            Verdict.INTERRUPTED if interrupted else Verdict.UNKNOWN,
+            pending_stages(model),
+            bindings=snapshot.bindings,
+            expected=_expected(model, snapshot, model.filter.start(snapshot.mind.time)),
+            evidence=interrupted or _missing(model, snapshot),
         )
-    best, sure = hypotheses[0], confidence(hypotheses)
-    stages = _stages(tracker, best, now, sure)
-    verdict, why = _verdict(best, stages, interrupted)
-    current = None if best.finished is not None else _current(tracker, best)
-    near = tuple(r for r in hypotheses if r.mass >= NEAR * best.mass)
+    stages = tuple(stage_beliefs(model, posterior))
+    verdict, probability, teller = _outcome(posterior)
+    current = None if teller.finished is not None else _current(posterior)
+    if current is not None and verdict is not Verdict.FAILED:
+        probability = _under_way(posterior)[current]
+    why = _why(verdict, teller, stages, current)
+    near = _near(posterior)
+    told = Verdict.INTERRUPTED if interrupted else verdict
     return TaskBelief(
         name,
-        verdict,
+        told,
         stages,
         current,
-        scene.bindings,
-        _expected(tracker, scene, near),
-        confidence=sure,
-        evidence=why,
-        prospects=_prospects(tracker, near),
-        success=0.0 if verdict in LOST else tracker.success(near),
+        snapshot.bindings,
+        _expected(model, snapshot, near),
+        confidence=probability,
+        evidence=interrupted or why,
+        prospects=_prospects(model, near),
+        success=0.0 if told in LOST else model.filter.success(near),
     )
 
 
-def _prospects(
-    tracker: HypothesisTracker, hypotheses: tuple[TaskHypothesis, ...]
-) -> tuple[Prospect, ...]:
-    """The stages that may begin next; those that are hardly possible are left out."""
-    found = tracker.next_stages(hypotheses).items()
-    likely = sorted((s for s in found if s[1] >= NEAR), key=lambda s: -s[1])
-    return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
+def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
+    """The stages of a task that has not begun."""
+    return tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(model.task))
 
 
 def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
@@ -180,81 +115,144 @@ def suppressed(belief: TaskBelief, activity: TaskActivity) -> TaskBelief:
     )
 
 
-def _stages(
-    tracker: HypothesisTracker, hypothesis: TaskHypothesis, now: float, sure: float
-) -> tuple[StageBelief, ...]:
-    told = {p.stage: p for p in hypothesis.past}
-    under_way: dict[str, list[Leaf[StepMonitor]]] = {}
-    for leaf in leaves(hypothesis.state):
-        under_way.setdefault(leaf.step.stage, []).append(leaf)
-    for stage, steps in under_way.items():
-        if stage in told and told[stage].status is Status.FAILED:
-            continue  # one of its steps has failed for good
-        told[stage] = _stage(tracker, stage, steps, hypothesis.finished, now, sure)
-    pending = {s: StageBelief(s, Status.PENDING, 0.0) for s in stage_names(tracker.task)}
-    return tuple(told.get(s, belief) for s, belief in pending.items())
+def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float]]:
+    """For each stage that some hypothesis has begun the probability of each of its standings."""
+    found: dict[str, dict[Standing, float]] = {}
+    for weighted in posterior.hypotheses.values():
+        for stage, standing in standings(weighted.value).items():
+            chances = found.setdefault(stage, {})
+            chances[standing] = chances.get(standing, 0.0) + weighted.mass
+    for chances in found.values():
+        chances[NOT_BEGUN] = max(0.0, 1.0 - sum(chances.values()))
+    return found
 
 
-def _stage(
-    tracker: HypothesisTracker,
-    stage: str,
-    steps: list[Leaf[StepMonitor]],
-    finished: float | None,
-    now: float,
-    sure: float,
+def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
+    """How a stage most likely stands: first whether it is pending, under way or behind, then how."""
+    progress = {p: sum(m for (q, _), m in chances.items() if q is p) for p in Progress}
+    place = max(Progress, key=lambda p: round(progress[p], TELLING_DIGITS))
+    return max((s for s in chances if s[0] is place), key=lambda s: round(chances[s], DIGITS))
+
+
+def stage_beliefs(model: MonitoredPhases, posterior: TaskHypotheses) -> Iterator[StageBelief]:
+    """How each stage stands by all hypotheses together, in the order of the task."""
+    marginals = stage_marginals(posterior)
+    for stage in stage_names(model.task):
+        chances = marginals.get(stage, {NOT_BEGUN: 1.0})
+        standing = likeliest_standing(chances)
+        if standing == NOT_BEGUN:
+            yield StageBelief(stage, Status.PENDING, 0.0, chances[standing])
+            continue
+        hypotheses = (w.value for w in posterior.hypotheses.values())
+        teller = next(h for h in hypotheses if standings(h).get(stage) == standing)
+        belief = _stage_belief(model, teller, stage, posterior.time)
+        yield replace(belief, confidence=chances[standing] * belief.confidence)
+
+
+def _stage_belief(
+    model: MonitoredPhases, hypothesis: TaskHypothesis, stage: str, now: float
 ) -> StageBelief:
-    leaf = min(steps, key=lambda x: WORST_FIRST.index(x.payload.status))
-    monitor, meaning = leaf.payload, tracker.actions[leaf.step.action]
-    if finished is not None:
-        _, why = outcome(leaf.step, meaning, monitor, finished)
-        return StageBelief(stage, Status.DONE, finished, sure * monitor.confidence, why)
-    why = evidence(leaf.step, meaning, monitor, now, tracker.actions)
-    return StageBelief(stage, monitor.status, monitor.since, sure * monitor.confidence, why)
-
-
-def _current(tracker: HypothesisTracker, hypothesis: TaskHypothesis) -> str:
-    """The stage under way; of several at the same time the one that stands worst."""
-    steps = leaves(hypothesis.state)
-    return min(steps, key=lambda x: WORST_FIRST.index(x.payload.status)).step.stage
-
-
-def _verdict(
-    hypothesis: TaskHypothesis, stages: tuple[StageBelief, ...], interrupted: str
-) -> tuple[Verdict, str]:
-    if interrupted:
-        return Verdict.INTERRUPTED, interrupted
-    failed = next((s for s in stages if s.status is Status.FAILED), None)
-    if failed is not None:
-        return Verdict.FAILED, failed.evidence
+    """What a hypothesis tells of a stage that it has begun."""
+    past = next((p for p in hypothesis.past if p.stage == stage), None)
+    leaf = under_way(hypothesis).get(stage)
+    if leaf is None or (past is not None and past.status is Status.FAILED):
+        assert past is not None
+        return past
+    monitor, meaning = leaf.payload, model.actions[leaf.step.action]
     if hypothesis.finished is not None:
-        return Verdict.SUCCEEDED, f"all stages were done at {hypothesis.finished:.1f} s"
+        _, why = outcome(leaf.step, meaning, monitor, hypothesis.finished)
+        return StageBelief(stage, Status.DONE, hypothesis.finished, monitor.confidence, why)
+    why = evidence(leaf.step, meaning, monitor, now, model.actions)
+    return StageBelief(stage, monitor.status, monitor.since, monitor.confidence, why)
+
+
+def _outcome(posterior: TaskHypotheses) -> tuple[Verdict, float, TaskHypothesis]:
+    """The likeliest verdict, its probability, and the likeliest hypothesis by which it is so.
+
+    Whether a task that is not over has begun is asked only once it is likely not to be over.
+    """
+    chances = posterior.marginals(lambda _, h: (_verdict(h),))
+    ended = {v: chances.get(v, 0.0) for v in (Verdict.FAILED, Verdict.SUCCEEDED)}
+    going_on = {v: chances.get(v, 0.0) for v in (Verdict.IN_PROGRESS, Verdict.UNKNOWN)}
+    verdict = max(ended, key=lambda v: round(ended[v], DIGITS))
+    if round(sum(going_on.values()), DIGITS) >= round(ended[verdict], DIGITS):
+        verdict = max(going_on, key=lambda v: round(going_on[v], DIGITS))
+    hypotheses = (w.value for w in posterior.hypotheses.values())
+    return verdict, chances[verdict], next(h for h in hypotheses if _verdict(h) is verdict)
+
+
+def _verdict(hypothesis: TaskHypothesis) -> Verdict:
+    if any(status is Status.FAILED for _, status in standings(hypothesis).values()):
+        return Verdict.FAILED
+    if hypothesis.finished is not None:
+        return Verdict.SUCCEEDED
+    bad = any(x.payload.status in BAD for x in under_way(hypothesis).values())
+    return Verdict.IN_PROGRESS if hypothesis.begun or bad else Verdict.UNKNOWN
+
+
+def _why(
+    verdict: Verdict,
+    teller: TaskHypothesis,
+    stages: tuple[StageBelief, ...],
+    current: str | None,
+) -> str:
+    """Why the verdict is what it is: one clause."""
+    if verdict is Verdict.UNKNOWN:
+        return "nothing of the task has been seen yet"
+    if verdict is Verdict.SUCCEEDED:
+        return f"all stages were done at {teller.finished:.1f} s"
+    if verdict is Verdict.FAILED:
+        failed = [s for s, (_, status) in standings(teller).items() if status is Status.FAILED]
+        return next((s.evidence for s in stages if s.stage in failed), "")
     bad = next((s for s in stages if s.status in BAD), None)
-    if hypothesis.begun or bad is not None:
-        told = bad or next((s for s in stages if s.stage == current_stage(hypothesis)), None)
-        return Verdict.IN_PROGRESS, told.evidence if told else ""
-    return Verdict.UNKNOWN, "nothing of the task has been seen yet"
+    told = bad or next((s for s in stages if s.stage == current), None)
+    return told.evidence if told else ""
 
 
-def current_stage(hypothesis: TaskHypothesis) -> str:
-    """The first stage under way in a hypothesis."""
-    return leaves(hypothesis.state)[0].step.stage
+def _under_way(posterior: TaskHypotheses) -> dict[str, float]:
+    """For each stage the probability that it is under way, the likeliest hypothesis first."""
+    return posterior.marginals(lambda _, h: () if h.finished is not None else under_way(h))
 
 
-def _missing(tracker: HypothesisTracker, scene: TaskSnapshot) -> str:
-    unbound = (b.actor for b in scene.bindings if b.object_id is None)
-    missing = [a for a in unbound if not tracker.task.actor(a).optional]
+def _current(posterior: TaskHypotheses) -> str:
+    """The stage most likely under way; of several at the same time the one that stands worst."""
+    chances = _under_way(posterior)
+    most = round(max(chances.values()), DIGITS)
+    tied = {s for s, chance in chances.items() if round(chance, DIGITS) == most}
+    hypotheses = (w.value for w in posterior.hypotheses.values())
+    steps = next(found for h in hypotheses if (found := under_way(h)).keys() & tied)
+    here = {stage: leaf for stage, leaf in steps.items() if stage in tied}
+    return min(here, key=lambda s: WORST_FIRST.index(here[s].payload.status))
+
+
+def _near(posterior: TaskHypotheses) -> TaskHypotheses:
+    """The hypotheses that are not much less likely than the best."""
+    least = NEAR * posterior.hypotheses[posterior.best].mass
+    near = {k: w for k, w in posterior.hypotheses.items() if w.mass >= least}
+    return replace(posterior, hypotheses=near)
+
+
+def _prospects(model: MonitoredPhases, near: TaskHypotheses) -> tuple[Prospect, ...]:
+    """The stages that may begin next; those that are hardly possible are left out."""
+    likely = (s for s in model.filter.next_stages(near) if s[1] >= NEAR)
+    return tuple(Prospect(stage, min(1.0, chance)) for stage, chance in likely)
+
+
+def _missing(model: MonitoredPhases, snapshot: TaskSnapshot) -> str:
+    unbound = (b.actor for b in snapshot.bindings if b.object_id is None)
+    missing = [a for a in unbound if not model.task.actor(a).optional]
     return f"not found yet: {', '.join(missing)}" if missing else "nothing of it has been seen yet"
 
 
 def _expected(
-    tracker: HypothesisTracker, scene: TaskSnapshot, hypotheses: tuple[TaskHypothesis, ...]
+    model: MonitoredPhases, snapshot: TaskSnapshot, posterior: TaskHypotheses
 ) -> tuple[Expectation, ...]:
     """What is under way asks for, and the entry to what may come next; each told once."""
-    asked = dict.fromkeys(a for r in hypotheses for a in tracker.asked_for(r.node))
+    asked = dict.fromkeys(a for node in posterior.hypotheses for a in model.requirements(node))
     wanted = (
-        Expectation(name, scene.objects(actors))
+        Expectation(name, snapshot.objects(actors))
         for actors, names in asked
-        if scene.found(actors)
+        if snapshot.found(actors)
         for name in names
     )
     return tuple(dict.fromkeys(wanted))

@@ -70,9 +70,7 @@ def activity_events(
     if before.reportable == now.reportable:
         return
     kind = "task_active" if now.reportable else "task_inactive"
-    said = (
-        "appears to be going on" if now.reportable else "is not what is going on, as it now appears"
-    )
+    said = "appears to be going on" if now.reportable else "turns out not to be going on"
     chance = f"{now.chance:.0%}".replace("%", " %")
     yield Event(
         kind,
@@ -100,7 +98,7 @@ def revision_events(
     earliest = {r.step.stage: r for r in revisions}  # they come with the last step first
     for stage, revision in earliest.items():
         if stage in done and stage not in still:
-            data = {"task": now.task, "stage": stage, "told": revision.told}
+            data = {"task": now.task, "stage": stage, "told": revision.reported}
             text = f"Stage {revision}."
             yield Event(
                 "stage_revised",

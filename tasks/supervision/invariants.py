@@ -10,27 +10,29 @@ from visup.tasks.grammar.conditions import facts_of
 from visup.tasks.grammar.nodes import Invariant
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
-from visup.tasks.supervision.belief import TaskSnapshot
 from visup.tasks.supervision.events import played
-from visup.tasks.supervision.hypotheses import HypothesisTracker
 from visup.tasks.supervision.memory import TaskMemory
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.supervision.snapshot import TaskSnapshot
 
 
 def broken_since(
-    tracker: HypothesisTracker, scene: TaskSnapshot, memory: TaskMemory
+    model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[float | None, ...]:
     """Since when each invariant has been broken, or None; what is not seen is not broken."""
     before = memory.broken_since
     if not memory.activity.reportable:
         return (None,) * len(before)  # it does not bind a task that is not going on
     return tuple(
-        (since if since is not None else scene.mind.time) if _breaks(i, scene, memory) else None
-        for i, since in zip(tracker.task.invariants, before, strict=True)
+        (since if since is not None else snapshot.mind.time)
+        if _breaks(i, snapshot, memory)
+        else None
+        for i, since in zip(model.task.invariants, before, strict=True)
     )
 
 
-def _breaks(invariant: Invariant, scene: TaskSnapshot, memory: TaskMemory) -> bool:
-    holds = scene.holds(invariant.condition, None)
+def _breaks(invariant: Invariant, snapshot: TaskSnapshot, memory: TaskMemory) -> bool:
+    holds = snapshot.holds(invariant.condition, None)
     if invariant.during and not {r.stage for r in invariant.during} & _under_way(memory):
         return False
     return holds is (Truth.TRUE if invariant.when == "never" else Truth.FALSE)
@@ -38,45 +40,46 @@ def _breaks(invariant: Invariant, scene: TaskSnapshot, memory: TaskMemory) -> bo
 
 def _under_way(memory: TaskMemory) -> frozenset[str]:
     """The stages under way by the best hypothesis, with those in which they stand."""
-    if not memory.hypotheses or memory.hypotheses[0].finished is not None:
+    posterior = memory.posterior
+    if posterior is None or posterior.likeliest.finished is not None:
         return frozenset()
-    steps = [x.step for x in leaves(memory.hypotheses[0].state)]
+    steps = [x.step for x in leaves(posterior.likeliest.state)]
     return frozenset().union(*(s.inside for s in steps))
 
 
-def patience(tracker: HypothesisTracker, invariant: Invariant) -> float:
+def patience(model: MonitoredPhases, invariant: Invariant) -> float:
     """For how long an invariant must be broken to count, seconds."""
     if invariant.lasting is None:
-        return tracker.settings.contrary_s
-    return value(tracker.task.amount(invariant.lasting.duration))
+        return model.settings.contrary_s
+    return value(model.task.amount(invariant.lasting.duration))
 
 
-def invariant_concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[AlertCondition]:
+def invariant_concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondition]:
     """A concern for each invariant that has been broken for as long as counts."""
-    for invariant, since in zip(tracker.task.invariants, memory.broken_since, strict=True):
-        if since is not None and memory.time - since >= patience(tracker, invariant):
+    for invariant, since in zip(model.task.invariants, memory.broken_since, strict=True):
+        if since is not None and memory.time - since >= patience(model, invariant):
             facts = facts_of(invariant.condition)
-            actors = (a for f in facts for a in fact_key(tracker.task, f)[1])
+            actors = (a for f in facts for a in fact_key(model.task, f)[1])
             objects = played(memory.belief, tuple(dict.fromkeys(actors)))
             cause = f"`{invariant}` has not held since {since:.1f} s."
-            key = f"{tracker.task.name}: {invariant}"
+            key = f"{model.task.name}: {invariant}"
             yield AlertCondition("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
 
 
 def invariant_events(
-    tracker: HypothesisTracker, memory: TaskMemory, new: TaskMemory, mind: Mind
+    model: MonitoredPhases, memory: TaskMemory, new: TaskMemory, mind: Mind
 ) -> Iterator[Event]:
     """An event of each invariant whose break has come to count in this step."""
-    for i, invariant in enumerate(tracker.task.invariants):
-        must = patience(tracker, invariant)
+    for i, invariant in enumerate(model.task.invariants):
+        must = patience(model, invariant)
         since = new.broken_since[i]
         if since is not None and memory.time - since < must <= new.time - since:
-            text = f"Task `{tracker.task.name}`: `{invariant}` has not held since {since:.1f} s."
+            text = f"Task `{model.task.name}`: `{invariant}` has not held since {since:.1f} s."
             yield Event(
                 "invariant_broken",
                 mind.time,
                 mind.frame_index,
                 text,
                 severity=Severity.CRITICAL,
-                data={"task": tracker.task.name, "invariant": str(invariant)},
+                data={"task": model.task.name, "invariant": str(invariant)},
             )

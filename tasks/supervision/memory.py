@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from visup.agent import TaskBelief
-from visup.tasks.supervision.hypotheses import TaskHypothesis
+from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity
 
 
@@ -15,7 +15,7 @@ class TaskMemory:
 
     Attributes:
         time: Seconds of the step in which it was last followed.
-        hypotheses: The courses followed; empty until its first actors are found.
+        posterior: The hypotheses about it; None until its first actors are found.
         belief: What was last believed.
         interrupted: Why the task was interrupted, or empty; once set it stays, but for one reason: an
             unexpected object that turns out to be one of the actors.
@@ -31,7 +31,7 @@ class TaskMemory:
     """
 
     time: float
-    hypotheses: tuple[TaskHypothesis, ...]
+    posterior: TaskHypotheses | None
     belief: TaskBelief
     interrupted: str = ""
     strangers: tuple[int, ...] = ()

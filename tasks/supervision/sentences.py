@@ -28,7 +28,8 @@ def evidence(
         now: Seconds.
         actions: All actions, for their words.
     """
-    who, have = names(step.actors), "has" if len(step.actors) == 1 else "have"
+    who, alone = names(step.actors), len(step.actors) == 1
+    have, them = ("has", "it") if alone else ("have", "them")
     match monitor.status:
         case Status.FAILED if monitor.late:
             due = next(d for d in step.deadlines if now > d.at)
@@ -37,13 +38,13 @@ def evidence(
             what = _say(monitor.contrary, actions)
             return (
                 f"{who} {have} been {what} since {monitor.contrary_since:.1f} s; "
-                f"stage `{step.stage}` requires `{step.action}`"
+                f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.FAILING | Status.FAILED if monitor.fault is not None:
-            was, what = ("was" if have == "has" else "were"), _say(monitor.fault, actions)
+            was, what = ("was" if alone else "were"), _say(monitor.fault, actions)
             return (
                 f"{who} {was} {what} at {monitor.fault_since:.1f} s and {have} not recovered; "
-                f"stage `{step.stage}` requires `{step.action}`"
+                f"stage `{step.stage}` requires {them} to be {meaning.text}"
             )
         case Status.PROGRESSING if monitor.helped_since is not None:
             what = _say(monitor.helped_by or "", actions)
@@ -125,7 +126,7 @@ def prospects_text(belief: TaskBelief) -> str:
     said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
     end = 1.0 - sum(p.probability for p in belief.prospects)
     said += [f"the end ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
-    coming = f"next: {', '.join(said)}" if said else "next: not known"
+    coming = f"next: {', '.join(said)}" if said else "next: unknown"
     if belief.success is None:
         return coming
     return f"{coming}; ends well with a probability of {belief.success:.0%}"

@@ -19,8 +19,6 @@ from visup.agent import (
     Presence,
     Reasoner,
     Severity,
-    StageBelief,
-    Status,
     TaskBelief,
     Verdict,
 )
@@ -31,15 +29,14 @@ from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
-from visup.tasks.grammar.structure import stage_names
-from visup.tasks.supervision.belief import TaskSnapshot, suppressed, task_belief
+from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
 from visup.tasks.supervision.events import (
     activity_events,
     revision_events,
     stage_concerns,
     stage_events,
 )
-from visup.tasks.supervision.hypotheses import HypothesisTracker, TaskHypothesis
+from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.invariants import (
     broken_since,
     invariant_concerns,
@@ -48,6 +45,8 @@ from visup.tasks.supervision.invariants import (
 )
 from visup.tasks.supervision.matching import match, strength, unexplained
 from visup.tasks.supervision.memory import TaskMemory
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
 from visup.tasks.verification.step_monitor import BAD
@@ -79,15 +78,15 @@ def task_reasoner(
         'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
         'verdict', and concerns 'stage_failing' and 'invariant_broken'.
     """
-    trackers = tuple(_follower(t, actions or known_actions(), settings) for t in tasks)
+    models = tuple(_model(t, actions or known_actions(), settings) for t in tasks)
 
     def think(mind: Mind, observation: Observation) -> Outcome:
-        before = _recall(mind, trackers)
-        each = zip(trackers, before, strict=True)
+        before = _recall(mind, models)
+        each = zip(models, before, strict=True)
         seen = tuple(_follow(f, m, mind) if _due(m, mind.time) else m for f, m in each)
         new = _inferred(before, seen, mind.time)
         believed = mind.remember(MEMORY, new, tasks=tuple(m.belief for m in new))
-        steps = list(zip(trackers, before, new, strict=True))
+        steps = list(zip(models, before, new, strict=True))
         events = tuple(e for step in steps for e in _events(*step, mind))
         return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))
 
@@ -109,28 +108,28 @@ def finish(belief: TaskBelief) -> Verdict:
     return belief.verdict
 
 
-def _follower(
+def _model(
     task: Task, actions: Mapping[str, ActionDefinition], settings: TaskSettings
-) -> HypothesisTracker:
+) -> MonitoredPhases:
     words = task_vocabulary(task, actions)
-    tracker = HypothesisTracker(task, words.meanings, settings, words.looks)
-    tracker.success(tracker.start(0.0))  # so that no step has to work out the whole course
-    return tracker
+    model = MonitoredPhases(task, words.meanings, settings, words.looks)
+    model.filter.success(model.filter.start())  # so that no step has to work out the whole course
+    return model
 
 
-def _recall(mind: Mind, trackers: tuple[HypothesisTracker, ...]) -> tuple[TaskMemory, ...]:
+def _recall(mind: Mind, models: tuple[MonitoredPhases, ...]) -> tuple[TaskMemory, ...]:
     kept = mind.recall(MEMORY)
-    if [m.belief.task for m in kept] == [f.task.name for f in trackers]:
+    if [m.belief.task for m in kept] == [f.task.name for f in models]:
         return kept
-    activity = ALONE if len(trackers) == 1 else TaskActivity()
-    return tuple(_blank(f, mind.time, activity) for f in trackers)
+    activity = ALONE if len(models) == 1 else TaskActivity()
+    return tuple(_blank(f, mind.time, activity) for f in models)
 
 
-def _blank(tracker: HypothesisTracker, now: float, activity: TaskActivity) -> TaskMemory:
-    stages = tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(tracker.task))
-    belief = TaskBelief(tracker.task.name, Verdict.UNKNOWN, stages, active=activity.chance)
-    broken = (None,) * len(tracker.task.invariants)
-    return TaskMemory(now, (), belief, broken_since=broken, activity=activity, inferred=now)
+def _blank(model: MonitoredPhases, now: float, activity: TaskActivity) -> TaskMemory:
+    name, stages = model.task.name, pending_stages(model)
+    belief = TaskBelief(name, Verdict.UNKNOWN, stages, active=activity.chance)
+    broken = (None,) * len(model.task.invariants)
+    return TaskMemory(now, None, belief, broken_since=broken, activity=activity, inferred=now)
 
 
 def _due(memory: TaskMemory, now: float) -> bool:
@@ -182,38 +181,34 @@ def _with_activity(
     over = told.verdict in OVER or any(s.status in BAD for s in told.stages)
     if activity.reportable or over or memory.interrupted:
         return replace(memory, activity=activity, belief=belief, inferred=now)
-    hypotheses = memory.hypotheses
+    posterior = memory.posterior
     if memory.activity.begun and not activity.begun:
-        hypotheses = ()  # a rival has ended; what follows is another matter
-    if any(x.payload.status in BAD for r in hypotheses[:1] for x in leaves(r.state)):
-        hypotheses = ()  # if it begins yet, it begins from its beginning
+        posterior = None  # a rival has ended; what follows is another matter
+    if posterior and any(x.payload.status in BAD for x in leaves(posterior.likeliest.state)):
+        posterior = None  # if it begins yet, it begins from its beginning
     belief = suppressed(belief, activity)
-    return replace(memory, activity=activity, belief=belief, hypotheses=hypotheses, inferred=now)
+    return replace(memory, activity=activity, belief=belief, posterior=posterior, inferred=now)
 
 
-def _follow(tracker: HypothesisTracker, memory: TaskMemory, mind: Mind) -> TaskMemory:
+def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemory:
     """One step of one task: bind its actors, follow its hypotheses, judge."""
-    settings, now = tracker.settings, mind.time
-    bindings, rival, rival_since = _bind(tracker, memory, mind)
-    scene = TaskSnapshot(mind, bindings, tracker, dict(memory.lasting))
-    hypotheses, gain = memory.hypotheses or _start(tracker, scene), 0.0
-    if hypotheses:
-        dt = min(max(0.0, now - memory.time), LONGEST_STEP_S) if memory.hypotheses else 0.0
-        hypotheses = tracker.follow(hypotheses, scene.see, now, dt)
-        gain = tracker.gain(hypotheses[0], scene.see) if memory.hypotheses else 0.0
-    broken = broken_since(tracker, scene, memory)
-    strange = _strange(tracker, scene, memory)
+    settings, now = model.settings, mind.time
+    bindings, rival, rival_since = _bind(model, memory, mind)
+    snapshot = TaskSnapshot(mind, bindings, model, dict(memory.lasting))
+    posterior, gain = _filtered(model, memory, snapshot)
+    broken = broken_since(model, snapshot, memory)
+    strange = _strange(model, snapshot, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
     if {b.object_id for b in bindings} & set(strangers):
         interrupted, strangers = "", ()
     if not interrupted:
-        interrupted, strangers = _interrupted(tracker, scene, memory, broken)
-    belief = task_belief(tracker, scene, hypotheses, interrupted)
+        interrupted, strangers = _interrupted(model, snapshot, memory, broken)
+    belief = task_belief(model, snapshot, posterior, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     belief = replace(belief, unexplained=lasting)
     return TaskMemory(
         now,
-        hypotheses,
+        posterior,
         belief,
         interrupted,
         strangers,
@@ -221,7 +216,7 @@ def _follow(tracker: HypothesisTracker, memory: TaskMemory, mind: Mind) -> TaskM
         broken,
         rival,
         rival_since,
-        scene.since,
+        snapshot.since,
         memory.activity,
         gain,
         memory.inferred,
@@ -229,45 +224,45 @@ def _follow(tracker: HypothesisTracker, memory: TaskMemory, mind: Mind) -> TaskM
 
 
 def _events(
-    tracker: HypothesisTracker, memory: TaskMemory, new: TaskMemory, mind: Mind
+    model: MonitoredPhases, memory: TaskMemory, new: TaskMemory, mind: Mind
 ) -> Iterator[Event]:
     """What is told of one task after a step."""
     yield from activity_events(memory.activity, new.activity, new.belief, mind)
     if not new.activity.reportable and memory.activity.reportable:
         return  # that it is not going on says all
-    yield from stage_events(memory.belief, new.belief, mind, tracker.task)
+    yield from stage_events(memory.belief, new.belief, mind, model.task)
     yield from revision_events(memory.belief, new.belief, _revised(memory, new), mind)
-    yield from invariant_events(tracker, memory, new, mind)
+    yield from invariant_events(model, memory, new, mind)
 
 
-def _concerns(tracker: HypothesisTracker, memory: TaskMemory) -> Iterator[AlertCondition]:
+def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondition]:
     yield from stage_concerns(memory.belief)
-    yield from invariant_concerns(tracker, memory)
+    yield from invariant_concerns(model, memory)
 
 
 def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
     """Steps that lay behind by the hypothesis told before and do not by the one told now."""
-    if not memory.hypotheses or not new.hypotheses:
+    before, after = memory.posterior, new.posterior
+    if before is None or after is None:
         return ()
-    return tuple(
-        revisions(memory.hypotheses[0].backpointer, new.hypotheses[0].backpointer, new.time)
-    )
+    behind = (before.likeliest.backpointer, after.likeliest.backpointer)
+    return tuple(revisions(*behind, new.time))
 
 
 def _bind(
-    tracker: HypothesisTracker, memory: TaskMemory, mind: Mind
+    model: MonitoredPhases, memory: TaskMemory, mind: Mind
 ) -> tuple[tuple[Binding, ...], tuple[int | None, ...], float]:
     """The bindings now, and the rival matching with the time since when it has been better.
 
     A matching that takes an actor from an object that is still there must last to be believed.
     """
     before = memory.belief.bindings
-    found = match(tracker.task, mind, before, _current_actors(memory), tracker.settings)
+    found = match(model.task, mind, before, _current_actors(memory), model.settings)
     if not any(_changes_hands(a, b, mind) for a, b in zip(before, found, strict=False)):
         return found, (), mind.time
     rival = tuple(b.object_id for b in found)
     since = memory.rival_since if rival == memory.rival else mind.time
-    if mind.time - since >= tracker.settings.switch_s:
+    if mind.time - since >= model.settings.switch_s:
         return found, (), mind.time
     return tuple(_refreshed(b, mind) for b in before), rival, since
 
@@ -287,25 +282,36 @@ def _refreshed(binding: Binding, mind: Mind) -> Binding:
     return replace(binding, strength=strength(belief, binding.models))
 
 
-def _start(tracker: HypothesisTracker, scene: TaskSnapshot) -> tuple[TaskHypothesis, ...]:
-    """The task begins once all actors of one of its first steps are found."""
-    found = any(scene.found(step.actors) for step in tracker.first_steps)
-    return tracker.start(scene.mind.time) if found else ()
+def _filtered(
+    model: MonitoredPhases, memory: TaskMemory, snapshot: TaskSnapshot
+) -> tuple[TaskHypotheses | None, float]:
+    """The hypotheses with what is seen now, and the evidence of a second that the task is going on.
+
+    The task begins once all actors of one of its first steps are found.
+    """
+    now = snapshot.mind.time
+    if memory.posterior is None:
+        found = any(snapshot.found(step.actors) for step in model.first_steps)
+        begun = model.filter.start(now)
+        return (model.filter.step(begun, snapshot.observe, 0.0) if found else None), 0.0
+    dt = min(max(0.0, now - memory.time), LONGEST_STEP_S)
+    posterior = model.filter.step(memory.posterior, snapshot.observe, dt, now)
+    return posterior, model.gain(posterior.likeliest, snapshot.observe)
 
 
 def _strange(
-    tracker: HypothesisTracker, scene: TaskSnapshot, memory: TaskMemory
+    model: MonitoredPhases, snapshot: TaskSnapshot, memory: TaskMemory
 ) -> tuple[tuple[int, float], ...]:
     """Objects that are unexplained now, each with the time since when."""
     before = dict(memory.strange_since)
-    optional = {a.name for a in tracker.task.actors if a.optional}
-    now = unexplained(scene.mind, scene.bindings, tracker.settings, optional)
-    return tuple((i, before.get(i, scene.mind.time)) for i in now)
+    optional = {a.name for a in model.task.actors if a.optional}
+    now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional)
+    return tuple((i, before.get(i, snapshot.mind.time)) for i in now)
 
 
 def _interrupted(
-    tracker: HypothesisTracker,
-    scene: TaskSnapshot,
+    model: MonitoredPhases,
+    snapshot: TaskSnapshot,
     memory: TaskMemory,
     broken: tuple[float | None, ...],
 ) -> tuple[str, tuple[int, ...]]:
@@ -315,17 +321,17 @@ def _interrupted(
     """
     if memory.belief.verdict in OVER:
         return "", ()
-    for alert in scene.mind.alerts:
+    for alert in snapshot.mind.alerts:
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
-    for invariant, since in zip(tracker.task.invariants, broken, strict=True):
-        if since is not None and scene.mind.time - since >= patience(tracker, invariant):
+    for invariant, since in zip(model.task.invariants, broken, strict=True):
+        if since is not None and snapshot.mind.time - since >= patience(model, invariant):
             return f"`{invariant}` does not hold", ()
     return "", ()
 
 
 def _current_actors(memory: TaskMemory) -> tuple[str, ...]:
-    if not memory.hypotheses:
+    if memory.posterior is None:
         return ()
-    return tuple(a for x in leaves(memory.hypotheses[0].state) for a in x.step.actors)
+    return tuple(a for x in leaves(memory.posterior.likeliest.state) for a in x.step.actors)

@@ -9,13 +9,14 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from visup.rules.formula.units import Span
+from visup.rules.language.diagnostics import Source
 from visup.tasks.actions.actions import known_actions
 from visup.tasks.actions.describe import described, written
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import shipped_tasks
-from visup.tasks.diagnostics.diagnostic import Source
 from visup.tasks.diagnostics.normalise import normalise
-from visup.tasks.grammar.nodes import Span, Task
+from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.statement import NAME
 from visup.tasks.grammar.units import UNITS
 

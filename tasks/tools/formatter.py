@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from lark import Token
 
-from visup.tasks.diagnostics.diagnostic import Source
+from visup.rules.language.diagnostics import Source
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.parser import tokens
 

@@ -22,6 +22,7 @@ class ActionObservation:
 
     Attributes:
         holds: Whether the action holds.
+        held_by: A true relation by which it holds, or None.
         helps: A true relation by which it holds or comes nearer, or None.
         entry: A true relation by which it begins, or None.
         not_yet: Whether the entry does not count yet (`while_not`).
@@ -33,6 +34,7 @@ class ActionObservation:
     """
 
     holds: Truth = Truth.UNKNOWN
+    held_by: Relation | None = None
     helps: Relation | None = None
     entry: Relation | None = None
     not_yet: bool = False
@@ -157,12 +159,14 @@ def observe(
     ids = tuple(o for o in objects if o is not None)
     if len(ids) < len(objects):
         return UNOBSERVED
-    holds = _holds(meaning, ids, relations)
+    held_by = relations.first_true(meaning.holds, ids)
+    holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
     known = (*meaning.helps, *meaning.contrary)
     return ActionObservation(
         holds=holds,
+        held_by=held_by,
         helps=helps,
         entry=relations.first_true(meaning.begins, ids),
         not_yet=holds is not Truth.TRUE
@@ -172,10 +176,8 @@ def observe(
     )
 
 
-def _holds(meaning: ActionDefinition, ids: tuple[int, ...], relations: RelationLookup) -> Truth:
-    """True when one of the relations is, false when all that are known are false."""
-    if relations.first_true(meaning.holds, ids) is not None:
-        return Truth.TRUE
+def _not_true(meaning: ActionDefinition, ids: tuple[int, ...], relations: RelationLookup) -> Truth:
+    """False when any of the relations by which an action holds is known: none of them is true."""
     return Truth.FALSE if relations.known(meaning.holds, ids) else Truth.UNKNOWN
 
 

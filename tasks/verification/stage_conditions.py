@@ -6,16 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from visup.agent import Relation, Truth
-from visup.tasks.actions.vocabulary import OPPOSITE
+from visup.rules.formula.nodes import And, Formula, Not, Or
+from visup.rules.formula.truth import NEGATION, conjunction, disjunction
 from visup.tasks.automaton.derivatives import TaskStep
-from visup.tasks.grammar.conditions import And, Condition, Not, Or
+from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Action, Comparison, Hold, StageCondition, Task
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
 from visup.tasks.verification.observe import ActionObservation, RelationLookup
-
-FIRM = (Truth.FALSE, Truth.UNKNOWN, Truth.TRUE)
-"""Kleene's strong logic: the least of a conjunction, the greatest of a disjunction."""
 
 Holds = Callable[[str, tuple[str, ...]], Truth]
 """Whether an action holds now, by its key and its actors."""
@@ -35,17 +33,18 @@ class ConditionEvaluator:
     holds: Holds
     relations: RelationLookup
 
-    def truth(self, condition: Condition) -> Truth:
+    def truth(self, condition: Formula) -> Truth:
         """Whether a condition holds; unknown when what decides it was not observed."""
         match condition:
             case Action() | Comparison():
                 return self.holds(*fact_key(self.task, condition))
-            case Not(item=item):
-                return OPPOSITE[self.truth(item)]
+            case Not(part=part):
+                return NEGATION[self.truth(part)]
             case And(parts=parts):
-                return min((self.truth(p) for p in parts), key=FIRM.index)
+                return conjunction(map(self.truth, parts))
             case Or(parts=parts):
-                return max((self.truth(p) for p in parts), key=FIRM.index)
+                return disjunction(map(self.truth, parts))
+        raise TypeError(f"a task has no condition like {condition}")
 
     def relation(self, condition: Condition, lasting: Hold | None) -> Relation:
         """A condition as a relation: true once it has held as long as it must."""

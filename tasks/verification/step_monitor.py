@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from visup.agent import Status, Truth
 from visup.agent.model.fast_replace import replace
@@ -12,6 +13,18 @@ from visup.tasks.verification.observe import UNOBSERVED, ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 
 BAD = (Status.FAILING, Status.FAILED)
+
+
+class Moment(NamedTuple):
+    """When something is seen.
+
+    Attributes:
+        now: Seconds.
+        dt: Seconds since the last time.
+    """
+
+    now: float
+    dt: float
 
 
 @dataclass(frozen=True)
@@ -77,30 +90,29 @@ def update(
     step: TaskStep,
     meaning: ActionDefinition,
     seen: ActionObservation,
-    now: float,
-    dt: float,
+    moment: Moment,
     settings: TaskSettings,
 ) -> StepMonitor:
-    """Take one sighting into what is kept about a step.
+    """Take one observation into what is kept about a step.
 
     Args:
         monitor: What was kept.
         step: The step.
         meaning: Its action.
         seen: What is seen of it now.
-        now: Seconds.
-        dt: Seconds since the last sighting.
+        moment: When that is.
         settings: Patience.
 
     Returns:
         What is kept now, with the new status.
     """
+    now = moment.now
     if step.condition("begins") is not None and not monitor.opened:
         # Until it begins, nothing that is seen speaks for or against it.
         monitor = replace(monitor, opened=seen.entry is not None)
         seen = seen if monitor.opened else replace(UNOBSERVED, observed=seen.observed)
     noted = _note_contrary(
-        _note_progress(monitor, step, meaning, seen, now, dt, settings), seen, now
+        _note_progress(monitor, step, meaning, seen, moment, settings), seen, now
     )
     late = noted.late or (overdue(step, now) and not over(noted, step, meaning))
     noted = replace(noted, late=late)
@@ -138,10 +150,10 @@ def _note_progress(
     step: TaskStep,
     meaning: ActionDefinition,
     seen: ActionObservation,
-    now: float,
-    dt: float,
+    moment: Moment,
     settings: TaskSettings,
 ) -> StepMonitor:
+    now, dt = moment
     if not seen.observed:
         # Not seen is not "no": what was reached stays, the clocks stand still.
         return replace(monitor, unseen_since=_first(monitor.unseen_since, now), better_since=None)

@@ -116,7 +116,7 @@ def mind_at(index: int, size: tuple[int, int] = SIZE, task: str = "dock") -> Min
         time,
         (1, 2),
         "The stage 'captured' is failing: the satellite and the arm are diverging.",
-        ("diverging since 6.2 s at 17.9 px/s", "stage 'captured' requires 'coupled'"),
+        ("diverging since 6.2 s at 17.9 px/s", "stage 'captured' requires them to be coupled"),
     )
     return Mind(
         time=time,

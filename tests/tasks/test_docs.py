@@ -7,7 +7,7 @@ import pytest
 from tests.paths import ROOT
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.load import shipped_tasks
-from visup.tasks.diagnostics.diagnostic import CODES
+from visup.tasks.diagnostics.codes import CODES
 from visup.tasks.grammar.parser import read
 
 PAGE = (ROOT / "docs/task-language.md").read_text("utf-8")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from visup.tasks.grammar.conditions import And, Condition, Not, Or
+from visup.rules.formula.nodes import And, Not, Or
+from visup.rules.formula.terms import Measure
+from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
     Actors,
-    Amount,
     AnyOrder,
     Choice,
     Clause,
@@ -22,7 +23,9 @@ from visup.tasks.grammar.nodes import (
     Include,
     Invariant,
     Name,
+    Number,
     Parameter,
+    ParameterRef,
     Reference,
     Repeated,
     Sequence,
@@ -46,14 +49,19 @@ amounts = st.one_of(
     st.integers(0, 10**6).map(float), st.floats(0.0, 1e9, allow_nan=False, allow_infinity=False)
 )
 amounts_said = st.one_of(
-    st.builds(Amount, amounts, st.sampled_from([*UNITS, "parsec"])),
-    st.builds(lambda n: Amount(0.0, "", n), names),
+    st.builds(Number, amounts, st.sampled_from([*UNITS, "parsec"])),
+    st.builds(ParameterRef, names),
 )
 holds = st.builds(Hold, amounts_said)
 clauses: st.SearchStrategy[Clause] = st.one_of(holds, st.builds(Deadline, amounts_said))
 actors = st.lists(names.map(Name), min_size=1, max_size=3).map(tuple)
 actions = st.builds(Action, names, actors)
-comparisons = st.builds(Comparison, actions, st.sampled_from(["<", "<=", ">", ">="]), amounts_said)
+comparisons = st.builds(
+    Comparison,
+    st.builds(Measure, names, actors),
+    st.sampled_from(["<", "<=", ">", ">="]),
+    amounts_said,
+)
 references = st.builds(Reference, names)
 facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
 

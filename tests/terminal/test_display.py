@@ -50,7 +50,10 @@ def test_every_record_fits_80_columns_and_is_html() -> None:
             assert out.getvalue() == text * 2
 
 
-NOT_SHOWN = ("Agent", "Column", "Contract", "Limits", "PastFrame", "Reasoners", "Snapshot")
+NOT_SHOWN = (
+    *("Agent", "AgentSnapshot", "Column", "Contract", "Limits", "MemoryKey", "PastFrame"),
+    "Reasoners",
+)
 
 
 @pytest.mark.parametrize("name", [n for n in agent.__all__ if n[0].isupper()])

@@ -27,7 +27,8 @@ EXPLAINED = ("tasks", "models", "rules", "actors", "every", "fps", "fov_vertical
 def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> None:
     """Report every mistake in rule files, and what each rule costs; exit code 2 if there is a mistake."""
     from visup.agent.model.errors import ErrorGroup, VisupError
-    from visup.rules.language.parser import load_rules, raise_all
+    from visup.rules.language.diagnostics import raise_errors
+    from visup.rules.language.parser import load_rules
 
     faults: list[VisupError] = []
     for file in files:
@@ -41,7 +42,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
             typer.echo(f"{file}: ok")
             for rule in found:
                 typer.echo(f"  {rule.name}: {_cost(rule)}")
-    raise_all(faults)
+    raise_errors(faults)
 
 
 @app.command("list")

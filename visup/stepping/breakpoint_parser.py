@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 
 from visup.agent import Mind
 from visup.agent.contract.phases import Phase
 from visup.agent.model.errors import SettingsError
+from visup.agent.model.suggestions import closest, did_you_mean
 from visup.rules.safety.expression import expression
 from visup.stepping.breakpoints import (
     AnyStop,
@@ -96,12 +96,12 @@ def _guessed(word: str, mind: Mind) -> StopCondition:
 def _event(kind: str, mind: Mind) -> StopCondition:
     """Any word may be a plug-in's kind of event; one that is nearly another word is a slip."""
     known = [*EVENT_KINDS, *stage_names(mind), *rule_names(mind), *Phase]
-    close = get_close_matches(kind, known, 1, 0.8)
+    close = closest(kind, known, 0.8)
     if not kind.isidentifier() or (close and kind not in known):
         raise SettingsError(
             f"'{kind}' is not known",
             expected="a phase, event, rule, stage, object, time, frame or expression",
-            hint=f"did you mean '{close[0]}'?" if close else None,
+            hint=f"did you mean '{close}'?" if close else None,
         )
     return EventStop(kind)
 
@@ -148,9 +148,8 @@ _READERS: Mapping[str, Callable[[str, Mind], StopCondition]] = {
 
 
 def _unknown(kind: str, name: str, known: tuple[str, ...]) -> SettingsError:
-    close = get_close_matches(name, known, 1, 0.6)
     return SettingsError(
         f"there is no {kind} '{name}'",
         expected=f"one of {', '.join(known)}",
-        hint=f"did you mean '{close[0]}'?" if close else None,
+        hint=did_you_mean(name, known),
     )

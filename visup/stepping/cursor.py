@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from visup.agent import Observation, Outcome
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.model.display import enable_display
 from visup.agent.model.step import Step
 from visup.stepping.history import StepHistory
@@ -61,7 +61,7 @@ class Bookmark:
     """
 
     number: int
-    snapshot: Snapshot
+    snapshot: AgentSnapshot
     history: StepHistory = field(repr=False)
 
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from visup.agent import Alert, Event, Observation, Outcome
-from visup.agent.contract.phases import Phase, Snapshot
+from visup.agent.contract.phases import AgentSnapshot, Phase
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.step import Step
 from visup.stepping.observation_log import ObservationLog
@@ -46,8 +46,10 @@ class StepHistory:
     answers: dict[int, Mapping[int, str]] = field(default_factory=dict)
     spacing: int = SPACING
     latest: int = LATEST
-    _minds: dict[int, Snapshot] = field(default_factory=dict, init=False)
-    _whole: OrderedDict[int, tuple[Step, Snapshot]] = field(default_factory=OrderedDict, init=False)
+    _minds: dict[int, AgentSnapshot] = field(default_factory=dict, init=False)
+    _whole: OrderedDict[int, tuple[Step, AgentSnapshot]] = field(
+        default_factory=OrderedDict, init=False
+    )
     _told: list[tuple[tuple[Event, ...], tuple[Alert, ...]]] = field(
         default_factory=list, init=False
     )
@@ -66,7 +68,7 @@ class StepHistory:
         return StepHistory(agent, self.observations, self.at, answers, self.spacing, self.latest)
 
     @property
-    def here(self) -> Snapshot:
+    def here(self) -> AgentSnapshot:
         """What the agent is now."""
         return self.agent.snapshot()
 
@@ -116,7 +118,7 @@ class StepHistory:
         with self.elsewhere():
             return self.go(number)
 
-    def snapshot(self, number: int) -> Snapshot:
+    def snapshot(self, number: int) -> AgentSnapshot:
         """What the agent was after step `number`, one that was made."""
         with self.elsewhere():
             self.go(number)
@@ -132,7 +134,7 @@ class StepHistory:
             self.at = at
             self.agent.restore(was)
 
-    def jump(self, number: int, was: Snapshot) -> None:
+    def jump(self, number: int, was: AgentSnapshot) -> None:
         """Be after step `number`, at which the agent was this."""
         self._note_answers()
         self.at = number

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 
 from visup.agent import Mind, Presence, Truth
 from visup.agent.cycle.agent import Reasoners
 from visup.agent.cycle.answers import resolve_answer
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.language.parser import load_rules
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.what_if import (
@@ -57,8 +57,7 @@ def _relation(mind: Mind, words: list[str], retract: bool) -> Assumption:
     ids = tuple(int(w) for w in rest if w.isdecimal())
     known = {*RELATION_NAMES, *(r.name for r in mind.relations)}
     if name not in known:
-        close = get_close_matches(name, known, 1, 0.6)
-        hint = f"did you mean '{close[0]}'?" if close else None
+        hint = did_you_mean(name, known)
         raise SettingsError(f"there is no relation '{name}'", expected=_EXPECTED, hint=hint)
     for object_id in ids:
         _known(mind, object_id)

@@ -86,7 +86,7 @@ class BackgroundMotion:
         scale: How much wider than expected its errors are (parallax, a bent scene), at least 1.
         fixed: Whether something is seen to be fixed to the camera while the rest moves; None when
             the baseline is too short to tell.
-        ground: Which motion prevails where.
+        prevalence: Which motion prevails where.
         sure: Whether the camera's motion was seen across the view, or only predicted.
     """
 

@@ -1,7 +1,7 @@
-"""A picture of what rests, pixel by pixel, for a camera that rests as well.
+"""A background model, pixel by pixel, for a camera that is static.
 
 Each pixel keeps the tone that it shows at rest with its variance, and a candidate: the tone that it
-shows instead of late. A candidate that has been seen longer than what is taken for the rest takes
+shows instead of late. A candidate that has been seen longer than what is taken for the background takes
 its place, so that what stood there as the video began, and leaves, is not taken for an object for
 ever. (After Stauffer and Grimson, Adaptive background mixture models, 1999, with two modes; shadows
 after Horprasert, Harwood, Davis, A statistical approach for robust background subtraction, 1999.)
@@ -44,12 +44,12 @@ CAST = ShadowLimits(SHADE, LIT, HUE, 3 * NOISE**2 / 4, 60.0**2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
-    """What rests.
+    """What is known of the background.
 
     Attributes:
         mean: (h, w, 3) float32, tone at rest, grey levels.
         variance: (h, w) float32, of one channel.
-        seen_s: (h, w) float32, for how long that tone was seen, seconds; 0 where the rest is unknown.
+        seen_s: (h, w) float32, for how long that tone was seen, seconds; 0 where the background is unknown.
         other: (h, w, 3) float32, the tone that is seen instead.
         other_s: (h, w) float32, for how long.
     """
@@ -62,57 +62,61 @@ class BackgroundModel:
 
 
 def initial_model(image: Floats) -> BackgroundModel:
-    """What rests, after one (h, w, 3) image."""
+    """The background after one (h, w, 3) image."""
     bare = np.zeros(image.shape[:2], np.float32)
     return BackgroundModel(image, bare + NOISE**2, bare + 0.01, image, bare)
 
 
-def with_unknown(picture: BackgroundModel, where: Mask) -> BackgroundModel:
-    """The picture without what it shows in some places: an object may have stood there."""
-    return replace(picture, seen_s=np.where(where, 0, picture.seen_s).astype(np.float32))
+def with_unknown(background: BackgroundModel, where: Mask) -> BackgroundModel:
+    """The background without what it shows in some places: an object may have stood there."""
+    return replace(background, seen_s=np.where(where, 0, background.seen_s).astype(np.float32))
 
 
-def with_revealed(picture: BackgroundModel, image: Floats, bare: Mask) -> BackgroundModel:
-    """The picture with what is seen of an image where it was unknown and nothing hides the rest."""
-    new = bare & (picture.seen_s <= 0)
+def with_revealed(background: BackgroundModel, image: Floats, bare: Mask) -> BackgroundModel:
+    """The background with what is seen of an image where it was unknown and nothing hides the background."""
+    new = bare & (background.seen_s <= 0)
     if not new.any():
-        return picture
+        return background
     fresh = initial_model(image)
-    planes = [getattr(picture, f.name).copy() for f in fields(picture)]
-    for plane, f in zip(planes, fields(picture), strict=True):
+    planes = [getattr(background, f.name).copy() for f in fields(background)]
+    for plane, f in zip(planes, fields(background), strict=True):
         plane[new] = getattr(fresh, f.name)[new]
     return BackgroundModel(*planes)
 
 
-def shadow_mask(picture: BackgroundModel, image: Floats) -> Mask:
+def shadow_mask(background: BackgroundModel, image: Floats) -> Mask:
     """Where an image differs as a shadow or a reflection does: in brightness, not in hue."""
-    return shadow_pixels(image, picture.mean, CAST)
+    return shadow_pixels(image, background.mean, CAST)
 
 
-def foreground_mask(picture: BackgroundModel, image: Floats) -> Mask:
-    """Which pixels show something else than what rests, (h, w) bool; where that is unknown, none."""
-    far = normalised_distances(image, picture.mean, picture.variance, 100.0)
+def foreground_mask(background: BackgroundModel, image: Floats) -> Mask:
+    """Which pixels show something else than the background, (h, w) bool; where that is unknown, none."""
+    far = normalised_distances(image, background.mean, background.variance, 100.0)
     off = np.asarray(cv2.GaussianBlur(far, (3, 3), 0.8), dtype=np.float32)
-    out = foreground_pixels(off, image, picture.mean, picture.seen_s, CAST, NEAR**2)
+    out = foreground_pixels(off, image, background.mean, background.seen_s, CAST, NEAR**2)
     near = cv2.medianBlur(out.view(np.uint8), 5)
     count, labels = cv2.connectedComponents(near, connectivity=8)
     return pixels_near_sure_ones(np.asarray(labels, np.int32), off, out, count, (FAR * 1.5) ** 2)
 
 
 def update_background(
-    picture: BackgroundModel, image: Floats, moving: Mask, seconds: float, gone: Mask | None = None
+    background: BackgroundModel,
+    image: Floats,
+    moving: Mask,
+    seconds: float,
+    gone: Mask | None = None,
 ) -> BackgroundModel:
-    """The picture after one more image.
+    """The background after one more image.
 
     Args:
-        picture: As known.
+        background: As known.
         image: (h, w, 3) float32.
-        moving: (h, w) bool, where objects are told: there the rest is not easily given up.
+        moving: (h, w) bool, where objects are reported: there the background is not easily given up.
         seconds: Since the last image.
-        gone: (h, w) bool, where something that was taken for the rest has left: it is forgotten.
+        gone: (h, w) bool, where something that was taken for the background has left: it is forgotten.
 
     Returns:
-        The new picture.
+        The new background.
     """
     pace = LearningRates(
         seconds,
@@ -124,7 +128,7 @@ def update_background(
         (8 * NOISE) ** 2,
         3 * (FAR * NOISE) ** 2,
     )
-    known = BackgroundPlanes(*(getattr(picture, f.name) for f in fields(picture)))
+    known = BackgroundPlanes(*(getattr(background, f.name) for f in fields(background)))
     nowhere = np.zeros(moving.shape, dtype=bool)
     return BackgroundModel(
         *update_planes(known, image, moving, nowhere if gone is None else gone, pace)
@@ -140,12 +144,12 @@ def edge_strength(image: Floats, box: tuple[int, int, int, int]) -> Floats:
     return np.asarray(inner, np.float32)
 
 
-def match_exposure(picture: BackgroundModel, image: Floats) -> BackgroundModel:
-    """The picture as it would look at the exposure of an image, after the median change of tone."""
+def match_exposure(background: BackgroundModel, image: Floats) -> BackgroundModel:
+    """The background as it would look at the exposure of an image, after the median change of tone."""
     step = 4
-    rest, now = picture.mean[::step, ::step], image[::step, ::step]
+    rest, now = background.mean[::step, ::step], image[::step, ::step]
     ratio = np.median((now + 1.0) / (rest + 1.0), axis=(0, 1))
     if np.abs(ratio - 1).max() < EVEN:
-        return picture
+        return background
     gain = np.clip(ratio, 0.3, 3.0).astype(np.float32)
-    return replace(picture, mean=picture.mean * gain, other=picture.other * gain)
+    return replace(background, mean=background.mean * gain, other=background.other * gain)

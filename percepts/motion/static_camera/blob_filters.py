@@ -1,4 +1,4 @@
-"""Which silhouettes are objects: neither what has not left its place, nor limbs, nor ghosts."""
+"""Which blobs are objects: neither what has not left its place, nor limbs, nor ghosts."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from visup.percepts.motion.static_camera.background_model import edge_strength
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, crop
 
 LIMB = 0.35  # how large, as a share of its object, a part may be that is taken for a limb
-LEAST_GONE = 3.0  # pixels that a side must have gone before an object is told
+LEAST_GONE = 3.0  # pixels that a side must have gone before an object is reported
 LEAST_SHARE = 0.25  # the same as a share of its size
 FOLLOWED = 0.5  # how far the opposite side must have gone too, as a share
 STRAIGHT = 0.6  # net way as a share of the way
 DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of that at rest
-EVENLY = 1.5  # how much brighter, relative to the rest, the brightest part of a shadow may be
+EVENLY = 1.5  # how much brighter, relative to the background, the brightest part of a shadow may be
 SAME_HUE = 0.035  # how far colour may differ in it, as a share of brightness
-GHOST = 0.6  # edges in the image, as a share of those at rest, below which nothing is there
+GHOST = 0.6  # edges in the image, as a share of those at background, below which nothing is there
 FRAGMENT = 0.2  # gap between a part and its object, as a share of its length
 
 
@@ -34,14 +34,14 @@ def is_salient_blob(s: BlobTrack) -> bool:
     least = max(LEAST_GONE, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
     left = (gone > least) & (gone > STRAIGHT * s.path_length)
     if not s.cut:
-        # What stays and only grows or shrinks, as a shadow on a thing at rest, moves one side alone.
+        # What stays and only grows or shrinks, as a shadow on a thing at background, moves one side alone.
         ways = s.sides - s.initial_sides
         left = left & (np.roll(ways, 2) * np.sign(ways) >= FOLLOWED * gone)
     return s.frames >= 3 and bool(left.any())
 
 
 def merge_parts(known: BlobTracks) -> BlobTracks:
-    """Give small parts that were born beside an object, and go with it, to that object."""
+    """Give small parts that were initiated beside an object, and go with it, to that object."""
     out = list(known)
     for s in known:
         if s.visible is None:
@@ -83,20 +83,20 @@ def _with_part(host: BlobTrack, s: BlobTrack) -> BlobTrack:
     )
 
 
-def is_deep_shadow(s: BlobTrack, image: Floats, rest: Floats) -> bool:
-    """Whether an outline shows the rest, dimmed by one factor all over: what is cast, not what casts.
+def is_deep_shadow(s: BlobTrack, image: Floats, background: Floats) -> bool:
+    """Whether an outline shows the background, dimmed by one factor all over: what is cast, not what casts.
 
     Objects differ from what they hide by more in one place than in another.
 
     Args:
         s: The object.
         image: (h, w, 3) float32.
-        rest: (h, w, 3) float32, the picture of the rest at the exposure of the image.
+        background: (h, w, 3) float32, the background at the exposure of the image.
     """
     if s.visible is None or s.merged:
         return False
     box, shape = s.visible
-    now, before = crop(image, box)[shape], crop(rest, box)[shape]
+    now, before = crop(image, box)[shape], crop(background, box)[shape]
     power = np.einsum("ij,ij->i", before, before) + 1.0
     bright = np.einsum("ij,ij->i", now, before) / power
     gap = now - bright[:, None] * before
@@ -106,8 +106,8 @@ def is_deep_shadow(s: BlobTrack, image: Floats, rest: Floats) -> bool:
     return bool(dim and np.quantile(hue, 0.9) <= SAME_HUE)
 
 
-def is_ghost(s: BlobTrack, now: Floats, rest: Floats) -> bool:
-    """Whether an outline has its edges in the picture of the rest: it shows where something left.
+def is_ghost(s: BlobTrack, now: Floats, background: Floats) -> bool:
+    """Whether an outline has its edges in the background model: it shows where something left.
 
     A shadow dims the edges of what it falls on, and nothing has left; what is so thin that it has
     no inside is not surely one.
@@ -115,7 +115,7 @@ def is_ghost(s: BlobTrack, now: Floats, rest: Floats) -> bool:
     Args:
         s: The object.
         now: (h, w, 3) float32 image.
-        rest: (h, w, 3) float32 picture of the rest.
+        background: (h, w, 3) float32 background.
     """
     if s.visible is None or s.merged:
         return False
@@ -125,5 +125,5 @@ def is_ghost(s: BlobTrack, now: Floats, rest: Floats) -> bool:
         return False
     rim = shape & (inner == 0)
     return float(edge_strength(now, box)[rim].mean()) < GHOST * float(
-        edge_strength(rest, box)[rim].mean()
+        edge_strength(background, box)[rim].mean()
     )

@@ -1,4 +1,4 @@
-"""A silhouette that is followed before a background at rest, and what one frame shows of it."""
+"""A blob that is followed before a static background, and what one frame shows of it."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ class BlobTrack:
 
     Attributes:
         key: Number in order of birth.
-        id: Public number, 0 until told.
-        born: Seconds.
-        seen: Seconds when last visible.
+        id: Public number, 0 until reported.
+        initiated: Seconds.
+        last_seen: Seconds when last visible.
         frames: In how many frames it was visible.
         corner: (x, y) of the template, pixels.
         velocity: (vx, vy), pixels per second.
         shape: (h, w) bool, template: its silhouette when it last stood alone.
         tone: (h, w, 3) float32, what was seen there.
         histogram: (TONES ** 3,) float32 of its tones, sums to 1.
-        start: (4,) sides of its box at birth: left, top, right, bottom.
-        way: (4,) how far each side went since, to and fro, pixels.
-        alone: In how many frames it was seen apart from others.
-        now: Its visible pixels as (box, mask within it); None when hidden.
-        crowded: Whether it shares a blob with others.
+        initial_sides: (4,) sides of its box at birth: left, top, right, bottom.
+        path_length: (4,) how far each side went since, to and fro, pixels.
+        isolated_frames: In how many frames it was seen apart from others.
+        visible: Its visible pixels as (box, mask within it); None when hidden.
+        merged: Whether it shares a blob with others.
         cut: Whether the border of the image cuts it, or did: then it is no limb of another.
-        parted: How far it went since it was last seen in one piece, pixels.
-        shadow: Whether it looks as a deep shadow does; told of what has no public id.
+        split_px: How far it went since it was last seen in one piece, pixels.
+        shadow: Whether it looks as a deep shadow does; known of what has no public id.
     """
 
     key: int

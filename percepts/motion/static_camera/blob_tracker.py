@@ -1,6 +1,6 @@
-"""Objects before a background that rests, each followed by its silhouette.
+"""Objects before a static background, each followed by its blob.
 
-Where the camera rests, what differs from the picture of the rest falls into blobs. One blob may
+While the camera is static, what differs from the background falls into blobs. One blob may
 show several objects and one object several blobs: each object keeps a template of its silhouette
 and tones from when it stood alone, which says what part of a common blob is its own, and where it
 is while others hide it.
@@ -41,16 +41,16 @@ PIECE = 0.35  # how large, as a share of the largest, a piece is that may be an 
 GROWN = 1.3  # how much more than its template is seen of an object that has come into view
 
 
-def track_blobs(known: BlobTracks, view: Foreground, born: int) -> tuple[BlobTracks, int]:
+def track_blobs(known: BlobTracks, view: Foreground, last_key: int) -> tuple[BlobTracks, int]:
     """Bring objects to the next frame, and add those that are new.
 
     Args:
         known: Those of the frame before.
         view: The frame.
-        born: How many were born before.
+        last_key: The greatest key given so far.
 
     Returns:
-        All objects, hidden ones too; how many were born.
+        All objects, hidden ones too; the greatest key given.
     """
     ahead = [_predicted(s, view.seconds) for s in known]
     claims = _claims(ahead, view)
@@ -76,9 +76,9 @@ def track_blobs(known: BlobTracks, view: Foreground, born: int) -> tuple[BlobTra
         out.append(_updated(s, known[i], whole, alone, view, pieces=pieces))
     fresh = [view.labels == b for b in range(1, view.count + 1) if not taken[b]] + left
     for mask in fresh:
-        born += 1
-        out.append(_initiated(mask, view, born))
-    return tuple(out), born
+        last_key += 1
+        out.append(_initiated(mask, view, last_key))
+    return tuple(out), last_key
 
 
 def _predicted(s: BlobTrack, seconds: float) -> BlobTrack:

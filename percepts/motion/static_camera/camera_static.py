@@ -1,4 +1,4 @@
-"""Whether the camera rests, from the motions measured in a frame."""
+"""Whether the camera is static, from the motions measured in a frame."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements
 TELLS = 16.0  # information, 1 / pixels squared, of a point that would show a motion
 FITS = 9.0  # squared distance within which a point rests
 SPREAD = 0.5  # share of the view in which points must be seen to rest
-RESTS = 0.85  # share of those parts that rest when the camera does
+RESTS = 0.85  # share of those parts that rest when the camera is static
 MOVES = 0.6  # the same below which the camera moves
 
 
 def is_camera_static(scene: FrameMeasurements) -> bool | None:
-    """Whether the camera is seen to rest: all over the view, away from objects, nothing moves.
+    """Whether the camera is seen to be static: all over the view, away from objects, nothing moves.
 
     Args:
         scene: A frame as measured.

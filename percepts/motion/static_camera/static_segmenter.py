@@ -1,9 +1,9 @@
-"""A camera that rests: what moves is seen pixel by pixel, before the picture of what rests.
+"""A static camera: what moves is seen pixel by pixel, by background subtraction.
 
 Layers of motion need no still camera and know slow things from the first frame on; but small and
-thin things have too few constraints for them. Where the camera is seen to rest, silhouettes before
-the picture of the rest are reported instead, and of the layers' regions those that the picture does
-not know: what was there, and slow, when the picture was made.
+thin things have too few constraints for them. Where the camera is seen to be static, blobs of
+the foreground are reported instead, and of the layers' regions those that subtraction does not show:
+what was there, and slow, when the background model was begun.
 """
 
 from __future__ import annotations
@@ -44,23 +44,25 @@ from visup.percepts.motion.static_camera.track_fusion import (
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
-REST_S = 1.0  # how long the camera must rest before the picture is believed, seconds
-LONGEST_S = 4.0  # most seconds of rest that make up for times when too little is seen
+REST_S = 1.0  # how long the camera must be static before the background is believed, seconds
+LONGEST_S = 4.0  # most seconds of standing still that make up for times when too little is seen
 FLOODED = 0.6  # share of the image that no change of what is seen in it explains
 MANY_CELLS = 15  # superpixels of a region whose outline the layers know well
-YOUNG_S = 0.3  # how long what was never told is missed, seconds
-SIZE = 768  # longer side of the picture, pixels
-KNOWN = 0.6  # share of a region that differs from the picture when it shows the rest behind
-START_S = 2.4  # age of the picture up to which it may show what has only begun to be told, seconds
+YOUNG_S = 0.3  # how long what was never reported is missed, seconds
+SIZE = 768  # longer side of the background, pixels
+KNOWN = 0.6  # share of a region that differs from the background when that shows what lies behind
+START_S = (
+    2.4  # age of the background up to which it may show what has only begun to be reported, seconds
+)
 STRIDE_PX, MOST_STRIDES = 4.0, 32
 HALO = 7  # pixels: a region's outline may be off by half as much
 
 
 class StaticCameraSegmenter:
-    """Silhouettes before the picture of what rests; one per video.
+    """Blobs before the background of a static camera; one per video.
 
     Attributes:
-        active: Whether the camera rests, and has done so for long enough.
+        active: Whether the camera is static, and has been so for long enough.
     """
 
     def __init__(self) -> None:
@@ -132,38 +134,38 @@ class StaticCameraSegmenter:
     def _reveal(
         self, image: Floats, frame: Frame, regions: Sequence[Region], fresh: Sequence[Region]
     ) -> None:
-        """Forget what a region hid since the picture was begun, and look where none hides it now."""
+        """Forget what a region hid since the background was begun, and look where none hides it now."""
         assert self._background is not None
-        picture, shape = self._background, image.shape[:2]
+        background, shape = self._background, image.shape[:2]
         age = frame.time - self._since
         if fresh and age < START_S:
-            change = foreground_mask(match_exposure(picture, image), image)
+            change = foreground_mask(match_exposure(background, image), image)
             for r in fresh:
                 here = region_mask([r], frame.size, shape)
                 if change[here].mean() < KNOWN:
-                    picture = with_unknown(picture, here & ~change)
+                    background = with_unknown(background, here & ~change)
                 was = swept_mask(here, r, age, shape[1] / frame.size[0])
-                picture = with_unknown(picture, was & ~here & change)
-        told = region_mask(regions, frame.size, shape)
-        self._background = with_revealed(picture, image, ~told)
+                background = with_unknown(background, was & ~here & change)
+        reported = region_mask(regions, frame.size, shape)
+        self._background = with_revealed(background, image, ~reported)
 
-    def _is_static(self, rests: bool | None, seconds: float) -> bool:
-        """Whether the camera rests, as far as is known; else all is forgotten."""
-        step = seconds if rests else -seconds
+    def _is_static(self, static: bool | None, seconds: float) -> bool:
+        """Whether the camera is static, as far as is known; else all is forgotten."""
+        step = seconds if static else -seconds
         self._static_s = min(max(self._static_s + step, 0.0), LONGEST_S)
-        if rests is False or self._static_s <= 0:
+        if static is False or self._static_s <= 0:
             self._forget()
         return self._static_s > 0
 
     def _track_blobs(
         self, image: Floats, now: float, settings: MotionSettings
     ) -> Foreground | None:
-        """Follow the silhouettes into a frame, and learn from it; None when it shows another view."""
+        """Follow the blobs into a frame, and learn from it; None when it shows another view."""
         assert self._background is not None
         seconds = max(now - self._time, 1e-3)
         self._time = now
-        picture = match_exposure(self._background, image)
-        change = foreground_mask(picture, image)
+        background = match_exposure(self._background, image)
+        change = foreground_mask(background, image)
         if change.mean() > FLOODED:
             self._forget()
             return None
@@ -171,14 +173,15 @@ class StaticCameraSegmenter:
         known, self._last_key = track_blobs(self._tracks, view, self._last_key)
         known = merge_parts(known)
         known = tuple(
-            s if s.id else replace(s, shadow=is_deep_shadow(s, image, picture.mean)) for s in known
+            s if s.id else replace(s, shadow=is_deep_shadow(s, image, background.mean))
+            for s in known
         )
-        ghosts = [s for s in known if is_ghost(s, image, picture.mean)]
+        ghosts = [s for s in known if is_ghost(s, image, background.mean)]
         known = tuple(s for s in known if s not in ghosts)
-        told = blob_mask([s for s in known if s.id], change.shape)
-        held = (cv2.dilate(told.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
+        reported = blob_mask([s for s in known if s.id], change.shape)
+        held = (cv2.dilate(reported.view(np.uint8), np.ones((5, 5), np.uint8)) > 0) & change
         self._background = update_background(
-            picture, image, held, seconds, blob_mask(ghosts, change.shape)
+            background, image, held, seconds, blob_mask(ghosts, change.shape)
         )
         self._tracks = tuple(
             s
@@ -200,12 +203,12 @@ def _prepare(frame: Frame) -> Floats:
 
 
 def region_mask(regions: Sequence[Region], size: tuple[int, int], shape: tuple[int, int]) -> Mask:
-    """(h, w) bool: the pixels of the picture that some regions may hide.
+    """(h, w) bool: the pixels of the background that some regions may hide.
 
     Args:
         regions: In frame pixels.
         size: (width, height) of the frame.
-        shape: (h, w) of the picture.
+        shape: (h, w) of the background.
     """
     out = np.zeros(shape, dtype=np.uint8)
     scale = shape[1] / size[0], shape[0] / size[1]
@@ -233,7 +236,7 @@ def swept_mask(here: Mask, region: Region, seconds: float, scale: float) -> Mask
         here: (h, w) bool, where it is.
         region: Gives the velocity, frame pixels per second.
         seconds: How far back.
-        scale: Pixels of the picture per frame pixel.
+        scale: Pixels of the background per frame pixel.
     """
     way = -np.asarray(region.velocity) * seconds * scale
     steps = int(np.clip(np.ceil(np.hypot(*way) / STRIDE_PX), 1, MOST_STRIDES))

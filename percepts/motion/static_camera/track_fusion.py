@@ -19,18 +19,18 @@ from visup.percepts.motion.static_camera.blob_filters import is_salient_blob
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, Foreground
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-KNOWN = 0.4  # share of a region that differs from the picture when the picture knows it
+KNOWN = 0.4  # share of a region that differs from the background when subtraction shows it
 COMMON = 0.5  # share of the smaller that two outlines of one object have in common
-WHOLE = 0.6  # intersection over union at which an object is seen whole in the picture
-MAIN = 0.4  # share of a region that a silhouette must fill to take its id: limbs do not
+WHOLE = 0.6  # intersection over union at which an object is seen whole by subtraction
+MAIN = 0.4  # share of a region that a blob must fill to take its id: limbs do not
 MISSED = (
-    0.15  # share of what tells of a region's motion that lies where the picture shows no change
+    0.15  # share of what tells of a region's motion that lies where subtraction shows no change
 )
 LARGE = (
-    4.0  # how much larger a region must be than one known well, for the picture to miss parts of it
+    4.0  # how much larger a region must be than one known well, for subtraction to miss parts of it
 )
 RECENT = 0.9  # weight of what was known of that before
-BESIDE = 5  # pixels: points lie on edges, half of them outside of the silhouette
+BESIDE = 5  # pixels: points lie on edges, half of them outside of the blob
 LEAST_AREA = 0.0005  # share of the image that an object must fill when it is first reported
 
 
@@ -241,9 +241,9 @@ class TrackFusion:
     def _older(
         self, regions: Sequence[Region], seen: Mapping[int, Region], missed: set[int]
     ) -> tuple[list[Region], dict[int, int]]:
-        """Regions of which it misses parts, or told before it was and not yet seen whole in it.
+        """Regions of which it misses parts, or reported before it was and not yet seen whole in it.
 
-        Also the ids that pass to silhouettes, by key, which now show such a region whole.
+        Also the ids that pass to blobs, by key, which now show such a region whole.
         """
         out, heirs = [], {}
         for r in regions:
@@ -265,7 +265,7 @@ class TrackFusion:
     def _is_part(
         self, own: Region, regions: Sequence[Region], numbered: Mapping[int, Region]
     ) -> bool:
-        """Whether a silhouette that was never told touches another one of the same region."""
+        """Whether a blob that was never reported touches another one of the same region."""
         for r in regions:
             host = numbered.get(self._known_id(r))
             if (
@@ -334,7 +334,7 @@ def blob_region(
 
     Args:
         s: An object that is visible.
-        scale: Frame pixels per pixel of the picture, (x, y).
+        scale: Frame pixels per pixel of the foreground, (x, y).
         size: (width, height) of the frame.
         seconds: Between frames.
 

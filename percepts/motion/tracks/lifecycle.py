@@ -1,4 +1,4 @@
-"""The life of tracks: born, updated, confirmed, forgotten."""
+"""The lifecycle of tracks: initiated, updated, confirmed, deleted."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def delete(tracks: Tracks, scene: FrameMeasurements, settings: MotionSettings) -
             keep = gone <= 0.2 and t.evidence > -20
         else:
             keep = gone <= (settings.memory_s if t.occluded is not None else 0.5)
-            # As surely the background as it had to be something else to be told.
+            # As surely the background as it had to be something else to be reported.
             keep = keep and t.evidence > -LIKELY and not has_absorbed_background(t, scene)
         if keep:
             out.append(t)
@@ -199,7 +199,7 @@ def _without_keys_of_deleted(t: Track, keys: set[int]) -> Track:
 
 
 def _is_thin(t: Track, scene: FrameMeasurements) -> bool:
-    """Whether no cell of a track lies inside it: such a one must move more surely to be told."""
+    """Whether no cell of a track lies inside it: such a one must move more surely to be reported."""
     rest = t.share <= 0.5
     return bool(scene.cells.dilated(rest[:, None], 1)[:, 0].all())
 
@@ -246,7 +246,7 @@ def confirm(
 def _is_confirmed(
     t: Track, scene: FrameMeasurements, settings: MotionSettings, need: float
 ) -> bool:
-    """Whether a track is to be told: at first sight when its motion is clear, else once it lasts."""
+    """Whether a track is to be reported: at first sight when its motion is clear, else once it lasts."""
     thin = _is_thin(t, scene)
     if t.frames < 2 or t.evidence < need * (2 if thin else 1) * LIKELY:
         return False

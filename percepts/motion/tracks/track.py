@@ -81,32 +81,32 @@ class Track:
     Attributes:
         key: Number within the segmenter, from 1, in order of birth.
         id: Public number from 1, 0 until confirmed.
-        born: Seconds.
-        seen: Seconds when it was last visible.
+        initiated: Seconds.
+        last_seen: Seconds when it was last visible.
         share: (count,) float32, probability that each superpixel shows it.
-        hidden: (h, w) float32, where others hide it; None when they do not.
+        occluded: (h, w) float32, where others hide it; None when they do not.
         motions: Of its rigid parts; an arm has several.
-        whole: The one motion that suits all parts best.
-        recent: (count,) float32, where it was of late: parts that turn up there are its own.
+        whole_rate: The one motion that suits all parts best.
+        recent_share: (count,) float32, where it was of late: parts that turn up there are its own.
         evidence: How much better its own motion explains it than the background's did (log
             likelihood, running sum).
         frames: In how many frames it was visible.
         centre: (x, y) centroid when last visible, working pixels.
-        mostly_hidden: Whether others hide a third of it or more.
-        pace: (vx, vy) when it was last in full view, pixels per second.
-        drift: (x, y) of motion not yet applied to `hidden`, pixels.
-        own: (count,) float32, where it would be by its own motion alone.
-        whole_map: (h, w) float32, the same by pixels while others hide a part of it, or None.
-        body: (count,) bool, where it prevails, if by less than half, and objects are surer than the
+        mostly_occluded: Whether others hide a third of it or more.
+        unoccluded_velocity: (vx, vy) when it was last in full view, pixels per second.
+        pending_shift: (x, y) of motion not yet applied to `occluded`, pixels.
+        predicted_share: (count,) float32, where it would be by its own motion alone.
+        predicted_map: (h, w) float32, the same by pixels while others hide a part of it, or None.
+        core: (count,) bool, where it prevails, if by less than half, and objects are surer than the
             background; None before that was seen.
         path: (time, x, y) of its displacement since birth, over the longest baseline.
-        apart: Seconds for which it was seen apart from other tracks, by key.
-        alike: Votes that it is one with another track, by key.
-        gone: (x, y) of its displacement since birth against the background, pixels.
-        way: Length of the way it took to get there, pixels.
-        borne: Displacement over a longer baseline as a share of the way it took meanwhile, by
+        separate_s: Seconds for which it was seen apart from other tracks, by key.
+        merge_votes: Votes that it is one with another track, by key.
+        displacement: (x, y) of its displacement since birth against the background, pixels.
+        path_length: Length of the way it took to get there, pixels.
+        long_baseline_course: Displacement over a longer baseline as a share of the way it took meanwhile, by
             octave of the baseline.
-        explained: Share of its points that the background explains, by octave of the baseline.
+        background_fit: Share of its points that the background explains, by octave of the baseline.
         moving_area: Its area when the background last did not explain it, working pixels.
     """
 

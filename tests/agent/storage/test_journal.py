@@ -15,7 +15,7 @@ from tests.paths import ROOT
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.journal import Journal
-from visup.agent.storage.journal_reader import export_events, read_events, read_facts, read_steps
+from visup.agent.storage.journal_reader import Recording, export_events
 
 CRASH = """
 import os, signal, sys
@@ -46,13 +46,13 @@ def run(path: Path, count: int) -> None:
 def test_a_run_can_be_read_back(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     run(path, 12)
-    events = list(read_events(path))
+    events = list(Recording.open(path).events())
     assert [e["text"] for e in events if e["kind"] == "counted"] == [
         f"I counted {i}." for i in range(1, 13)
     ]
     assert [e["kind"] for e in events].count("alert") == 1
-    assert [s["frame_index"] for s in read_steps(path)] == list(range(12))
-    assert read_facts(path) == {"verdict": "succeeded"}
+    assert [s["frame_index"] for s in Recording.open(path).summaries()] == list(range(12))
+    assert Recording.open(path).facts() == {"verdict": "succeeded"}
 
 
 def test_exported_events_are_one_object_a_line_and_equal_runs_give_equal_bytes(
@@ -80,7 +80,7 @@ def test_a_killed_run_keeps_every_step_that_was_taken(tmp_path: Path) -> None:
     )
     assert done.returncode == -signal.SIGKILL
     printed = [int(line) for line in done.stdout.split()]
-    assert [s["frame_index"] for s in read_steps(path)] == printed
+    assert [s["frame_index"] for s in Recording.open(path).summaries()] == printed
 
 
 @pytest.mark.parametrize("place", ["missing/journal.sqlite", "."])
@@ -92,7 +92,7 @@ def test_a_journal_that_cannot_be_written_says_so(tmp_path: Path, place: str) ->
 def test_reading_something_else_says_so(tmp_path: Path) -> None:
     (tmp_path / "x.sqlite").write_text("not a database, but long enough to look like a file")
     with pytest.raises(OutputError, match="not a journal"):
-        list(read_events(tmp_path / "x.sqlite"))
+        list(Recording.open(tmp_path / "x.sqlite").events())
 
 
 def test_a_step_that_cannot_be_written_leaves_the_earlier_ones(tmp_path: Path) -> None:
@@ -107,4 +107,4 @@ def test_a_step_that_cannot_be_written_leaves_the_earlier_ones(tmp_path: Path) -
     with pytest.raises(OutputError):
         agent.run(frames(1))
     journal.close()
-    assert [s["frame_index"] for s in read_steps(path)] == [0, 1, 2]
+    assert [s["frame_index"] for s in Recording.open(path).summaries()] == [0, 1, 2]

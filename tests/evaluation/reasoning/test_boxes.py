@@ -31,7 +31,8 @@ from visup.rules.relations.direction import CONVERSE, DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
 from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import rcc8
-from visup.rules.relations.thresholds import AWAY, DIRECTION, DISTANCE, SIDE, ThresholdSettings
+from visup.rules.relations.rows import AWAY, DIRECTION, DISTANCE, SIDE
+from visup.rules.relations.thresholds import ThresholdSettings
 
 A = (100.0, 200.0, 80.0, 60.0)
 MIRROR = {"converging": "diverging", "diverging": "converging"}

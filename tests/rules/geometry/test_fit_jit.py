@@ -47,7 +47,7 @@ def velocity(times: Floats, support: Floats, free: NDArray[np.bool_]) -> Floats:
 
 
 def by_medians(times: Floats, values: Floats) -> tuple[float, float]:
-    """`fit_loops.line` by NumPy's medians, pair by pair."""
+    """`theil_sen` by NumPy's medians, pair by pair."""
     known = np.isfinite(values)
     t, v = times[known], values[known]
     if len(t) < 4:

@@ -175,8 +175,8 @@ BAD = [
     (wrap("gap(a, b) < 3"), "a length is compared with a number", "a length: px", 2, 10),
     (wrap("gapp(a, b) < 3 px"), "no quantity 'gapp'", "did you mean 'gap'?", 2, 10),
     (wrap("gap(a, b)"), "no relation or fact 'gap'", "compare it with a number", 2, 10),
-    (wrap("touching(a, b) for 2 px"), "'for' wants a time", "such as 2 s", 2, 29),
-    (wrap("touching(a, b) for 0 s"), "'for' wants a time above 0", "", 2, 29),
+    (wrap("touching(a, b) for 2 px"), "'for' needs a time", "such as 2 s", 2, 29),
+    (wrap("touching(a, b) for 0 s"), "'for' needs a time above 0", "", 2, 29),
     (wrap("seen(a)"), "the variable 'b' of 'r' is not used", "leave it out", 1, 6),
     (wrap("touching(a, b)", say='"{c}"'), "mentions 'c'", "one of a, b, is", 1, 6),
     (wrap("expected(near, a, b)"), "'near' is no relation", "one of converging", 2, 10),
@@ -188,10 +188,10 @@ BAD = [
     (wrap("touching(a, b)", say="near"), "'near' does not belong", "double quotes", 3, 9),
     ("rule r(a): info\n    when seen(a)\n", "ends too early", "'say'", 2, 17),
     (wrap("gap(a, b) + 3 s < 3 px"), "a length is added to a time", "a length: px", 2, 10),
-    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "a time is compared with a length", "a time: s", 2, 10),
+    (wrap("gap(a, b) / closing_speed(a, b) < 3 px"), "time is compared with a length", "s, min, h", 2, 10),
     (wrap("gap(a, b) + 3 px"), "is a quantity, neither true nor false", "compare it", 2, 10),
     (wrap("touching(a, b) + 3 px < 5 px"), "no quantity 'touching'", "true or false", 2, 10),
-    (wrap("(seen(a) and seen(b)) < 5 px"), "is true or false, and no quantity", "a quantity", 2, 11),
+    (wrap("(seen(a) and seen(b)) < 5 px"), "is true or false, not a quantity", "a quantity", 2, 11),
     (wrap("rate(gap(a, b), 2 s) < 5 px"), "a speed is compared with a length", "a speed: px/s", 2, 10),
     (wrap("rate(gap(a, b)) < 5 px/s"), "'rate' takes something and a time", "such as rate", 2, 10),
     (wrap("abs(gap(a, b), 1 px) < 5 px"), "'abs' does not take 2", "abs(gap(a, b))", 2, 10),
@@ -208,7 +208,7 @@ BAD = [
     (wrap("exists c: exists d: (touching(a, c) and touching(b, d))"), "looks at 4 objects together",
      "at most 3", 1, 6),
     (wrap("touching(a, b)", "rule r(a, for): info"), "'for' does not belong here", "a name", 1, 11),
-    (wrap("touching(a, b)\n    hold 2 px"), "'hold' wants a time", "such as 2 s", 3, 10),
+    (wrap("touching(a, b)\n    hold 2 px"), "'hold' needs a time", "such as 2 s", 3, 10),
     (wrap("last(touching(a, b), 3) and seen(a)"), "'last' takes something and a time", "", 2, 10),
 ]  # fmt: skip
 
@@ -299,3 +299,16 @@ def test_a_rule_in_python_is_checked_as_one_of_a_file_is() -> None:
 
 def test_every_relation_is_a_word() -> None:
     assert set(RELATION_NAMES) <= set(PREDICATES)
+
+
+def test_both_languages_know_the_same_units_and_print_numbers_alike() -> None:
+    from visup.tasks.grammar.conditions import bound_of
+    from visup.tasks.grammar.parser import read
+
+    for unit in ("ms", "s", "min", "h"):
+        formula = parse_formula(f"x() > 1 for 2 {unit}", signals("x"))
+        assert str(formula) == f"x() > 1 for 2 {unit}"
+        assert UNITS[unit] == (Number(1.0, unit).dimension, Number(1.0, unit).base)
+    body = read("<t> ::= gap(a, b) < 2.5 px").stages[0].body
+    assert isinstance(body, Comparison)
+    assert bound_of(body) == Number(2.5, Unit.PX)

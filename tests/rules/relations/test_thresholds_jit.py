@@ -5,18 +5,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.relations import judged_by_arrays as twin
+from tests.rules.relations import thresholds_by_arrays as twin
 from visup.rules.geometry.hysteresis import Codes, Floats
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import DIRECTIONS
-from visup.rules.relations import _kinematics_jit as measure_loops
-from visup.rules.relations import _pair_states_jit as relation_loops
-from visup.rules.relations import _thresholds_jit as judge_loops
+from visup.rules.relations import _kinematics_jit as kinematics_jit
+from visup.rules.relations import _pair_states_jit as pair_states_jit
+from visup.rules.relations import _thresholds_jit as thresholds_jit
 from visup.rules.relations.direction import CONVERSE as OPPOSITE
 from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.rcc8 import CONVERSE, from_outline_signs, from_signs
-from visup.rules.relations.reasoner import ROWS
-from visup.rules.relations.thresholds import BOX_ROWS, ThresholdSettings, limits
+from visup.rules.relations.rows import BOX_ROWS, ROWS
+from visup.rules.relations.thresholds import ThresholdSettings, limits
 
 some = settings(max_examples=80, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
@@ -52,12 +52,12 @@ def test_boxes_are_judged_as_by_arrays(seed: int, m: int) -> None:
     )
     bounds = limits(ThresholdSettings(), 800.0)
     found = np.empty((BOX_ROWS, p), dtype=np.int8)
-    judge_loops.classify_boxes(before, boxes, velocities, spread, bounds, found)
+    thresholds_jit.classify_boxes(before, boxes, velocities, spread, bounds, found)
     expected = twin.judged(before, boxes, velocities, spread, bounds)
     assert (found == expected).all()
     apart = twin.differences(boxes)
-    assert np.allclose(judge_loops.edge_differences(boxes), apart, equal_nan=True)
-    assert np.allclose(judge_loops.box_gaps(boxes), twin.gaps(apart), equal_nan=True)
+    assert np.allclose(thresholds_jit.edge_differences(boxes), apart, equal_nan=True)
+    assert np.allclose(thresholds_jit.box_gaps(boxes), twin.gaps(apart), equal_nan=True)
 
 
 @some
@@ -65,10 +65,10 @@ def test_boxes_are_judged_as_by_arrays(seed: int, m: int) -> None:
 def test_signs_are_those_of_arrays(seed: int) -> None:
     rng = np.random.default_rng(seed)
     values, before = holed(rng, rng.normal(0.0, 2.0, (3, 20))), codes(rng, 2, 3, 20)
-    found = judge_loops.signs_with_hysteresis(values, before, 2.0, 1.0)
+    found = thresholds_jit.signs_with_hysteresis(values, before, 2.0, 1.0)
     assert (found == twin.signs(values, before, 2.0, 1.0)).all()
     sigma = rng.uniform(0.1, 1.0, 20)
-    moving = judge_loops.moving_signs(values[0], sigma, before[0], (1.0, 0.5, 3.0, 2.0))
+    moving = thresholds_jit.moving_signs(values[0], sigma, before[0], (1.0, 0.5, 3.0, 2.0))
     at_rest = np.where(before[0] == -1, 1, before[0])
     enter, leave = np.maximum(1.0, 3.0 * sigma), np.maximum(0.5, 2.0 * sigma)
     assert (moving == twin.signs(values[0], at_rest, enter, leave)).all()
@@ -102,10 +102,11 @@ def test_trend_touch_and_moving_together_are_those_of_arrays(seed: int, m: int) 
     depth, gap = codes(rng, 2, p), holed(rng, rng.uniform(0.0, 8.0, p))
     marks = rng.choice([0, 0, 1, 2, 3], p).astype(np.int8)
     found = np.concatenate([np.zeros((3, p), dtype=np.int8), depth[None]])
-    bounds = (1.6, 0.8), (3.0, 2.0), (3.0, 5.0, 0.2, 0.25), (2.0, 4.0, 1.5, 0.7)
-    relation_loops.classify_motion(
-        state, pending, now.tables, now.motion, now.speed, now.depth, gap, marks, bounds, found
+    bounds = pair_states_jit.MotionLimits(
+        (1.6, 0.8), (3.0, 2.0), (3.0, 5.0, 0.2, 0.25), (2.0, 4.0, 1.5, 0.7)
     )
+    motion = pair_states_jit.PairMotion(now.tables, now.motion, now.speed, now.depth, gap, marks)
+    pair_states_jit.classify_motion(state, pending, motion, bounds, found)
     i, j = pairs(m)
     trend = twin.trends(now.rate[i, j], now.rate_sigma[i, j], state[0], pending[0], depth)
     touch = twin.touches(gap, now.depth, state[1])
@@ -123,8 +124,9 @@ def test_what_is_told_is_what_is_believed_with_its_converse(seed: int, m: int) -
     now, p = measured(rng, m), m * (m - 1) // 2
     state, rcc8 = codes(rng, 2, ROWS, p), codes(rng, 7, 2, p)
     since, turned = rng.uniform(0.0, 9.0, (ROWS, p)), rng.uniform(0.0, 9.0, (2, p))
-    told, moments, numbers = relation_loops.relation_rows(
-        state, since, rcc8, turned, now.tables, now.depth, CONVERSE, OPPOSITE, (9.5, 0.8, 0.5)
+    beliefs = pair_states_jit.PairBeliefs(state, since, rcc8, turned)
+    told, moments, numbers = pair_states_jit.relation_rows(
+        beliefs, now.tables, now.depth, (CONVERSE, OPPOSITE), (9.5, 0.8, 0.5)
     )
     i, j = pairs(m)
     gap, rate, sigma = now.gap[i, j], now.rate[i, j], now.rate_sigma[i, j]
@@ -160,7 +162,7 @@ def test_places_and_outlines_follow_what_moves_and_smooth_what_shakes(seed: int,
         steady = np.abs(value - before) <= jump
         return np.asarray(np.where(steady, before + 0.4 * (value - before), value))
 
-    found = relation_loops.smoothed_boxes(boxes, gap, seen, now.tables, (0.4, 3.0, 2.0, 0.3, 1.5))
+    found = pair_states_jit.smoothed_boxes(boxes, gap, seen, now.tables, (0.4, 3.0, 2.0, 0.3, 1.5))
     wanted = np.where(seen[:, :1] > 0.3, np.nan, seen[:, 4:])
     i, j = pairs(m)
     gaps = smooth(gap, now.gap[i, j], 2.0)
@@ -169,7 +171,7 @@ def test_places_and_outlines_follow_what_moves_and_smooth_what_shakes(seed: int,
     assert found[2].tolist() == np.flatnonzero(gaps <= 1.5).tolist()
     before, apart = holed(rng, rng.uniform(30.0, 41.0, (3, p))), rng.normal(35.0, 3.0, (3, p))
     asked = found[2]
-    level = relation_loops.smoothed_outlines(
+    level = pair_states_jit.smoothed_outlines(
         before, gaps, asked, apart[:, asked].copy(), (0.4, 2.0, 40.0)
     )
     value = np.where(np.isnan(gaps), np.nan, np.full((3, p), 40.0))
@@ -187,7 +189,7 @@ def test_quantities_of_pairs_are_those_of_arrays(seed: int, m: int) -> None:
     seen = rng.normal(0.0, 9.0, (m, 8))
     seen[:, 0] = rng.choice([0.0, 1.0], m)
     seen[:, 3] = rng.uniform(0.1, 1.0, m)
-    found, speed = measure_loops.pair_tables(
+    found, speed = kinematics_jit.pair_tables(
         gaps, slope, sigma, velocity, support, seen, DIRECTIONS, (4.0, 3.0, 4.0, 0.75)
     )
     reach = support[:, None] + support[:, (np.arange(16) + 8) % 16]
@@ -219,8 +221,8 @@ def test_only_near_pairs_are_asked_and_a_moment_out_of_sight_keeps_the_last_gap(
     seen[3, 0] = 0.2
     apart, before = np.full((4, 4), 7.0), np.full((4, 4), 33.0)
     apart[1, 2] = np.nan
-    gaps, asked = measure_loops.hull_gaps(seen, apart, before, 5.0, 0.3)
+    gaps, asked = kinematics_jit.hull_gaps(seen, apart, before, 5.0, 0.3)
     assert asked.tolist() == [0]
     assert np.array_equal(gaps, [7.0, 7.0, 33.0, np.nan, 33.0, 33.0], equal_nan=True)
     seen[3, 0] = 0.4
-    assert np.isnan(measure_loops.hull_gaps(seen, apart, before, 5.0, 0.3)[0][[2, 4, 5]]).all()
+    assert np.isnan(kinematics_jit.hull_gaps(seen, apart, before, 5.0, 0.3)[0][[2, 4, 5]]).all()

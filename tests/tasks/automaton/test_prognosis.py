@@ -9,8 +9,9 @@ import pytest
 from tests.tasks.scripted import Played, Script, Spell, play
 from visup.agent import TaskBelief, Verdict
 from visup.tasks import load_task, parse_task
+from visup.tasks.automaton.hidden_phases import hidden_filter
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, ActionStatus
-from visup.tasks.automaton.task_filter import TaskFilter
+from visup.tasks.supervision.hypotheses import under_way
 from visup.tasks.supervision.sentences import prospects_text
 from visup.tasks.supervision.supervise import task_reasoner
 
@@ -36,16 +37,22 @@ def belief(played: Played, time: float) -> TaskBelief:
 
 
 @pytest.mark.parametrize("spells", [FAILS, SUCCEEDS])
-def test_readings_share_all_probability_and_the_likeliest_is_told(
+def test_hypotheses_share_all_probability_and_what_is_told_is_a_marginal(
     spells: tuple[Spell, ...],
 ) -> None:
     played = watch(*spells)
     for mind in played.minds[5:]:
-        hypotheses = mind.memory["tasks"][0].hypotheses
-        masses = [r.mass for r in hypotheses]
+        weighted = mind.memory["tasks"][0].posterior.hypotheses.values()
+        masses = [w.mass for w in weighted]
         assert math.isclose(sum(masses), 1.0)
         assert masses == sorted(masses, reverse=True)
-        assert mind.tasks[0].confidence == masses[0]
+        told = mind.tasks[0]
+        if told.verdict is Verdict.IN_PROGRESS:
+            here = [w.mass for w in weighted if told.current in under_way(w.value)]
+            assert told.confidence == pytest.approx(sum(here))
+        elif told.verdict is Verdict.SUCCEEDED:
+            done = [w.mass for w in weighted if w.value.finished is not None]
+            assert told.confidence == pytest.approx(sum(done))
 
 
 def test_how_sure_it_is_does_not_hang_on_the_frame_rate() -> None:
@@ -96,7 +103,7 @@ def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> 
     assert played.last.tasks[0].current == "approach"
     taken = [e for e in played.events if e.kind == "stage_revised"]
     assert [e.data["stage"] for e in taken] == ["approach"]
-    assert "told done at 5." in taken[0].text
+    assert "reported complete at 5." in taken[0].text
     assert "is now believed not to have happened" in taken[0].text
     assert not [e for e in watch(*SUCCEEDS).events if e.kind == "stage_revised"]
 
@@ -115,7 +122,7 @@ def test_prospects_are_said_in_one_line() -> None:
     said = prospects_text(belief(played, 6.0))
     assert said.startswith("next: `captured` (")
     assert "ends well with a probability of 8" in said
-    assert prospects_text(TaskBelief("t", Verdict.UNKNOWN)) == "next: not known"
+    assert prospects_text(TaskBelief("t", Verdict.UNKNOWN)) == "next: unknown"
 
 
 def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:
@@ -137,5 +144,5 @@ def test_a_stage_that_comes_back_to_itself_inside_another_is_not_looked_into_for
         "<t> ::= <loop>\n<loop> ::= converging(arm, satellite)"
         " | touching(arm, satellite) & (diverging(arm, satellite) <loop>)"
     )
-    recogniser = TaskFilter(task)
+    recogniser = hidden_filter(task)
     assert 0.0 < recogniser.success(recogniser.start()) < 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -12,9 +13,16 @@ from tests.oracles.recognition_tasks import Draw, text_of
 from visup.agent import Status
 from visup.evaluation.reasoning.recognition import compare, follow
 from visup.tasks.automaton.automaton import END
+from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.hidden_phases import (
+    ActionEvidence,
+    ActionKey,
+    HiddenFilter,
+    HiddenPosterior,
+    hidden_filter,
+)
 from visup.tasks.automaton.stage_hmm import DEFAULT_HMM, ActionStatus, PhaseKind, StageHmm
-from visup.tasks.automaton.task_filter import ActionEvidence, ActionKey, TaskFilter, TaskPosterior
 from visup.tasks.automaton.transitions import HiddenState, HiddenTransitions
 from visup.tasks.grammar.parser import read
 
@@ -30,8 +38,8 @@ def seeing(*holding: str, among: str = "abc") -> dict[ActionKey, ActionEvidence]
 
 
 def followed(
-    recogniser: TaskFilter, told: str, among: str = "abc", dt: float = 0.2
-) -> list[TaskPosterior]:
+    recogniser: HiddenFilter, told: str, among: str = "abc", dt: float = 0.2
+) -> list[HiddenPosterior]:
     """Beliefs after each letter of what is seen; `.` for nothing at all."""
     beliefs = [recogniser.start()]
     for letter in told:
@@ -52,7 +60,7 @@ def test_small_tasks_are_recognised_as_by_counting_all_histories() -> None:
 @given(st.integers(0, 10**6), st.sampled_from([0.04, 0.3, 5.0]))
 def test_passages_from_a_place_share_all_of_its_mass(seed: int, dt: float) -> None:
     task = read(text_of(Draw(random.Random(seed)).rules()))
-    recogniser = TaskFilter(task)
+    recogniser = hidden_filter(task)
     transitions = HiddenTransitions(recogniser.automaton, DEFAULT_HMM)
     places = [p for p, _ in transitions.begin()]
     for place in places[:5]:
@@ -81,20 +89,23 @@ def test_what_is_seen_is_seen_with_some_probability_whatever_is_going_on(
 
 
 def test_what_is_unknown_changes_nothing_but_the_time() -> None:
-    recogniser = TaskFilter(read(ROW))
+    recogniser = hidden_filter(read(ROW))
     before = followed(recogniser, "aaa")[-1]
     unknown = {key: ActionEvidence(ActionStatus.UNKNOWN) for key in seeing()}
-    assert recogniser.step(before, unknown, 0.5).states == recogniser.step(before, {}, 0.5).states
+    assert (
+        recogniser.step(before, unknown, 0.5).hypotheses
+        == recogniser.step(before, {}, 0.5).hypotheses
+    )
     same = recogniser.step(before, unknown, 0.0)
-    for place, weighed in before.states.items():
-        assert same.states[place].mass == pytest.approx(weighed.mass)
+    for place, weighed in before.hypotheses.items():
+        assert same.hypotheses[place].mass == pytest.approx(weighed.mass)
 
 
 @LAW
 @given(st.integers(0, 10**6))
 def test_time_may_be_cut_into_steps_as_one_likes(seed: int) -> None:
     """While nothing is seen, many short steps and few longer ones come to nearly the same."""
-    recogniser = TaskFilter(read(ROW), least=0.0)
+    recogniser = hidden_filter(read(ROW), least=0.0)
     before = followed(recogniser, random.Random(seed).choice(["aaaa", "aab", "abbbc"]))[-1]
     short = before
     for _ in range(20):
@@ -108,7 +119,7 @@ def test_time_may_be_cut_into_steps_as_one_likes(seed: int) -> None:
 
 
 def test_a_task_is_followed_from_stage_to_stage() -> None:
-    recogniser = TaskFilter(read(ROW))
+    recogniser = hidden_filter(read(ROW))
     beliefs = followed(recogniser, "aaaaaabbbbbbcccccc")
     told = [recogniser.most_likely(b)[0] for b in beliefs[1:]]
     assert told == sorted(told, key=["one", "two", "three"].index)
@@ -119,13 +130,13 @@ def test_a_task_is_followed_from_stage_to_stage() -> None:
 
 
 def test_one_wrong_look_does_not_lead_astray() -> None:
-    recogniser = TaskFilter(read(ROW))
+    recogniser = hidden_filter(read(ROW))
     beliefs = followed(recogniser, "aaaaaacaaabaaaaaaa")
     assert {recogniser.most_likely(b)[0] for b in beliefs[4:]} == {"one"}
 
 
 def test_a_contrary_that_lasts_is_failing_and_ends_it() -> None:
-    recogniser = TaskFilter(read(ROW))
+    recogniser = hidden_filter(read(ROW))
     belief = followed(recogniser, "aaaaa")[-1]
     hopes = [recogniser.success(belief)]
     for _ in range(6):
@@ -139,7 +150,7 @@ def test_a_contrary_that_lasts_is_failing_and_ends_it() -> None:
 
 def test_what_may_come_next_is_told_with_equal_shares() -> None:
     task = "<t> ::= <a> (<b> | <c> <b>)\n<a> ::= a(x)\n<b> ::= b(x)\n<c> ::= c(x)"
-    recogniser = TaskFilter(read(task))
+    recogniser = hidden_filter(read(task))
     assert dict(recogniser.next_stages(recogniser.start())) == {
         "b": pytest.approx(0.5),
         "c": pytest.approx(0.5),
@@ -149,7 +160,7 @@ def test_what_may_come_next_is_told_with_equal_shares() -> None:
 
 def test_what_comes_next_is_a_stage_however_many_steps_away() -> None:
     task = "<t> ::= <a> <b>?\n<a> ::= (a(x) c(x))+\n<b> ::= b(x)"
-    recogniser = TaskFilter(read(task))
+    recogniser = hidden_filter(read(task))
     after_one = dict(recogniser.next_stages(recogniser.start()))["b"]
     # From c: a again, b, or the end; a leads back to c: p = 1/3 p + 1/3.
     assert after_one == pytest.approx(0.5, abs=1e-6)
@@ -161,32 +172,38 @@ def test_what_comes_next_is_a_stage_however_many_steps_away() -> None:
 def test_success_is_the_share_of_courses_that_end(text: str) -> None:
     """Letting the model run until all is over finds what is told beforehand."""
     process = StageHmm(begin=2.0, leave=1.0, fail=0.2, recover=0.3, lose=0.2, skip=0.05)
-    recogniser = TaskFilter(read(text), process, most=10**6, least=1e-12)
+    recogniser = hidden_filter(read(text), process, most=10**6, least=1e-12)
     belief = recogniser.start()
     hope = recogniser.success(belief)
     for _ in range(3_000):
         belief = recogniser.step(belief, {}, 0.05)
-    ended = belief.states[HiddenState(END, ())].mass
+    ended = belief.hypotheses[HiddenState(END, ())].mass
     assert 0.1 < hope < 0.95
     assert ended == pytest.approx(hope, abs=0.01)
 
 
+def taken_back(beliefs: list[HiddenPosterior]) -> list[Revision]:
+    """The steps told done on the way that later turn out not to have been."""
+    pairs = pairwise(beliefs)
+    return [r for a, b in pairs for r in revisions(a.likeliest, b.likeliest, b.time)]
+
+
 def test_what_later_evidence_overturns_is_taken_back() -> None:
     task = "<t> ::= a(x) | <long> <other>\n<long> ::= b(x)\n<other> ::= c(x)"
-    recogniser = TaskFilter(read("<t> ::= <one> <two>\n<one> ::= a(x)\n<two> ::= b(x)"))
+    recogniser = hidden_filter(read("<t> ::= <one> <two>\n<one> ::= a(x)\n<two> ::= b(x)"))
     beliefs = followed(recogniser, "aaaaabbb" + "a" * 12, among="ab")
-    taken = [r for b in beliefs for r in b.revised]
+    taken = taken_back(beliefs)
     assert [r.step.stage for r in taken] == ["one"]
-    assert 1.0 < taken[0].told < taken[0].revised
-    assert "`one`, told done at" in str(taken[0])
+    assert 1.0 < taken[0].reported < taken[0].revised
+    assert "`one`, reported complete at" in str(taken[0])
     assert "now believed not to have happened" in str(taken[0])
-    steady = followed(TaskFilter(read(task)), "bbbbbbccccc")
-    assert not [r for b in steady for r in b.revised]
+    steady = followed(hidden_filter(read(task)), "bbbbbbccccc")
+    assert not taken_back(steady)
 
 
 def test_a_retry_is_followed_however_often_it_comes() -> None:
     task = "<t> ::= <try> (<done> | <back> <t>)\n<try> ::= a(x)\n<back> ::= b(x)\n<done> ::= c(x)"
-    recogniser = TaskFilter(read(task))
+    recogniser = hidden_filter(read(task))
     beliefs = followed(recogniser, "aaaaabbbbb" * 8 + "ccccccccc")
     assert recogniser.most_likely(beliefs[78])[0] == "back"
     assert recogniser.most_likely(beliefs[-1])[0] == "done"
@@ -195,17 +212,17 @@ def test_a_retry_is_followed_however_often_it_comes() -> None:
 
 def test_a_task_that_holds_itself_within_itself_is_looked_into_no_further_than_is_bounded() -> None:
     task = read("<t> ::= any order (<u>, e(x)?) | b(x) <t>\n<u> ::= d(x)? | c(x) <t>")
-    recogniser = TaskFilter(task)
+    recogniser = hidden_filter(task)
     assert 0.5 < recogniser.success(recogniser.start()) < 1.0
     assert len(recogniser.automaton) < 3_000
 
 
 def test_places_are_bounded_and_what_is_dropped_is_accounted_for() -> None:
     task = read("<t> ::= any order (a(x), b(x), c(x), d(x), e(x))")
-    few, all_of_them = TaskFilter(task, most=40), TaskFilter(task, most=10**6, least=0.0)
+    few, all_of_them = hidden_filter(task, most=40), hidden_filter(task, most=10**6, least=0.0)
     told = "aaaaaccccceeeee"
     one, other = followed(few, told, "abcde")[-1], followed(all_of_them, told, "abcde")[-1]
-    assert len(one.states) <= 40 < len(other.states)
+    assert len(one.hypotheses) <= 40 < len(other.hypotheses)
     assert 0.0 < one.lost < 0.05
     assert other.lost == pytest.approx(0.0, abs=1e-12)
     assert few.most_likely(one) == all_of_them.most_likely(other)
@@ -214,14 +231,14 @@ def test_places_are_bounded_and_what_is_dropped_is_accounted_for() -> None:
 def test_the_truth_is_dropped_no_more_often_than_is_accounted_for() -> None:
     """Over streams that the model itself draws, with far too few places kept."""
     task = read("<t> ::= any order (a(x), b(x), c(x))")
-    recogniser = TaskFilter(task, most=4)
+    recogniser = hidden_filter(task, most=4)
     dropped, accounted = 0, 0.0
     for seed in range(60):
         truths, belief = drawn(recogniser, random.Random(seed)), recogniser.start()
         missed = False
         for place, seen in truths:
             belief = recogniser.step(belief, seen, 1.0)
-            missed = missed or place not in belief.states
+            missed = missed or place not in belief.hypotheses
         dropped += missed
         accounted += belief.lost
     assert dropped > 0
@@ -229,7 +246,7 @@ def test_the_truth_is_dropped_no_more_often_than_is_accounted_for() -> None:
 
 
 def drawn(
-    recogniser: TaskFilter, rng: random.Random
+    recogniser: HiddenFilter, rng: random.Random
 ) -> list[tuple[HiddenState, dict[ActionKey, ActionEvidence]]]:
     """Where a task is at each second, and what is seen of it, by the model itself."""
     transitions = HiddenTransitions(recogniser.automaton, DEFAULT_HMM)

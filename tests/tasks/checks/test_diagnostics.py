@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 
 from tests.paths import ROOT
 from visup.agent.model.errors import ErrorGroup, SourceLocation, TaskError
+from visup.agent.model.suggestions import closest
 from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
+from visup.rules.language.diagnostics import Diagnostic
 from visup.tasks import load_task, parse_task, shipped_tasks
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.load import read_text
-from visup.tasks.diagnostics.diagnostic import CODES, Diagnostic, closest
+from visup.tasks.diagnostics.codes import CODES
 from visup.tasks.grammar.structure import stage_names, task_actors
 
 HERE = ROOT / "tests/tasks"
@@ -80,7 +82,7 @@ def test_an_action_that_needs_percepts_which_nothing_gives_is_told() -> None:
 def test_three_mistakes_are_raised_together() -> None:
     with pytest.raises(ErrorGroup) as caught:
         load_task(HERE / "bad" / "three_mistakes.task")
-    codes = [e.code for e in caught.value.errors if isinstance(e, Diagnostic)]
+    codes = [e.code for e in caught.value.errors]
     assert codes == ["E102", "E201", "E117"]
     for error in caught.value.errors:
         assert isinstance(error.where, SourceLocation)

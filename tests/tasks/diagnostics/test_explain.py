@@ -4,7 +4,7 @@ import pytest
 
 from visup.agent.model.errors import TaskError
 from visup.tasks.checks.diagnose import diagnose
-from visup.tasks.diagnostics.diagnostic import CODES
+from visup.tasks.diagnostics.codes import CODES
 from visup.tasks.diagnostics.explain import explain
 
 

@@ -32,6 +32,7 @@ class Run:
     beliefs: tuple[tuple[float, TaskBelief], ...]
     events: tuple[Event, ...]
     alerts: tuple[AlertCondition, ...]
+    minds: tuple[Mind, ...]
 
 
 @cache
@@ -43,6 +44,7 @@ def run(name: str) -> Run:
     beliefs: list[tuple[float, TaskBelief]] = []
     events: list[Event] = []
     alerts: list[AlertCondition] = []
+    minds: list[Mind] = []
     for seen, _ in observations(name, Noise(every=3)):
         mind = replace(
             mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
@@ -57,7 +59,8 @@ def run(name: str) -> Run:
         alerts += [c for c in concerns if (c.kind, c.objects, c.key) not in open_now]
         mind = replace(mind, alerts=tuple(_alert(c, seen.time) for c in concerns))
         beliefs.append((seen.time, mind.tasks[0]))
-    return Run(tuple(beliefs), tuple(events), tuple(alerts))
+        minds.append(mind)
+    return Run(tuple(beliefs), tuple(events), tuple(alerts), tuple(minds))
 
 
 def _alert(concern: AlertCondition, now: float) -> Alert:
@@ -130,5 +133,5 @@ def test_the_narrative_is_that_of_the_paper() -> None:
     assert told[2].startswith("Stage `approach` is complete")
     assert told[3].startswith("Stage `captured` of task `dock` has begun")
     failing = next(t for t in told if t.startswith("Stage `captured` is failing: "))
-    assert failing.endswith("s; stage `captured` requires `coupled`.")
+    assert failing.endswith("s; stage `captured` requires them to be coupled.")
     assert told[-1].startswith("Task `dock` has failed: ")

@@ -58,7 +58,7 @@ def test_capture_fails_as_in_the_paper() -> None:
     assert failing.severity is Severity.WARNING
     assert failing.text == (
         "Stage `captured` is failing: the arm and the satellite have been diverging since 12.8 s; "
-        "stage `captured` requires `coupled`."
+        "stage `captured` requires them to be coupled."
     )
     assert status(played, "captured", 25.0) in (Status.FAILING, Status.FAILED)
     assert finish(task_of(played)) is Verdict.FAILED
@@ -390,7 +390,7 @@ def test_a_reasoner_is_a_pure_function_and_keeps_nothing_to_itself() -> None:
     again = play(reasoner, Script(FAILS), 20.0)
     assert [m.tasks for m in again.minds] == [m.tasks for m in played.minds]
     assert again.events == played.events
-    hash(played.last.memory["tasks"][0].hypotheses[0].state)
+    hash(played.last.memory["tasks"][0].posterior.likeliest.state)
 
 
 def test_several_tasks_are_supervised_side_by_side() -> None:

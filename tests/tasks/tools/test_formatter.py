@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from tests.tasks.checks.test_diagnostics import GOOD, text_of
 from tests.tasks.trees import tasks
+from visup.rules.language.diagnostics import Source
 from visup.tasks.checks.files import read_text, shipped_tasks
-from visup.tasks.diagnostics.diagnostic import Source
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import read as read_clean

@@ -50,15 +50,15 @@ def formatted_source(text: str, file: str) -> str:
 
     Raises:
         TaskError: It cannot be laid out, since it is not in the language; tabs are no obstacle.
-        ManyErrors: The same, for several reasons.
+        ErrorGroup: The same, for several reasons.
     """
-    from visup.tasks.checks.diagnose import raise_all
-    from visup.tasks.diagnostics.diagnostic import Source
+    from visup.agent.model.errors import TaskError
+    from visup.rules.language.diagnostics import Source, raise_all
     from visup.tasks.diagnostics.normalise import normalise
     from visup.tasks.diagnostics.recovery import parse
     from visup.tasks.tools.formatter import formatted
 
     source = Source(text, file)
     code, odd = normalise(text, source)
-    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults])
+    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults], TaskError)
     return formatted(text)

@@ -13,11 +13,11 @@ from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
 from visup.agent.model.errors import SourceLocation, VisupError
 from visup.commands.task.format import formatted_source
+from visup.rules.formula.units import Span
+from visup.rules.language.diagnostics import Diagnostic
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
-from visup.tasks.diagnostics.diagnostic import Diagnostic
 from visup.tasks.diagnostics.explain import explain
-from visup.tasks.grammar.nodes import Span
 from visup.tasks.tools.editing import NameUse, completions, definition, hover, name_at, references
 from visup.version import __version__
 

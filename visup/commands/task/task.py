@@ -29,7 +29,8 @@ Without = Annotated[
 @app.command()
 def check(files: Files, as_json: AsJson = False, without: Without = None) -> None:
     """Report every mistake in task files; exit code 2 if there is any."""
-    from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
+    from visup.agent.model.errors import SettingsError, TaskError, VisupError
+    from visup.rules.language.diagnostics import raise_errors
     from visup.tasks.actions.actions import ALL_PERCEPTS
     from visup.tasks.checks.diagnose import diagnose
     from visup.tasks.checks.files import read_text
@@ -42,7 +43,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     for file in files:
         try:
             faults = diagnose(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
-            found[file] = [*faults]
+            found[file] = [f.error(TaskError) for f in faults]
         except VisupError as e:
             found[file] = [e]
     told = [e for errors in found.values() for e in errors]
@@ -52,10 +53,7 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     for file, errors in found.items():
         if not errors:
             typer.echo(f"{file}: ok")
-    if len(told) == 1:
-        raise told[0]
-    if told:
-        raise ErrorGroup(told)
+    raise_errors(told)
 
 
 @app.command()
@@ -157,7 +155,7 @@ def _as_data(error: VisupError) -> dict[str, Any]:
             "length": where.length,
         }
     return {
-        "code": getattr(error, "code", None),
+        "code": error.code,
         "what": error.what,
         **place,
         "expected": error.expected,

@@ -30,17 +30,8 @@ from visup.rules.relations.direction import DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
 from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import CONVERSE, from_signs
-from visup.rules.relations.thresholds import (
-    AWAY,
-    BOX_ROWS,
-    DIRECTION,
-    DISTANCE,
-    ORDER,
-    SIDE,
-    ThresholdSettings,
-    least_durations,
-    limits,
-)
+from visup.rules.relations.rows import AWAY, BOX_ROWS, DIRECTION, DISTANCE, ORDER, SIDE
+from visup.rules.relations.thresholds import ThresholdSettings, least_durations, limits
 
 APPROACH = BOX_ROWS
 APPROACH_NAMES = ("converging", "keeping_distance", "diverging")

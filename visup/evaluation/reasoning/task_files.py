@@ -12,9 +12,10 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_text, shipped_tasks
-from visup.tasks.diagnostics.diagnostic import CODES, Diagnostic, Source
+from visup.tasks.diagnostics.codes import CODES
 from visup.tasks.diagnostics.explain import explain
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.tools.formatter import formatted

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 from visup.agent import Mind, Presence
 from visup.agent.model.errors import SettingsError
+from visup.agent.model.suggestions import did_you_mean
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import why_not as whynot
@@ -99,11 +99,10 @@ def _taken_apart(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestio
         if about in table:
             return ParsedQuestion(kind, about, ids)
     tables = (*known, *stage_names(mind), *rule_names(mind), *RELATION_NAMES)
-    close = get_close_matches(about, tables, 1, 0.6)
     raise SettingsError(
         f"nothing is asked by '{text}'",
         expected=f"{', '.join(known)}, or the name of a stage, rule or relation with ids of objects",
-        hint=f"did you mean '{close[0]}'?" if close else None,
+        hint=did_you_mean(about, tables),
     )
 
 

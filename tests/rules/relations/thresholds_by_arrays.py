@@ -89,7 +89,7 @@ def movements(
 def judged(
     before: Array, boxes: Floats, velocities: Floats, spread: Floats, limits: Limits
 ) -> Array:
-    """(14, P) as of `judge_loops.judged`."""
+    """(14, P) as of `classify_boxes`."""
     level, level_out, near, far, cone, noise, slack, enter, leave, sure, still = limits
     apart, places = differences(boxes), boxes[:, :2] + 0.5 * boxes[:, 2:]
     speeds, sigma = movements(places, velocities, spread, noise)

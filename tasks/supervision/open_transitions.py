@@ -1,0 +1,138 @@
+"""The transitions that are open to a hypothesis, with what its monitors keep.
+
+They are those of the automaton. Where a task says `within`, each entry to a stage has its own time
+at which it runs out, so that the state they lead to is worked out anew each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition, with_payloads
+from visup.tasks.automaton.derivatives import (
+    Leaf,
+    State,
+    TaskStep,
+    begin,
+    derivatives,
+    enter,
+    leaves,
+)
+from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
+from visup.tasks.verification.step_monitor import StepMonitor, entered
+
+Target = tuple[Transition, tuple[TaskStep, ...], State[int] | None]
+"""A transition, the steps that begin by it, and the state it leads to; None at the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenTransition:
+    """A transition that a hypothesis may take.
+
+    Attributes:
+        transition: The transition of the automaton.
+        left: The steps that are over by it.
+        entered: The steps that begin by it.
+        state: Where it leads, or None at the end of the course.
+    """
+
+    transition: Transition
+    left: tuple[Leaf[StepMonitor], ...]
+    entered: tuple[TaskStep, ...]
+    state: State[int] | None
+
+    @property
+    def ends(self) -> bool:
+        """Whether it is the end of the course."""
+        return self.state is None
+
+    @property
+    def share(self) -> float:
+        """Its share among the transitions that leave the same steps."""
+        return self.transition.share
+
+    def taken(self, here: tuple[Leaf[StepMonitor], ...], fresh: StepMonitor) -> State[StepMonitor]:
+        """The state it leads to, which is no end; monitors of steps carried over stay.
+
+        Args:
+            here: The steps under way before.
+            fresh: The monitor of each step that begins.
+        """
+        assert self.state is not None
+        pairs = zip(leaves(self.state), self.transition.carried, strict=True)
+        new = [Leaf(x.step, fresh) if c == NEW else here[c] for x, c in pairs]
+        return with_payloads(self.state, new)
+
+
+class OpenTransitions:
+    """Where hypotheses about one task begin, and the transitions open to them.
+
+    Args:
+        task: The task.
+        automaton: Its states.
+    """
+
+    def __init__(self, task: Task, automaton: Automaton) -> None:
+        self._task = task
+        self._automaton = automaton
+        self._timed = any(_deadlines(task))
+        self._targets: dict[int, list[Target]] = {}
+        self._starts: list[tuple[State[int], int]] = []
+
+    def begin(self, now: float) -> list[tuple[State[StepMonitor], int]]:
+        """The states in which the task may begin now, each with its number."""
+        fresh = entered(now)
+        return [
+            (with_payloads(state, [Leaf(x.step, fresh) for x in leaves(state)]), node)
+            for state, node in self._beginnings(now)
+        ]
+
+    def first_steps(self) -> Iterator[TaskStep]:
+        """The steps with which the task may begin."""
+        return (x.step for state, _ in self._beginnings(0.0) for x in leaves(state))
+
+    def _beginnings(self, now: float) -> list[tuple[State[int], int]]:
+        if self._starts and not self._timed:
+            return self._starts
+        states = enter(self._task, begin(self._task), NEW, now)
+        self._starts = [(s, self._automaton.node(s)) for s in states if s is not None]
+        return self._starts
+
+    def of(self, state: State[StepMonitor], node: int, now: float) -> list[OpenTransition]:
+        """All transitions open in a state.
+
+        Args:
+            state: The state.
+            node: Its number.
+            now: Seconds, from which each `within` counts.
+        """
+        here = leaves(state)
+        return [
+            OpenTransition(transition, tuple(here[i] for i in transition.left), begun, target)
+            for transition, begun, target in self._targets_of(state, node, now)
+        ]
+
+    def _targets_of(self, state: State[StepMonitor], node: int, now: float) -> list[Target]:
+        transitions = self._automaton.transitions(node)
+        if self._timed:
+            numbered = with_payloads(state, [Leaf(x.step, i) for i, x in enumerate(leaves(state))])
+            found = derivatives(self._task, numbered, NEW, now)
+            return [_target(t, d.state) for t, d in zip(transitions, found, strict=True)]
+        if node not in self._targets:
+            states = (
+                None if t.target == END else self._automaton.state(t.target) for t in transitions
+            )
+            self._targets[node] = [_target(t, s) for t, s in zip(transitions, states, strict=True)]
+        return self._targets[node]
+
+
+def _target(transition: Transition, state: State[int] | None) -> Target:
+    steps = () if state is None else leaves(state)
+    return transition, tuple(steps[i].step for i in transition.begun), state
+
+
+def _deadlines(task: Task) -> Iterator[Deadline]:
+    bodies = [s.body for s in task.stages if not isinstance(s.body, Actors)]
+    timed = (c for body in bodies for c in walk(body) if isinstance(c, Timed))
+    return (c for t in timed for c in t.clauses if isinstance(c, Deadline))

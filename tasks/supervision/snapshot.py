@@ -1,0 +1,78 @@
+"""One task at one moment: who plays its actors, and what is seen of its actions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from visup.agent import Binding, Mind, Truth
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.nodes import Hold
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.verification.observe import NEVER, ActionObservation, RelationLookup
+from visup.tasks.verification.observe import observe as observe_action
+from visup.tasks.verification.stage_conditions import ConditionEvaluator
+
+
+class TaskSnapshot:
+    """One task at one moment: who plays its actors, and what is seen of its actions.
+
+    Args:
+        mind: What is believed.
+        bindings: Who plays which actor.
+        model: The task with the meanings of its actions.
+        before: Since when what is no plain relation of the mind has been true, by key.
+    """
+
+    def __init__(
+        self,
+        mind: Mind,
+        bindings: tuple[Binding, ...],
+        model: MonitoredPhases,
+        before: Mapping[str, float] = NEVER,
+    ) -> None:
+        self.mind = mind
+        self.bindings = bindings
+        self._actions = model.actions
+        self._objects = {b.actor: b.object_id for b in bindings}
+        self._relations = RelationLookup(mind, model.looks, before)
+        self._conditions = ConditionEvaluator(model.task, self._holds, self._relations)
+        self._seen: dict[tuple[str, tuple[str, ...]], ActionObservation] = {}
+        self._judged: dict[TaskStep, ActionObservation] = {}
+
+    def observe(self, step: TaskStep) -> ActionObservation:
+        """What is seen now of a step."""
+        if not step.conditions:
+            return self._look(step.action, step.actors)
+        if step not in self._judged:
+            seen = self._look(step.action, step.actors)
+            self._judged[step] = self._conditions.apply(step, seen)
+        return self._judged[step]
+
+    def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
+        """Whether a condition holds, and has for as long as it must."""
+        return self._conditions.relation(condition, lasting).truth
+
+    @property
+    def since(self) -> tuple[tuple[str, float], ...]:
+        """Since when what is no plain relation of the mind has been true, for the next step."""
+        return tuple(self._relations.after.items())
+
+    def _look(self, action: str, actors: tuple[str, ...]) -> ActionObservation:
+        key = (action, actors)
+        if key not in self._seen:
+            objects = tuple(self._objects.get(a) for a in actors)
+            self._seen[key] = observe_action(self._actions[action], objects, self._relations)
+        return self._seen[key]
+
+    def _holds(self, action: str, actors: tuple[str, ...]) -> Truth:
+        return self._look(action, actors).holds
+
+    def found(self, actors: tuple[str, ...]) -> bool:
+        """Whether each of some actors is played by an object."""
+        return all(self._objects.get(a) is not None for a in actors)
+
+    def objects(self, actors: tuple[str, ...]) -> tuple[int, ...]:
+        """Ids of the objects that play some actors; those not found are left out."""
+        ids = (self._objects.get(a) for a in actors)
+        return tuple(i for i in ids if i is not None)

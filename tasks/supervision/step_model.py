@@ -1,0 +1,82 @@
+"""What supervision makes of one step: its phase, and how well what is seen fits it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from visup.agent import Status, Truth
+from visup.agent.model.fast_replace import replace
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.automaton.derivatives import Leaf
+from visup.tasks.automaton.stage_hmm import WAITING, ActionStatus, StageHmm
+from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.settings import TaskSettings
+from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
+
+
+@dataclass(frozen=True)
+class StepModel:
+    """The steps of a task as they are monitored.
+
+    Attributes:
+        actions: Meanings of actions.
+        settings: Patience.
+        hmm: The probabilities of the model.
+    """
+
+    actions: Mapping[str, ActionDefinition]
+    settings: TaskSettings
+    hmm: StageHmm
+
+    def looked_at(
+        self, leaf: Leaf[StepMonitor], seen: ActionObservation, moment: Moment, done: bool
+    ) -> Leaf[StepMonitor]:
+        """A step with what is seen of it in its monitor; `done` when the task is."""
+        # A `within` no longer matters once the task is done.
+        step = replace(leaf.step, deadlines=()) if done else leaf.step
+        meaning = self.actions[step.action]
+        monitor = update(leaf.payload, step, meaning, seen, moment, self.settings)
+        return replace(leaf, payload=monitor)
+
+    def fit(self, leaf: Leaf[StepMonitor], seen: ActionObservation, done: bool, dt: float) -> float:
+        """How well `dt` seconds of what is seen fit a step; 1 at best."""
+        if not seen.observed:
+            return self.hmm.fit(ActionStatus.UNKNOWN, 1.0, dt)
+        if seen.contrary is not None and _counts(seen):
+            return self.hmm.fit(ActionStatus.CONTRARY, seen.contrary.confidence, dt)
+        if done or self.over(leaf) or (seen.helps is not None and leaf.payload.held):
+            return 1.0
+        if seen.helps is not None or leaf.payload.begun is None:
+            return math.exp(-self.hmm.begin * dt)  # it has not begun to hold in all that time
+        return self.hmm.fit(ActionStatus.NEITHER, 1.0, dt)
+
+    def over(self, leaf: Leaf[StepMonitor]) -> bool:
+        """Whether a step is over by itself, whatever comes next."""
+        return over(leaf.payload, leaf.step, self.actions[leaf.step.action])
+
+    def phase(self, leaf: Leaf[StepMonitor]) -> int:
+        """The phase in which `StageHmm` has a step."""
+        monitor, whole = leaf.payload, self.hmm.count(leaf.step)
+        if monitor.status in BAD:
+            return whole + (1 if monitor.status is Status.FAILING else 2)
+        if monitor.fulfilled:
+            return whole
+        return WAITING if monitor.begun is None else 1
+
+    def gain(self, leaf: Leaf[StepMonitor], seen: ActionObservation) -> float:
+        """The evidence of a second that a step is going on; see `MonitoredPhases.gain`."""
+        fit = self.hmm.fit
+        if not seen.observed or self.over(leaf):
+            return 0.0
+        if seen.contrary is not None and _counts(seen):
+            return math.log(fit(ActionStatus.CONTRARY, seen.contrary.confidence, 1.0))
+        if seen.helps is not None:
+            return -math.log(fit(ActionStatus.CONTRARY, seen.helps.confidence, 1.0))
+        return 0.0 if leaf.payload.begun is None else math.log(fit(ActionStatus.NEITHER, 1.0, 1.0))
+
+
+def _counts(seen: ActionObservation) -> bool:
+    """Whether a contrary counts: holding outweighs it unless the course itself names it."""
+    return seen.decisive or seen.holds is not Truth.TRUE

@@ -1,0 +1,113 @@
+"""Supervision tells what the certified filter tells, on what was recorded, within a stated bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from tests.rules.percepts_from_truth import MISSIONS
+from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.supervision.test_missions import NAMES, run
+from visup.agent import Mind
+from visup.evaluation.reasoning.filter_laws import (
+    BOUND,
+    Recorded,
+    distance_to_certified,
+    drawn_distance,
+)
+from visup.tasks import load_task, parse_task
+from visup.tasks.actions.actions import known_actions
+from visup.tasks.actions.vocabulary import task_vocabulary
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.supervision.snapshot import TaskSnapshot
+from visup.tasks.supervision.supervise import task_reasoner
+from visup.tasks.verification.settings import DEFAULT_SETTINGS
+
+DOCKS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 30),
+    Spell("coupled", 13.0, 30),
+)
+FAILS = (
+    Spell("converging", 0.5, 12.3),
+    Spell("touching", 12.0, 12.8),
+    Spell("diverging", 12.8, 30),
+)
+RETRIES = (
+    Spell("converging", 0, 5),
+    Spell("diverging", 6, 10),
+    Spell("converging", 11, 15),
+    Spell("diverging", 16, 18),
+    Spell("converging", 19, 25),
+    Spell("touching", 25, 40),
+    Spell("coupled", 26, 40),
+)
+ORDERS = """<t> ::= any order (<s0>, <s1>, <s2>)
+<s0> ::= touching(arm, satellite)
+<s1> ::= keeping_distance(arm, satellite) for 1 s
+<s2> ::= converging(arm, satellite)
+"""
+MIXED = (
+    Spell("keeping_distance", 1.0, 3.5),
+    Spell("converging", 4.0, 8.0),
+    Spell("touching", 8.0, 10.0),
+    Spell("diverging", 12.0, 14.0),
+)
+
+
+def model_of(task: Task) -> MonitoredPhases:
+    words = task_vocabulary(task, known_actions())
+    return MonitoredPhases(task, words.meanings, DEFAULT_SETTINGS, words.looks)
+
+
+def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
+    """What supervision saw of the steps of its task, from where the task begins."""
+    followed = [m for m in minds if m.memory["tasks"][0].posterior is not None]
+    found = []
+    for mind in followed:
+        memory = mind.memory["tasks"][0]
+        scene = TaskSnapshot(mind, memory.belief.bindings, model, dict(memory.lasting))
+        found.append((mind.time, scene.observe))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("task", "spells"),
+    [
+        (load_task("dock"), DOCKS),
+        (load_task("dock"), FAILS),
+        (load_task("dock_with_retry"), RETRIES),
+        (parse_task(ORDERS), MIXED),
+    ],
+)
+def test_on_scripted_scenes_supervision_is_within_its_bound(
+    task: Task, spells: tuple[Spell, ...]
+) -> None:
+    played = play(task_reasoner([task]), Script(spells), 28.0)
+    model = model_of(task)
+    found = distance_to_certified(model, recorded(model, played.minds))
+    assert found.lost < 1e-6
+    assert found.worst <= BOUND
+
+
+@pytest.mark.skipif(
+    not (MISSIONS / NAMES[0]).exists(), reason="the shared missions are not beside the repo"
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_on_the_missions_supervision_is_within_its_bound(name: str) -> None:
+    model = model_of(load_task("dock"))
+    found = distance_to_certified(model, recorded(model, run(name).minds))
+    assert found.lost < 1e-6
+    assert found.worst <= BOUND
+
+
+def test_where_nothing_is_merged_the_two_are_the_same() -> None:
+    found = [drawn_distance(seed) for seed in (0, 2, 3, 5)]
+    assert max(d.worst for d in found) < 1e-9
+
+
+def test_where_monitors_differ_at_a_node_merging_costs_something() -> None:
+    """The law can fail: random observations that follow no course make merging tell."""
+    assert drawn_distance(8).worst > BOUND

@@ -1,0 +1,119 @@
+"""The law of the layer that reads phases off what was seen.
+
+The task filter of supervision merges hypotheses that stand at the same node, although their monitors
+may differ, and follows a few of them. The certified posterior is that of the same model and the same
+evidence with each history followed by itself (`tests/oracles/unmerged_filter.py`).
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from visup.agent import Relation, Truth
+from visup.evaluation.oracles import oracle
+from visup.tasks.actions.actions import ActionDefinition
+from visup.tasks.automaton.derivatives import TaskStep
+from visup.tasks.automaton.stage_hmm import ActionStatus
+from visup.tasks.automaton.task_filter import TaskFilter
+from visup.tasks.grammar.parser import read
+from visup.tasks.supervision.advance import Observe
+from visup.tasks.supervision.hypotheses import TaskHypothesis
+from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.verification.observe import ActionObservation
+from visup.tasks.verification.settings import DEFAULT_SETTINGS
+
+recognition_tasks = oracle("recognition_tasks")
+unmerged_filter = oracle("unmerged_filter").unmerged_filter
+
+BOUND = 0.01
+"""So far the probability of a stage may be from the certified one on observations of a mission."""
+DRAWN_BOUND = 0.05
+"""The same on average for random grammars with observations that follow no course."""
+STEPS = 40
+FRAME_S = 0.2
+SPELL_S = (0.4, 4.0)  # for so long one thing is seen of an action, at least and at most
+
+Recorded = Sequence[tuple[float, Observe]]
+"""Times in seconds, and what was seen of steps then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Distance:
+    """How far two posteriors of stages are from each other over time.
+
+    Attributes:
+        worst: Greatest difference of the probabilities of a stage.
+        mean: Mean over steps of the greatest difference.
+        lost: What the certified filter dropped at most.
+    """
+
+    worst: float
+    mean: float
+    lost: float = 0.0
+
+
+def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> Distance:
+    """How far supervision is from the posterior with each history by itself.
+
+    Args:
+        model: The task as it is supervised.
+        recorded: Times and observations, the first where the task begins.
+    """
+    certified: TaskFilter[int, TaskHypothesis, Observe] = unmerged_filter(model)
+    told = model.filter.start(recorded[0][0])
+    true = certified.start(told.time)
+    differences = []
+    for now, observe in recorded:
+        told = model.filter.step(told, observe, now - told.time, now)
+        true = certified.step(true, observe, now - true.time, now)
+        differences.append(_apart(dict(model.filter.ranking(told)), dict(certified.ranking(true))))
+    return Distance(max(differences), sum(differences) / len(differences), true.lost)
+
+
+def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
+    """The greatest difference of the probabilities of a stage, the end among them."""
+    return max(abs(one.get(k, 0.0) - other.get(k, 0.0)) for k in {*one, *other})
+
+
+def drawn_distance(seed: int) -> Distance:
+    """How far supervision is from certified on a random grammar with observations of no course."""
+    rng = random.Random(seed)
+    task = read(recognition_tasks.text_of(recognition_tasks.Draw(rng).rules()))
+    keys = recognition_tasks.KEYS
+    actions = {k: ActionDefinition(k, (k,), contrary=(f"not {k}",), text=k) for k in keys}
+    spells = {k: drawn_spells(rng) for k in keys}
+    times = [FRAME_S * i for i in range(STEPS)]
+    recorded = [(now, _seen_at(now, spells)) for now in times]
+    return distance_to_certified(MonitoredPhases(task, actions, DEFAULT_SETTINGS), recorded)
+
+
+Spells = Sequence[tuple[float, ActionStatus]]
+"""Since when each thing is seen of an action, seconds."""
+
+
+def drawn_spells(rng: random.Random) -> Spells:
+    """What is seen of an action over time, one thing after the other."""
+    found, now = [], 0.0
+    while now < FRAME_S * STEPS:
+        found.append((now, rng.choice(tuple(ActionStatus))))
+        now += rng.uniform(*SPELL_S)
+    return found
+
+
+def _seen_at(now: float, spells: Mapping[str, Spells]) -> Observe:
+    def observe(step: TaskStep) -> ActionObservation:
+        since, seen = max(s for s in spells[step.action] if s[0] <= now)
+        relation = Relation(step.action, (1,), Truth.TRUE, since)
+        holds = relation if seen is ActionStatus.HOLDS else None
+        return ActionObservation(
+            holds=Truth.TRUE if holds else Truth.FALSE,
+            held_by=holds,
+            helps=holds,
+            entry=holds,
+            contrary=relation if seen is ActionStatus.CONTRARY else None,
+            observed=seen is not ActionStatus.UNKNOWN,
+        )
+
+    return observe
