@@ -4,6 +4,10 @@ A step is one JSON document (docs/step.schema.json), compressed by zlib. Numbers
 they are read back to the last bit; masks are runs, contours from pixel to pixel chain codes. Plug-ins'
 values are kept when they are made of plain values, arrays and visup's own records; of others only
 the type is known, and what their behaviour gives is unknown when the run is replayed.
+
+It is written by hand, over the fields of the records, because pydantic's `TypeAdapter` has no form for
+what JSON lacks (tuples, arrays, read-only mappings) and is no faster: 1.6 to 1.8 microseconds for a
+hypothesis, as here. The form is described once, from the records, in `schema.py`.
 """
 
 from __future__ import annotations

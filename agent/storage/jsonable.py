@@ -1,4 +1,8 @@
-"""Records as plain JSON values, for the journal and for programs that read visup's output."""
+"""Records as plain JSON values, for the journal and for programs that read visup's output.
+
+By hand: pydantic does not serialise read-only mappings, and does not round numbers, by which equal runs
+give equal bytes.
+"""
 
 from __future__ import annotations
 

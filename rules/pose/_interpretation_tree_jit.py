@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import acos, atan2, hypot, isnan, nan, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,144 +62,143 @@ def rotation_cost(
     return 0.5 * (swing * swing + roll * roll)
 
 
+class TreeCosts(NamedTuple):
+    """What choices cost at one level.
+
+    Attributes:
+        time: Seconds.
+        weight: Of the level.
+        wrong: Of calling all hypotheses wrong.
+        jump: The most that a turn costs.
+        other_view: Of another view where directions are not known.
+        swing: Radians that count as one standard deviation for an object that stands still.
+        roll: The same in the plane.
+        rate_sigma: Standard deviation of the rate, radians per second.
+        most_paths: So many are kept.
+    """
+
+    time: float
+    weight: float
+    wrong: float
+    jump: float
+    other_view: float
+    swing: float
+    roll: float
+    rate_sigma: float
+    most_paths: int
+
+
+class Paths(NamedTuple):
+    """The paths of a tree, each by where it stands; see `InterpretationTree`."""
+
+    cost: Floats
+    views: Ints
+    chosen: Floats
+    since: Floats
+    orientation: Floats
+    rolled: Bools
+    path: NDArray[np.int8]
+
+
+class Choices(NamedTuple):
+    """The hypotheses of a level, none where nothing was hypothesised; see `TreeLevel`."""
+
+    views: Ints
+    orientation: Floats
+    rolled: Bools
+    cost: Floats
+
+
 @compiled
-def turn_costs(
-    numbers: Floats,
-    chosen: Floats,
-    view: Ints,
-    orientation: Floats,
-    rolled: Bools,
-    level_view: Ints,
-    level_orientation: Floats,
-    level_rolled: Bools,
-    rate: Floats,
-) -> Floats:
+def turn_costs(costs: TreeCosts, paths: Paths, level: Choices, rate: Floats) -> Floats:
     """Costs (S, H) of choosing each hypothesis of a level after what each path chose last.
 
     Args:
-        numbers: As of `extend_paths`.
-        chosen: (S,) of the tree, as are the following up to `rolled`.
-        view: (S,).
-        orientation: (S, 3, 3).
-        rolled: (S,).
-        level_view: (H,) of the level, as are the following.
-        level_orientation: (H, 3, 3).
-        level_rolled: (H,).
+        costs: Of the level.
+        paths: Before it.
+        level: Its hypotheses.
         rate: (3,) radians per second.
     """
-    time, jump, other_view = numbers[0], numbers[3], numbers[4]
-    cost = np.zeros((len(chosen), len(level_view)))
+    cost = np.zeros((len(paths.chosen), len(level.views)))
     before = np.empty((3, 3))
-    for i in range(len(chosen)):
-        if view[i] == NONE:
+    for i in range(len(paths.chosen)):
+        if paths.views[i] == NONE:
             continue
-        seconds = time - chosen[i]
-        swing_is = hypot(numbers[5], numbers[7] * seconds)
-        roll_is = hypot(numbers[6], numbers[7] * seconds)
-        rotate(rate, seconds, orientation[i], before)
-        for k in range(len(level_view)):
-            both = rolled[i] and level_rolled[k]
-            apart = rotation_cost(before, level_orientation[k], both, swing_is, roll_is)
+        seconds = costs.time - paths.chosen[i]
+        swing_is = hypot(costs.swing, costs.rate_sigma * seconds)
+        roll_is = hypot(costs.roll, costs.rate_sigma * seconds)
+        rotate(rate, seconds, paths.orientation[i], before)
+        for k in range(len(level.views)):
+            both = paths.rolled[i] and level.rolled[k]
+            apart = rotation_cost(before, level.orientation[k], both, swing_is, roll_is)
             if isnan(apart):
-                cost[i, k] = 0.0 if view[i] == level_view[k] else other_view
+                cost[i, k] = 0.0 if paths.views[i] == level.views[k] else costs.other_view
             else:
-                cost[i, k] = min(apart, jump)
+                cost[i, k] = min(apart, costs.jump)
     return cost
 
 
 @compiled
+def _cheapest_parents(
+    costs: TreeCosts, paths: Paths, level: Choices, rate: Floats
+) -> tuple[Ints, Floats]:
+    """(H + S,) the path that each new one goes on from, and what it costs.
+
+    The first H choose a hypothesis, the others none.
+    """
+    turns = turn_costs(costs, paths, level, rate)
+    fresh, old = len(level.views), len(paths.cost)
+    parent, every = np.zeros(fresh + old, np.int64), np.empty(fresh + old)
+    for k in range(fresh):
+        least = paths.cost[0] + turns[0, k]
+        for i in range(1, old):
+            through = paths.cost[i] + turns[i, k]
+            if through < least:
+                least, parent[k] = through, i
+        every[k] = least + costs.weight * level.cost[k]
+    for i in range(old):
+        parent[fresh + i], every[fresh + i] = i, paths.cost[i] + costs.weight * costs.wrong
+    return parent, every
+
+
+@compiled
 def extend_paths(
-    numbers: Floats,
-    cost: Floats,
-    view: Ints,
-    chosen: Floats,
-    since: Floats,
-    orientation: Floats,
-    rolled: Bools,
-    path: NDArray[np.int8],
-    level_view: Ints,
-    level_orientation: Floats,
-    level_rolled: Bools,
-    level_cost: Floats,
-    rate: Floats,
-) -> tuple[Floats, Ints, Floats, Floats, Floats, Bools, NDArray[np.int8], float]:
+    costs: TreeCosts, paths: Paths, level: Choices, rate: Floats
+) -> tuple[Paths, float]:
     """The paths after one level more, cheapest first, without those that cannot become cheapest.
 
     Args:
-        numbers: (9,) time, weight of the level, cost of calling all wrong, greatest cost of a turn,
-            cost of another view, radians of swing and of roll, standard deviation of the rate
-            (radians per second), most paths.
-        cost: (S,) of the tree, as are the following up to `path`.
-        view: (S,).
-        chosen: (S,).
-        since: (S,).
-        orientation: (S, 3, 3).
-        rolled: (S,).
-        path: (S, L).
-        level_view: (H,) of the level, as are the following; H is 0 where nothing was hypothesised.
-        level_orientation: (H, 3, 3).
-        level_rolled: (H,).
-        level_cost: (H,).
+        costs: Of the level.
+        paths: Before it.
+        level: Its hypotheses.
         rate: (3,) radians per second.
 
     Returns:
-        `cost` to `path` of the new tree, and what its cheapest path costs more than that before.
+        The new paths, and what the cheapest costs more than that before.
     """
-    time, weight, wrong, jump = numbers[0], numbers[1], numbers[2], numbers[3]
-    paths, fresh = len(cost), len(level_view)
-    between_them = turn_costs(
-        numbers,
-        chosen,
-        view,
-        orientation,
-        rolled,
-        level_view,
-        level_orientation,
-        level_rolled,
-        rate,
-    )
-    parent = np.zeros(fresh + paths, np.int64)
-    every = np.empty(fresh + paths)
-    for k in range(fresh):
-        least = cost[0] + between_them[0, k]
-        for i in range(1, paths):
-            through = cost[i] + between_them[i, k]
-            if through < least:
-                least, parent[k] = through, i
-        every[k] = least + weight * level_cost[k]
-    for i in range(paths):
-        parent[fresh + i], every[fresh + i] = i, cost[i] + weight * wrong
+    parent, every = _cheapest_parents(costs, paths, level, rate)
     order = np.argsort(every, kind="mergesort")
-    cheapest = every[order[0]]
-    count = 0
-    while count < min(len(order), int(numbers[8])) and every[order[count]] <= cheapest + jump:
+    cheapest, fresh, count = every[order[0]], len(level.views), 0
+    most = min(len(order), costs.most_paths)
+    while count < most and every[order[count]] <= cheapest + costs.jump:
         count += 1
-    new_cost, new_view = np.empty(count), np.empty(count, np.int64)
-    new_chosen, new_since = np.empty(count), np.empty(count)
-    new_orientation, new_rolled = np.empty((count, 3, 3)), np.empty(count, np.bool_)
-    lag = path.shape[1]
-    new_path = np.empty((count, lag), np.int8)
-    for n in range(count):
-        k = order[n]
-        i = parent[k]
-        new_cost[n] = every[k] - cheapest
-        new_path[n, : lag - 1] = path[i, 1:]
-        if k < fresh:
-            new_view[n], new_chosen[n], new_rolled[n] = level_view[k], time, level_rolled[k]
-            new_since[n] = since[i] if view[i] == level_view[k] else time
-            new_orientation[n] = level_orientation[k]
-            new_path[n, lag - 1] = k
-        else:
-            new_view[n], new_chosen[n], new_rolled[n] = view[i], chosen[i], rolled[i]
-            new_since[n], new_orientation[n] = since[i], orientation[i]
-            new_path[n, lag - 1] = NONE
-    return (
-        new_cost,
-        new_view,
-        new_chosen,
-        new_since,
-        new_orientation,
-        new_rolled,
-        new_path,
-        cheapest,
+    chosen = order[:count]
+    parents = parent[chosen]
+    new = Paths(
+        every[chosen] - cheapest,
+        paths.views[parents],
+        paths.chosen[parents],
+        paths.since[parents],
+        paths.orientation[parents],
+        paths.rolled[parents],
+        np.full((count, paths.path.shape[1]), NONE, np.int8),
     )
+    for n in range(count):
+        k = chosen[n]
+        new.path[n, :-1] = paths.path[parents[n], 1:]
+        if k < fresh:
+            if new.views[n] != level.views[k]:
+                new.since[n] = costs.time
+            new.views[n], new.chosen[n], new.path[n, -1] = level.views[k], costs.time, k
+            new.orientation[n], new.rolled[n] = level.orientation[k], level.rolled[k]
+    return new, cheapest

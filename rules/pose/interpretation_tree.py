@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Hypothesis
 from visup.agent.model.orientation import orientations, swing_and_roll
-from visup.rules.pose._interpretation_tree_jit import NONE, extend_paths
+from visup.rules.pose._interpretation_tree_jit import NONE, Choices, Paths, TreeCosts, extend_paths
 from visup.rules.pose.rotations import Floats, nearest_rotations
 
 
@@ -230,7 +230,7 @@ def extended_tree(
     tree: InterpretationTree,
     level: TreeLevel | None,
     time: float,
-    turning: SpinPrior,
+    spin: SpinPrior,
     settings: TreeSettings,
 ) -> InterpretationTree:
     """The tree after one more look.
@@ -239,32 +239,28 @@ def extended_tree(
         tree: Before.
         level: The model's hypotheses, or None when only others were hypothesised.
         time: Seconds, not before the last level's.
-        turning: How the object is believed to turn.
+        spin: How the object is believed to turn.
         settings: Of the tree.
     """
     weight = look_weight(time - tree.time, settings)
     level = level or _NO_LEVEL
-    found = extend_paths(
-        np.array((time, weight, *_costs(settings), turning.sigma, settings.most_paths)),
-        tree.cost,
-        tree.view,
-        tree.chosen,
-        tree.since,
-        tree.orientation,
-        tree.rolled,
-        tree.path,
-        level.views,
-        level.orientation,
-        level.rolled,
-        level.cost,
-        np.array(turning.rate),
-    )
-    return InterpretationTree(time, *found[:7], tree.total + found[7])
-
-
-def _costs(settings: TreeSettings) -> tuple[float, float, float, float, float]:
     s = settings
-    return s.wrong, s.jump, s.other_view, radians(s.swing_deg), radians(s.roll_deg)
+    costs = TreeCosts(
+        time,
+        weight,
+        s.wrong,
+        s.jump,
+        s.other_view,
+        radians(s.swing_deg),
+        radians(s.roll_deg),
+        spin.sigma,
+        s.most_paths,
+    )
+    t = tree
+    paths = Paths(t.cost, t.view, t.chosen, t.since, t.orientation, t.rolled, t.path)
+    choices = Choices(level.views, level.orientation, level.rolled, level.cost)
+    found, dearer = extend_paths(costs, paths, choices, np.array(spin.rate))
+    return InterpretationTree(time, *found, tree.total + dearer)
 
 
 def look_weight(waited: float, settings: TreeSettings) -> float:

@@ -61,10 +61,10 @@ def extended(
     return backpointer
 
 
-def steps_behind(backpointer: Backpointer | None) -> Iterator[TaskStep]:
-    """The steps that lie behind, the last first, as far as they are remembered."""
+def behind(backpointer: Backpointer | None) -> Iterator[Backpointer]:
+    """What lies behind, the last first, as far as it is remembered."""
     while backpointer is not None:
-        yield backpointer.step
+        yield backpointer
         backpointer = backpointer.before
 
 

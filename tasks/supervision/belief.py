@@ -36,9 +36,9 @@ from visup.tasks.verification.step_monitor import BAD
 
 NEAR = 0.01  # hypotheses that are so likely against the best have a say in what is expected
 DIGITS = 9  # probabilities that differ by less are the same
-# A stage is told to be further on only where that is likelier by so many digits: of two stages that
-# may come next alike, neither is told to have begun.
-TELLING_DIGITS = 2
+# Of two stages that may come next alike neither is told to have begun: a stage that is waited for is
+# told only where that is likelier than that it is pending, by so many digits.
+WAITING_DIGITS = 2
 
 LOST = (Verdict.FAILED, Verdict.INTERRUPTED)  # there is no way back from these
 
@@ -130,8 +130,11 @@ def stage_marginals(posterior: TaskHypotheses) -> dict[str, dict[Standing, float
 def likeliest_standing(chances: Mapping[Standing, float]) -> Standing:
     """How a stage most likely stands: first whether it is pending, under way or behind, then how."""
     progress = {p: sum(m for (q, _), m in chances.items() if q is p) for p in Progress}
-    place = max(Progress, key=lambda p: round(progress[p], TELLING_DIGITS))
-    return max((s for s in chances if s[0] is place), key=lambda s: round(chances[s], DIGITS))
+    place = max(Progress, key=lambda p: round(progress[p], DIGITS))
+    standing = max((s for s in chances if s[0] is place), key=lambda s: round(chances[s], DIGITS))
+    lead = progress[place] - progress[Progress.PENDING]
+    waits = standing == (Progress.UNDER_WAY, Status.ACTIVE)
+    return NOT_BEGUN if waits and round(lead, WAITING_DIGITS) <= 0.0 else standing
 
 
 def stage_beliefs(model: MonitoredPhases, posterior: TaskHypotheses) -> Iterator[StageBelief]:

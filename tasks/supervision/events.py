@@ -94,7 +94,7 @@ def revision_events(
     before: TaskBelief, now: TaskBelief, revisions: Sequence[Revision], mind: Mind
 ) -> Iterator[Event]:
     """Events of stages that were told done, and are believed not to have happened after all."""
-    done, still = _done(before), _done(now)
+    done, still = done_stages(before), done_stages(now)
     earliest = {r.step.stage: r for r in revisions}  # they come with the last step first
     for stage, revision in earliest.items():
         if stage in done and stage not in still:
@@ -111,7 +111,8 @@ def revision_events(
             )
 
 
-def _done(belief: TaskBelief) -> set[str]:
+def done_stages(belief: TaskBelief) -> set[str]:
+    """The stages that are told done."""
     return {s.stage for s in belief.stages if s.status is Status.DONE}
 
 

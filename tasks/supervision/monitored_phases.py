@@ -17,7 +17,7 @@ from visup.agent.model.fast_replace import replace
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
-from visup.tasks.automaton.backpointers import steps_behind
+from visup.tasks.automaton.backpointers import behind
 from visup.tasks.automaton.derivatives import TaskStep, leaves, with_leaves
 from visup.tasks.automaton.prognosis import Prognosis, begun_by
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, StageHmm
@@ -169,7 +169,7 @@ class MonitoredPhases:
             helps = relation.name in self.actions[leaf.step.action].helps
             if step.same_as(leaf.step) or (helps and step.actors == leaf.step.actors):
                 return True
-        return any(step.same_as(s) for s in steps_behind(hypothesis.backpointer))
+        return any(step.same_as(b.step) for b in behind(hypothesis.backpointer))
 
     def stage_statuses(
         self, key: int, hypothesis: TaskHypothesis

@@ -26,12 +26,13 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
 from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
-from visup.tasks.automaton.backpointers import Revision, revisions
+from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
 from visup.tasks.supervision.events import (
     activity_events,
+    done_stages,
     revision_events,
     stage_concerns,
     stage_events,
@@ -241,12 +242,16 @@ def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondi
 
 
 def _revised(memory: TaskMemory, new: TaskMemory) -> tuple[Revision, ...]:
-    """Steps that lay behind by the hypothesis told before and do not by the one told now."""
+    """Steps of stages that were told done and are not any more, nor lie behind as it is told now."""
     before, after = memory.posterior, new.posterior
-    if before is None or after is None:
+    undone = done_stages(memory.belief) - done_stages(new.belief)
+    if before is None or after is None or not undone:
         return ()
-    behind = (before.likeliest.backpointer, after.likeliest.backpointer)
-    return tuple(revisions(*behind, new.time))
+    still = {s.step.stage for s in behind(after.likeliest.backpointer)}
+    trails = (tuple(behind(w.value.backpointer)) for w in before.hypotheses.values())
+    gone = undone - still
+    found = next((t for t in trails if gone <= {b.step.stage for b in t}), ())
+    return tuple(Revision(b.step, b.left, new.time) for b in found if b.step.stage in gone)
 
 
 def _bind(

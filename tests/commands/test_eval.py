@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from visup.commands.eval.catalogue import EVALUATIONS, eval_app
-from visup.commands.eval.evaluation import Evaluation
+from visup.commands.eval.evaluation import EvaluationCommand
 
 
 @pytest.mark.parametrize("evaluation", EVALUATIONS, ids=lambda e: e.name)
-def test_a_function_takes_what_its_command_gives(evaluation: Evaluation) -> None:
+def test_a_function_takes_what_its_command_gives(evaluation: EvaluationCommand) -> None:
     module, _, name = evaluation.function.partition(":")
     given = [s.name for s in evaluation.settings]
     given += [evaluation.argument.name] if evaluation.argument else []

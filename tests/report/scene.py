@@ -21,7 +21,6 @@ from visup.agent import (
     Observation,
     Percept,
     Presence,
-    Region,
     Relation,
     Report,
     ReportState,
@@ -33,21 +32,11 @@ from visup.agent import (
     Verdict,
 )
 from visup.agent.model.step import Step
+from visup.testing import region_of
 
 FPS = 5.0
 TOUCH_S, END_S = 6.0, 12.0
 SIZE = (640, 480)
-
-
-def region_of(mask: NDArray[np.uint8], number: int) -> Region:
-    """A region from a mask with a single body."""
-    x, y, w, h = cv2.boundingRect(mask)
-    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    contour = max(outlines, key=len).reshape(-1, 2).astype(np.float32)
-    ys, xs = np.nonzero(mask)
-    inside = mask[y : y + h, x : x + w] > 0
-    centre = (float(xs.mean()), float(ys.mean()))
-    return Region(number, (x, y, w, h), inside, contour, centre, float(len(xs)))
 
 
 def body(points: list[tuple[float, float]], size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -97,7 +86,7 @@ def mind_at(index: int, size: tuple[int, int] = SIZE, task: str = "dock") -> Min
     objects = {
         id_: ObjectBelief(
             id_,
-            region_of(mask, id_),
+            region_of(mask > 0, id_),
             Presence.HIDDEN if id_ == 1 and 3.0 < time < 3.5 else Presence.SEEN,
             0.0,
             time,

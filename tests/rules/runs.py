@@ -18,6 +18,7 @@ from visup.agent import (
     TaskBelief,
     Verdict,
 )
+from visup.rules.reasoners import default_reasoners
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,23 @@ def think(
             mind, events = outcome.mind, events + outcome.events
             concerns += outcome.conditions
         yield Thought(mind, events, concerns)
+
+
+def reason(
+    observations: Iterable[Observation],
+    *more: Reasoner,
+    actors: dict[str, tuple[str, ...]] | None = None,
+) -> list[Thought]:
+    """What the reasoners of rules/ conclude, and any more after them."""
+    rules = default_reasoners()
+    return list(think((*rules.update, *rules.cogitate, *more), observations, actors))
+
+
+def events_of(thoughts: Iterable[Thought], kinds: Iterable[str]) -> list[tuple[str, int, float]]:
+    """(kind, first object, seconds) of the events of some kinds."""
+    wanted = frozenset(kinds)
+    events = (e for t in thoughts for e in t.events if e.kind in wanted)
+    return [(e.kind, e.objects[0], e.time) for e in events]
 
 
 def dock(mind: Mind, observation: Observation) -> Outcome:

@@ -5,9 +5,8 @@ from functools import lru_cache
 import pytest
 
 from tests.rules.percepts_from_truth import Noise, actors_of, available, observations
-from tests.rules.runs import Thought, dock, think
+from tests.rules.runs import Thought, dock, reason
 from visup.agent import Presence, Truth
-from visup.rules.reasoners import default_reasoners
 
 pytestmark = pytest.mark.skipif(
     not available("capture_fails"), reason="the shared missions are not beside this repository"
@@ -17,14 +16,12 @@ pytestmark = pytest.mark.skipif(
 @lru_cache(maxsize=8)
 def run(name: str, noise: Noise) -> tuple[list[Thought], dict[int, str]]:
     """Thoughts, and what each region is in truth."""
-    rules = default_reasoners()
     who: dict[int, str] = {}
     seen = []
     for observation, truth in observations(name, noise):
         seen.append(observation)
         who.update(truth)
-    chain = (*rules.update, *rules.cogitate, dock)
-    return list(think(chain, seen, actors_of(name))), who
+    return reason(seen, dock, actors=actors_of(name)), who
 
 
 def events(name: str, noise: Noise) -> list[tuple[str, tuple[str, ...], float]]:
@@ -124,11 +121,10 @@ def test_an_intruder_that_comes_near_is_unexpected_and_on_a_collision_course() -
 def test_thinking_is_a_pure_function() -> None:
     """The same percepts give the same story; a mind that was kept is as it was."""
     name, noise = "capture_fails", Noise(seed=3, every=5)
-    rules = default_reasoners()
     seen = [o for o, _ in observations(name, noise)][:60]
     stories = [
-        [(t.mind.time, t.events, t.mind.relations, t.conditions) for t in think(
-            (*rules.update, *rules.cogitate), seen, actors_of(name))]
+        [(t.mind.time, t.events, t.mind.relations, t.conditions)
+         for t in reason(seen, actors=actors_of(name))]
         for _ in range(2)
     ]  # fmt: skip
     assert stories[0] == stories[1]

@@ -12,7 +12,7 @@ LIBRARIES = {
     "numba": "compiled loops",
     "scipy": "assignment, sparse systems, distances",
     "opencv-python-headless": "reading video, image processing",
-    "networkx": "shock graphs: drawing and export",
+    "networkx": "shock graphs and task graphs",
     "pillow": "pictures with text",
     "lark": "grammars of tasks and rules",
     "pydantic": "settings and recorded files",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class ReplayComparison:
     """What the replay is compared with, and what is shown of it."""
 
     diff: Annotated[bool, Option("Show what changes against the recorded run.", "--diff")] = False
@@ -37,7 +37,7 @@ class Comparison:
         return Recording.open(self.against) if self.against else recording if self.diff else None
 
 
-@takes(WatchSettings, Comparison, only=(*REPLAYED, "diff", "against", "quiet"))
+@takes(WatchSettings, ReplayComparison, only=(*REPLAYED, "diff", "against", "quiet"))
 def replay(
     setting: Given,
     compared: Given,
@@ -59,7 +59,7 @@ def replay(
     from visup.runs.runner import fresh_folder
     from visup.terminal.narrator import Narrator
 
-    console, comparison = Console(highlight=False), Comparison(**compared)
+    console, comparison = Console(highlight=False), ReplayComparison(**compared)
     recording = Recording.open(run)
     other = comparison.other(recording)
     settings = settings_for(recording, **setting)

@@ -3,16 +3,16 @@
 Rooms, by what is evaluated:
 
 - `motion`: segmentation and tracking (J, F, ghosts, id switches, MOTA, IDF1).
-- `shape`: shape retrieval, view recognition, size and robustness of model databases.
+- `shape`: shape retrieval and view recognition.
 - `health`: camera faults injected into sound video.
 - `missions`: the whole supervisor on missions with ground truth.
 - `simulation`: percepts simulated from a mission's ground truth, with the errors of real ones.
-- `reasoning`: rules, relations, tasks and their inference, without perception.
-- `runtime`: faults of behaviours, resume, speed, memory, stepping.
+- `reasoning`: missions reasoned about without perception, relations of boxes.
+- `runtime`: resume, speed, memory, stepping.
 
 An evaluation is a function `evaluate_NAME(...)` that returns `{"total": {...}, "items": {name: {...}}}`;
 `record` writes that as JSON. Start with `motion/runner.py`; `bench` (`make bench`) runs them all, `oracles`
-finds the slow reference implementations of a source checkout.
+finds the comparisons with slow oracles, which a source checkout has in `tests/oracles` (`make oracles`).
 """
 
 from visup.evaluation.oracles import oracle

@@ -1,7 +1,7 @@
-"""Oracles and peers: slow twins to compare with, kept with the tests and found in a source checkout.
+"""Oracles and comparisons with them: kept with the tests and found in a source checkout.
 
 They stand in `tests/oracles/`, so that the installed package holds nothing that only a comparison
-runs. Evaluations ask for them by name.
+runs. The commands of `visup eval` ask for them by name.
 """
 
 from __future__ import annotations
@@ -11,22 +11,23 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-import visup.version
+import visup
 from visup.agent.model.errors import SettingsError
 
-CHECKOUT = Path(visup.version.__file__).resolve().parents[1]
+CHECKOUT = Path(visup.__file__).resolve().parents[1]
+PACKAGE = "tests.oracles"
 
 
 def oracle(name: str) -> ModuleType:
     """A module of `tests/oracles/`.
 
     Args:
-        name: Of the module, such as `rule_oracle`.
+        name: Of the module below it, such as `reasoning.rules`.
 
     Raises:
         SettingsError: visup does not run from a source checkout.
     """
-    if not (CHECKOUT / "tests" / "oracles" / f"{name}.py").exists():
+    if not (CHECKOUT / "tests" / "oracles").is_dir():
         raise SettingsError(
             "this evaluation compares visup with oracles that do not ship in the package",
             expected="a source checkout of visup, installed by `make setup`",
@@ -34,4 +35,15 @@ def oracle(name: str) -> ModuleType:
         )
     if str(CHECKOUT) not in sys.path:
         sys.path.append(str(CHECKOUT))
-    return importlib.import_module(f"tests.oracles.{name}")
+    return importlib.import_module(f"{PACKAGE}.{name}")
+
+
+def evaluation_module(name: str) -> ModuleType:
+    """The module of an evaluation by its full name, wherever it stands.
+
+    Raises:
+        SettingsError: It compares with oracles, and visup does not run from a source checkout.
+    """
+    if name.startswith(f"{PACKAGE}."):
+        return oracle(name.removeprefix(f"{PACKAGE}."))
+    return importlib.import_module(name)

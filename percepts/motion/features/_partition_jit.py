@@ -35,7 +35,8 @@ def watershed(right: Bytes, down: Bytes, marks: Labels) -> None:
     first, last = np.full(LEVELS, -1, np.int32), np.full(LEVELS, -1, np.int32)
     marks[0], marks[height - 1] = LINE, LINE
     marks[:, 0], marks[:, width - 1] = LINE, LINE
-    # In a function of its own this loop takes an eighth longer: it is called for each pixel.
+    # In a function of its own, called for each pixel, this loop makes the whole take 28 ms instead of 20
+    # (512 x 288 pixels, both in one process).
     for y in range(1, height - 1):
         for x in range(1, width - 1):
             p = np.uint64(y * width + x)

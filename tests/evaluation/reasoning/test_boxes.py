@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.oracles.relation_oracles import plain_relations, qtc_by_definition
-from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
-from visup.evaluation.reasoning.relations import (
+from tests.oracles.reasoning.relations import (
     SCENES,
     changes,
     drift_seen,
@@ -17,6 +15,8 @@ from visup.evaluation.reasoning.relations import (
     qtc_wrong,
     rcc8_wrong,
 )
+from tests.oracles.relation_oracles import plain_relations, qtc_by_definition
+from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
 from visup.rules.geometry.hysteresis import UNKNOWN
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import RCC8, Floats

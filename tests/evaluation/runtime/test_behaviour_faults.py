@@ -7,18 +7,18 @@ from pathlib import Path
 
 import pytest
 
-from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.model.mind import Mind
-from visup.agent.model.records import Observation
-from visup.evaluation.runtime import behaviour_faults
-from visup.evaluation.runtime.behaviour_faults import (
+from tests.oracles.runtime import behaviour_faults
+from tests.oracles.runtime.behaviour_faults import (
     KINDS,
     BehaviourFaultTrial,
     draw,
     evaluate_faults,
     run,
 )
-from visup.evaluation.runtime.fault_injection import DEADLY, FAULTS, WAITING
+from tests.oracles.runtime.fault_injection import DEADLY, FAULTS, WAITING
+from visup.agent.cycle.agent import Agent, Reasoners
+from visup.agent.model.mind import Mind
+from visup.agent.model.records import Observation
 from visup.rules.language.parser import shipped_rules
 from visup.rules.predicates.inputs_missing import inputs_missing, percepts_read
 

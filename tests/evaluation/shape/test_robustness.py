@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.percepts.shape.shapes import ZOO
-from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.commands.eval.catalogue import eval_app
-from visup.evaluation.shape.corrupt import CORRUPTIONS, MASKS, corrupt_file, odd_mask
-from visup.evaluation.shape.robustness import (
+from tests.oracles.shape.corrupt import CORRUPTIONS, MASKS, corrupt_file, odd_mask
+from tests.oracles.shape.robustness import (
     evaluate_robustness,
     sound_database,
     try_file,
     try_mask,
 )
+from tests.percepts.shape.shapes import ZOO
+from visup.agent.model.errors import DatabaseError, SettingsError
+from visup.commands.eval.catalogue import eval_app
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.silhouette.silhouette import normalise
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.oracles.shape.augment import augmented, deformed
+from tests.oracles.shape.scale import evaluate_scale, noisy
 from tests.percepts.shape.shapes import FLOWERS, LIMBS, ZOO, flower, limbs, shape, small_database
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.shape.augment import augmented, deformed
-from visup.evaluation.shape.scale import evaluate_scale, noisy
 from visup.percepts.shape.database.model_database import CANDIDATES, ModelDatabase
 from visup.percepts.shape.database.time_budget import SEARCH_MS, SHAPE_MS, VIEW_MS
 from visup.percepts.shape.index.outline_sketch import POINTS, sketch, sketch_distances, spectra

@@ -8,6 +8,7 @@ import pytest
 from tests.percepts.motion.clips import FPS, SIZE, Shot, clip, texture
 from visup.agent import Directive, Frame, Region
 from visup.agent.model.errors import SettingsError
+from visup.evaluation.motion.mask_scores import iou
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.segmenter import MotionSegmenter
 
@@ -22,13 +23,8 @@ def run(shots: Iterable[Shot], directives: tuple[Directive, ...] = ()) -> list[t
     return [segmenter.step(shot.frame, directives) for shot in shots]
 
 
-def iou(region: Region, mask: np.ndarray) -> float:
-    seen = region.full_mask(SIZE[::-1])
-    return float((seen & mask).sum() / (seen | mask).sum())
-
-
 def best(regions: tuple[Region, ...], mask: np.ndarray) -> tuple[float, int]:
-    return max(((iou(r, mask), r.id) for r in regions), default=(0.0, 0))
+    return max(((iou(r.full_mask(SIZE[::-1]), mask), r.id) for r in regions), default=(0.0, 0))
 
 
 def moving_over_pan(frames: int = 45, colour: bool = False) -> list[Shot]:
@@ -47,7 +43,7 @@ def test_a_disc_is_found_over_a_panning_background(colour: bool) -> None:
 
 def test_velocity_is_that_of_the_image_with_its_sigma() -> None:
     shots = moving_over_pan()
-    region = max(run(shots)[-1], key=lambda r: iou(r, shots[-1].masks[0]))
+    region = max(run(shots)[-1], key=lambda r: iou(r.full_mask(SIZE[::-1]), shots[-1].masks[0]))
     error = np.hypot(region.velocity[0] - 2.0 * FPS, region.velocity[1] + 0.5 * FPS)
     assert error < 3.0
     assert 0 < region.velocity_sigma < 5.0

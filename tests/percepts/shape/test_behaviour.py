@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,17 +31,13 @@ from visup.percepts.depth import DepthBehaviour, extents, focal_px
 from visup.percepts.shape.behaviour import ShapeBehaviour, ShapeSettings
 from visup.percepts.shape.database.model_database import ModelDatabase, Ranking
 from visup.percepts.shape.matching.shape_similarity import Shape
+from visup.testing import region_of
 
 SIZE = (640, 480)
 
 
 def region(mask: Mask, number: int = 1, cut: bool = False) -> Region:
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    part = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    bbox = (int(columns[0]), int(rows[0]), part.shape[1], part.shape[0])
-    return Region(
-        number, bbox, part, np.zeros((4, 2), np.float32), (0.0, 0.0), float(part.sum()), cut=cut
-    )
+    return replace(region_of(mask, number), cut=cut)
 
 
 def frame(time: float) -> Frame:

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, reach_of, seen
 from visup.agent import ObjectBelief, Presence, Region, Truth
 from visup.rules.geometry.regions import DIRECTIONS
-from visup.rules.reasoners import default_reasoners
 from visup.rules.relations._kinematics_jit import separation_speeds
 from visup.rules.relations.kinematics import sightings
 
@@ -59,8 +58,7 @@ def scene(told: float, moves: float, gap: float, sigma: float = 0.5) -> list[Tho
         left = 180 + gap + (10 * (4 - t) if t < 4 else moves * (t - 4)) + rng.uniform(-2, 2)
         velocity = (-10.0 if t < 4 else told, 0.0)
         observations.append(seen(i, [body(1, 100, (0, 0)), body(2, left, velocity, sigma)]))
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), observations))
+    return reason(observations)
 
 
 def first_diverging(thoughts: list[Thought]) -> float:

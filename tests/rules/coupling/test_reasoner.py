@@ -4,10 +4,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Truth
-from visup.rules.reasoners import default_reasoners
 
 Place = Callable[[float], float]
 
@@ -18,12 +17,7 @@ def scene(right: Place, left: Place = lambda t: 100.0, seconds: float = 10.0) ->
             boxes = [(left(i / 25), 1), (right(i / 25), 2)]
             yield seen(i, [box_region(n, (x, 200, 80, 60)) for x, n in boxes])
 
-    return run(observations())
-
-
-def run(observations: Iterator[Observation]) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), observations))
+    return reason(observations())
 
 
 def told(thoughts: list[Thought]) -> list[tuple[str, float]]:
@@ -89,7 +83,7 @@ def test_regions_that_become_their_union_are_coupled(parts_at: float | None) -> 
             return seen(i, [box_region(1, (100, 200, 80, 60)), box_region(2, (x, 200, 80, 60))])
         return seen(i, [box_region(1, (100, 200, 160, 60))])
 
-    thoughts = run(at(i) for i in range(300))
+    thoughts = reason(at(i) for i in range(300))
     found = told(thoughts)
     assert [k for k, _ in found] == (["coupled"] if parts_at is None else ["coupled", "decoupled"])
     assert 4.0 < found[0][1] < 6.5
@@ -108,4 +102,4 @@ def test_a_region_that_hides_another_did_not_swallow_it() -> None:
         rest = box_region(2, (max(180.0, left), 220, 260 - max(180.0, left), 30))
         return seen(i, [box_region(1, (100, 150, reach, 160)), rest])
 
-    assert told(run(at(i) for i in range(200))) == []
+    assert told(reason(at(i) for i in range(200))) == []

@@ -7,20 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Region
 from visup.evaluation.reasoning.calibration import Calibration
 from visup.rules.identity.votes import VoteSettings, candidates, unknown_probability
-from visup.rules.reasoners import default_reasoners
 
 SET = VoteSettings()
 CROWD = tuple(f"model {k}" for k in range(30))
-
-
-def run(observations: list[Observation]) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), observations))
 
 
 @pytest.mark.parametrize(
@@ -35,7 +29,7 @@ def test_what_is_like_nothing_known_ends_as_unknown_with_confidence(said) -> Non
     rng = np.random.default_rng(5)
     box = box_region(1, (200, 150, 90, 70))
     seq = [seen(i, [box], names={1: said(rng)} if i % 5 == 0 else {}) for i in range(400)]
-    belief = run(seq)[-1].mind.objects[1]
+    belief = reason(seq)[-1].mind.objects[1]
     assert belief.name == "unknown object"
     assert belief.confidence > 0.6
 
@@ -61,7 +55,7 @@ def test_hypotheses_of_one_picture_count_once() -> None:
     """Told in every frame or five times a second: much the same votes."""
     box = box_region(1, (200, 150, 90, 70))
     votes = [
-        run(
+        reason(
             [seen(i, [box], names={1: [("probe", 0.8)]} if i % n == 0 else {}) for i in range(100)]
         )[-1].mind.objects[1]
         for n in (1, 5)
@@ -94,7 +88,7 @@ def test_identity_survives_a_crossing_and_goes_to_nobody_else(fresh: bool) -> No
         told = {n: names[n] for n in ids} if i % 5 == 0 else {}
         return seen(i, crossing(i, ids), names=told)
 
-    for thought in run([at(i) for i in range(175)])[60:]:
+    for thought in reason([at(i) for i in range(175)])[60:]:
         for belief in thought.mind.objects.values():
             if belief.confirmed and belief.last_seen == thought.mind.time:
                 assert belief.name == ("large" if belief.region.bbox[3] > 100 else "small")
@@ -114,7 +108,7 @@ def test_another_body_that_comes_out_from_behind_is_not_the_one_that_went_there(
         present = [r for r in (region, cover, other) if r is not None]
         return seen(i, present, names={r.id: said[r.id] for r in present})
 
-    told = run([at(i) for i in range(400)])[-1].mind
+    told = reason([at(i) for i in range(400)])[-1].mind
     there = [b for b in told.objects.values() if b.last_seen == told.time and b.confirmed]
     assert [(b.region.id, b.name) for b in there] == [(3, "second")]
 

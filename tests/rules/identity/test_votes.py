@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import think
+from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Hypothesis, ReportState
 from visup.rules.identity.votes import VoteSettings, candidates, updated_votes, weights
-from visup.rules.reasoners import default_reasoners
 
 SET = VoteSettings()
 names = st.sampled_from("abcdef")
@@ -97,8 +96,7 @@ def run(similarity: float, lost_from: int = 10**9, steps: int = 60) -> tuple[flo
         )
         for i in range(steps)
     ]
-    rules = default_reasoners()
-    thoughts = list(think((*rules.update, *rules.cogitate), observations))
+    thoughts = reason(observations)
     belief = thoughts[-1].mind.objects[1]
     votes = belief.candidates[0].votes if belief.candidates else 0.0
     told = sum(e.kind == "identified" for t in thoughts for e in t.events)

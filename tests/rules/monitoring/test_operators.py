@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.oracles.reasoning.rules import alike
 from tests.oracles.rule_formulas import (
     SIGNALS,
     random_formula,
@@ -15,7 +16,6 @@ from tests.oracles.rule_formulas import (
     random_value,
 )
 from tests.oracles.rule_oracle import robustness
-from visup.evaluation.reasoning.rules import alike
 from visup.rules.formula.nodes import Formula, Predicate
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula

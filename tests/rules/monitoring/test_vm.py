@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.oracles.reasoning.rules import alike
 from tests.oracles.rule_formulas import random_times
-from visup.evaluation.reasoning.rules import alike
 from visup.rules.formula.nodes import (
     And,
     Comparison,

@@ -1,36 +1,30 @@
 """Parts that a segmenter cuts off a body are no objects; what only looks like one still enters."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import Thought, events_of, reason
 from tests.rules.scenes import Rect, box_region, seen
-from visup.agent import Observation, Region
+from visup.agent import Region
 from visup.rules.presence.fragments import FRAGMENTS, share_within
-from visup.rules.reasoners import default_reasoners
 
 TOLD = ("entry", "exit", "occlusion", "reappearance", "lost", "found")
 BODY: Rect = (200, 150, 160, 140)
 
 
-def run(observations: Iterable[Observation]) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), observations))
-
-
 def scene(*places: Callable[[int], Rect | None], frames: int = 200) -> list[Thought]:
     """Boxes 1, 2, ... at places by frame, 25 frames a second."""
-    return run(
+    return reason(
         seen(i, [box_region(n, r) for n, at in enumerate(places, 1) if (r := at(i))])
         for i in range(frames)
     )
 
 
 def events(thoughts: list[Thought]) -> list[tuple[str, int, float]]:
-    return [(e.kind, e.objects[0], e.time) for t in thoughts for e in t.events if e.kind in TOLD]
+    return events_of(thoughts, TOLD)
 
 
 def kinds(thoughts: list[Thought]) -> list[tuple[str, int]]:
@@ -148,7 +142,7 @@ def test_a_known_object_that_comes_out_from_behind_another_reappears() -> None:
         left, right = (left, min(right, 200.0)) if left < 200 else (max(left, 360.0), right)
         return box_region(id_, (left, 200, right - left, 40)) if right - left >= 2 else None
 
-    thoughts = run(
+    thoughts = reason(
         seen(i, [region(1, BODY), probe(i, 2 if i < 70 else 9)], names={1: [("sat", 0.9)]})
         for i in range(170)
     )
@@ -175,7 +169,7 @@ def test_a_speck_without_a_name_is_not_told() -> None:
 
 
 def test_a_speck_that_has_been_recognised_enters() -> None:
-    thoughts = run(
+    thoughts = reason(
         seen(i, [region(1, (100, 100, 11, 11))], names={1: [("probe", 0.9)]}) for i in range(75)
     )
     assert kinds(thoughts) == [("entry", 1)]
@@ -185,7 +179,7 @@ def test_doubts_are_forgotten_with_their_regions() -> None:
     def parts(i: int) -> list[Region | None]:
         return [region(1, BODY), box_region(10 + i // 20, (360, 160, 30, 30))]
 
-    thoughts = run(seen(i, parts(i)) for i in range(400))
+    thoughts = reason(seen(i, parts(i)) for i in range(400))
     assert max(len(t.mind.recall(FRAGMENTS)) for t in thoughts) <= 3
     assert kinds(thoughts) == [("entry", 1)]
 

@@ -1,27 +1,20 @@
 """Entry, exit, occlusion, reappearance: scripted boxes that come, go, hide and flicker."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import Thought, events_of, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Presence, Region, ReportState
-from visup.rules.reasoners import default_reasoners
 
 TOLD = ("entry", "exit", "occlusion", "reappearance", "lost", "found", "coupled", "decoupled")
 
 
-def run(observations: Iterable[Observation]) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), observations))
-
-
 def events(thoughts: list[Thought]) -> list[tuple[str, int, float]]:
-    return [(e.kind, e.objects[0], e.time) for t in thoughts for e in t.events if e.kind in TOLD]
+    return events_of(thoughts, TOLD)
 
 
 def kinds(thoughts: list[Thought]) -> list[tuple[str, int]]:
@@ -51,7 +44,7 @@ def behind(i: int, id_: int) -> Region | None:
 
 
 def test_what_is_there_at_the_start_enters_soon_and_once() -> None:
-    told = events(run(seen(i, [still(i)]) for i in range(50)))
+    told = events(reason(seen(i, [still(i)]) for i in range(50)))
     assert [(k, o) for k, o, _ in told] == [("entry", 1)]
     assert told[0][2] < 1.0
 
@@ -59,7 +52,7 @@ def test_what_is_there_at_the_start_enters_soon_and_once() -> None:
 def test_what_comes_over_the_border_later_enters_soon_after() -> None:
     comes = 3.0
     told = events(
-        run(
+        reason(
             seen(i, [still(i), box_region(2, (-60 + 2 * (i - 75), 300, 60, 60))])
             for i in range(150)
         )
@@ -79,25 +72,25 @@ def test_flicker_gives_no_event(missing: list[int], ghosts: int) -> None:
         if i in gaps:
             regions += [box_region(100 + i * 5 + g, (400, 60 * g, 40, 40)) for g in range(ghosts)]
         observations.append(seen(i, regions))
-    assert kinds(run(observations)) == [("entry", 1)]
+    assert kinds(reason(observations)) == [("entry", 1)]
 
 
 def test_leaving_over_the_border_is_an_exit() -> None:
     """3 px a frame to the left; the last pixel goes at frame 100."""
-    told = events(run(seen(i, [box_region(1, (220 - 3 * i, 200, 80, 60))]) for i in range(150)))
+    told = events(reason(seen(i, [box_region(1, (220 - 3 * i, 200, 80, 60))]) for i in range(150)))
     assert [(k, o) for k, o, _ in told] == [("entry", 1), ("exit", 1)]
     assert told[1][2] == pytest.approx(4.0, abs=0.6)
 
 
 def test_vanishing_in_the_middle_is_neither_exit_nor_occlusion() -> None:
-    thoughts = run(seen(i, [still(i)] if i < 50 else []) for i in range(150))
+    thoughts = reason(seen(i, [still(i)] if i < 50 else []) for i in range(150))
     assert kinds(thoughts) == [("entry", 1), ("lost", 1)]
     assert thoughts[-1].mind.objects[1].presence is Presence.HIDDEN
 
 
 def test_an_object_that_stays_at_the_border_is_not_believed_to_leave() -> None:
     """Like an arm that reaches in from above and draws back a little."""
-    told = kinds(run(seen(i, [box_region(1, (300, 0, 60, 300 - 0.5 * i))]) for i in range(250)))
+    told = kinds(reason(seen(i, [box_region(1, (300, 0, 60, 300 - 0.5 * i))]) for i in range(250)))
     assert told == [("entry", 1)]
 
 
@@ -109,7 +102,7 @@ def test_what_comes_over_the_border_in_pieces_enters_when_it_was_first_seen() ->
         box = box_region(1, (0, 100, 2 * (i - 20), height)) if height else None
         return seen(i, [still(i, 7), box])
 
-    found = [(k, t) for k, o, t in events(run(at(i) for i in range(25 * 4))) if o == 1]
+    found = [(k, t) for k, o, t in events(reason(at(i) for i in range(25 * 4))) if o == 1]
     assert [k for k, _ in found] == ["entry"]
     assert found[0][1] < 1.45
 
@@ -125,7 +118,7 @@ def test_what_hardly_drifts_and_reaches_far_into_the_image_has_not_left_when_it_
             arm = replace(arm, velocity=(0.0, -1.5), velocity_sigma=0.7)
         return seen(i, [arm, box_region(2, (right - 420, 84, 420, 380))])
 
-    thoughts = run(at(i) for i in range(25 * 6))
+    thoughts = reason(at(i) for i in range(25 * 6))
     assert "exit" not in [k for k, _ in kinds(thoughts)]
 
 
@@ -134,7 +127,7 @@ def test_hidden_by_a_passing_object_and_seen_again_with_the_same_identity(new_id
     def regions(i: int) -> list[Region | None]:
         return [behind(i, 7 if new_id and i > 100 else 1), passing(i)]
 
-    thoughts = run(
+    thoughts = reason(
         seen(i, regions(i), names={r.id: [(f"m{r.id % 6}", 0.8)] for r in regions(i) if r})
         for i in range(220)
     )
@@ -153,14 +146,14 @@ def test_hidden_by_a_passing_object_and_seen_again_with_the_same_identity(new_id
 
 
 def test_a_new_region_id_at_the_same_place_is_the_same_object() -> None:
-    thoughts = run(seen(i, [still(i, 1 if i < 60 else 9)]) for i in range(120))
+    thoughts = reason(seen(i, [still(i, 1 if i < 60 else 9)]) for i in range(120))
     assert kinds(thoughts) == [("entry", 1)]
     assert list(thoughts[-1].mind.objects) == [1]
 
 
 def test_nothing_is_concluded_while_nobody_looks() -> None:
     """The segmenter fails for four seconds; the object is where it was, and no word is said."""
-    thoughts = run(
+    thoughts = reason(
         seen(i, [still(i)], state=ReportState.FAILED if 50 <= i < 150 else ReportState.RAN)
         for i in range(200)
     )
@@ -172,7 +165,7 @@ def test_nothing_is_concluded_while_nobody_looks() -> None:
 
 
 def test_a_behaviour_that_rests_is_not_a_failure() -> None:
-    thoughts = run(seen(i, [], state=ReportState.RESTED) for i in range(5))
+    thoughts = reason(seen(i, [], state=ReportState.RESTED) for i in range(5))
     assert not thoughts[-1].mind.unknown
 
 
@@ -187,7 +180,7 @@ def test_the_number_of_remembered_objects_is_bounded() -> None:
         ]
         return seen(i, boxes)
 
-    thoughts = run(at(i) for i in range(0, 25 * 80, 2))
+    thoughts = reason(at(i) for i in range(0, 25 * 80, 2))
     assert len(thoughts[-1].mind.objects) <= 64
     assert len(thoughts[-1].mind.memory["rules.objects"]) <= 256
     assert kinds(thoughts).count(("entry", 50)) == 1
@@ -210,6 +203,6 @@ def test_what_was_in_view_before_it_moved_does_not_enter(
         found = box_region(1, (100 + i, 100, 80, 60)) if i >= 100 else None
         return found and replace(found, visible_since=since)
 
-    told = [e for t in run(seen(i, [late(i)]) for i in range(150)) for e in t.events]
+    told = [e for t in reason(seen(i, [late(i)]) for i in range(150)) for e in t.events]
     assert [e.kind for e in told] == [kind]
     assert words in told[0].text

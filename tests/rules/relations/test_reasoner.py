@@ -5,10 +5,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Observation, Relation, Truth
-from visup.rules.reasoners import default_reasoners
 from visup.rules.relations._pair_states_jit import classify_trend, combined_trend
 from visup.rules.relations.reasoner import kinematics
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
@@ -34,11 +33,6 @@ def two_boxes(
         )
 
 
-def thoughts(observations: Iterator[Observation]) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), observations))
-
-
 def relation(mind: Mind, name: str) -> Relation:
     found = mind.relation(name, 1, 2)
     assert found is not None
@@ -55,7 +49,7 @@ def truths(run: list[Thought], name: str) -> list[Truth]:
      (2.5, "diverging"), (25.0, "diverging")],
 )  # fmt: skip
 def test_trend_is_told_within_two_seconds_whatever_the_speed(speed: float, name: str) -> None:
-    run = thoughts(two_boxes(lambda t: 100, lambda t: 300 + speed * t, 2.4, 0.2))
+    run = reason(two_boxes(lambda t: 100, lambda t: 300 + speed * t, 2.4, 0.2))
     now = relation(run[-1].mind, name)
     assert now.truth is Truth.TRUE
     assert now.value == pytest.approx(speed, abs=1.0)
@@ -64,7 +58,7 @@ def test_trend_is_told_within_two_seconds_whatever_the_speed(speed: float, name:
 
 
 def test_still_boxes_with_jitter_change_no_relation_for_a_minute() -> None:
-    run = thoughts(two_boxes(lambda t: 100, lambda t: 300, 60.0, 0.5))
+    run = reason(two_boxes(lambda t: 100, lambda t: 300, 60.0, 0.5))
     names = {r.name for r in run[-1].mind.relations} - {"distance"}
     for name in names:
         told = truths(run[100:], name)
@@ -76,7 +70,7 @@ def test_still_boxes_with_jitter_change_no_relation_for_a_minute() -> None:
 def test_bodies_that_part_after_contact_diverge_within_a_second() -> None:
     """Closing in at 15 px/s, contact at 6 s, then the right one drifts off at 8 px/s."""
     at = lambda t: 180 + (15 * max(0.0, 6 - t) if t < 6 else 8 * (t - 6))  # noqa: E731
-    run = thoughts(two_boxes(lambda t: 100, at, 8.0, 0.3))
+    run = reason(two_boxes(lambda t: 100, at, 8.0, 0.3))
     first = {
         name: next(t.mind.time for t in run if relation_true(t.mind, name))
         for name in ("converging", "touching", "diverging")
@@ -98,7 +92,7 @@ def test_flicker_of_a_region_leaves_relations_as_they_are() -> None:
         seen(o.frame_index, [r for r in o.of("region") if r.id == 1 or o.frame_index % 4])
         for o in full
     ]
-    told = truths(thoughts(iter(kept)), "converging")
+    told = truths(reason(iter(kept)), "converging")
     assert told.count(Truth.TRUE) > 50
     assert Truth.UNKNOWN not in told[40:]
 
@@ -106,7 +100,7 @@ def test_flicker_of_a_region_leaves_relations_as_they_are() -> None:
 def test_a_relation_to_what_is_not_seen_is_unknown_not_false() -> None:
     full = list(two_boxes(lambda t: 100, lambda t: 300 - 10 * t, 3.0))
     gone = [seen(i, [box_region(1, (100, 200, 80, 60))]) for i in range(75, 125)]
-    run = thoughts(iter([*full, *gone]))
+    run = reason(iter([*full, *gone]))
     for name in ("converging", "diverging", "keeping_distance", "touching"):
         assert relation(run[-1].mind, name).truth is Truth.UNKNOWN
 
@@ -129,13 +123,13 @@ def test_depth_supports_or_contradicts_the_image(
             depths={1: ("probe", 10.0), 2: ("dish", 14.0 + rate * t)},
         )
 
-    now = relation(thoughts(at(i) for i in range(90))[-1].mind, "converging")
+    now = relation(reason(at(i) for i in range(90))[-1].mind, "converging")
     assert now.truth is expected
     assert (now.confidence > 0.8) is confident
 
 
 def test_without_depth_confidence_is_capped() -> None:
-    run = thoughts(two_boxes(lambda t: 100, lambda t: 400 - 20 * t, 3.0))
+    run = reason(two_boxes(lambda t: 100, lambda t: 400 - 20 * t, 3.0))
     assert relation(run[-1].mind, "converging").confidence == pytest.approx(0.8)
 
 
@@ -149,21 +143,21 @@ def test_outlines_far_apart_in_depth_do_not_touch() -> None:
         )
         for i in range(60)
     )
-    assert relation(thoughts(observations)[-1].mind, "touching").truth is Truth.FALSE
+    assert relation(reason(observations)[-1].mind, "touching").truth is Truth.FALSE
 
 
 def test_trend_does_not_depend_on_the_image_size_or_the_start_time() -> None:
     """The same motion scaled with the image, and shifted by an hour, gives the same truths."""
-    run = thoughts(two_boxes(lambda t: 100, lambda t: 300 - 10 * t, 3.0))
+    run = reason(two_boxes(lambda t: 100, lambda t: 300 - 10 * t, 3.0))
     late = [
         Observation(o.frame_index, o.time + 3600.0, o.frame_size, o.reports)
         for o in two_boxes(lambda t: 100, lambda t: 300 - 10 * t, 3.0)
     ]
-    assert truths(thoughts(iter(late)), "converging") == truths(run, "converging")
+    assert truths(reason(iter(late)), "converging") == truths(run, "converging")
 
 
 def test_time_runs_out_of_a_bounded_memory() -> None:
-    run = thoughts(two_boxes(lambda t: 100, lambda t: 300, 8.0, fps=100.0))
+    run = reason(two_boxes(lambda t: 100, lambda t: 300, 8.0, fps=100.0))
     kept = run[-1].mind.memory["rules.relations"]
     assert len(kept.history.times) <= 65
     assert kinematics(run[-1].mind).pair("gap", 1, 2) == pytest.approx(120.0, abs=2.0)

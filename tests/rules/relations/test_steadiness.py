@@ -8,10 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import think
+from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Region
-from visup.rules.reasoners import default_reasoners
 
 TOLD = ("entry", "exit", "occlusion", "reappearance", "coupled", "decoupled", "lost", "found")
 Scene = Callable[[int, np.random.Generator], list[Region | None]]
@@ -33,8 +32,7 @@ def story(
             gone[region.id] = gone.get(region.id, 0) + 1 if missing else 0
             kept += [] if missing else [region]
         observations.append(seen(i, kept))
-    rules = default_reasoners()
-    thoughts = think((*rules.update, *rules.cogitate), observations)
+    thoughts = reason(observations)
     return sorted((e.kind, e.objects) for t in thoughts for e in t.events if e.kind in TOLD)
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tests.rules.runs import Thought, think
+from tests.oracles.reasoning.rule_scenes import minds, twenty_rules
+from tests.rules.runs import Thought, reason
 from tests.rules.safety.test_reasoner import NAMES, believed
 from tests.rules.scenes import box_region, seen
 from visup.agent import Binding, Expectation, Mind, Observation, Outcome, TaskBelief, Verdict
@@ -17,11 +18,9 @@ from visup.agent.model.errors import RuleError
 from visup.agent.model.mind import Zone
 from visup.agent.model.object_beliefs import Pose, Spin
 from visup.cli import app
-from visup.evaluation.reasoning.rule_scenes import minds, twenty_rules
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES
-from visup.rules.reasoners import default_reasoners
 from visup.rules.relations.zones import ZoneReasoner
 from visup.rules.safety.explain import RuleExplanation
 from visup.rules.safety.queries import evaluation_of, explain, object_choices
@@ -40,8 +39,7 @@ def closing(frames: int) -> Iterator[Observation]:
 
 
 def watched(frames: int = 125) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate), closing(frames)))
+    return reason(closing(frames))
 
 
 def test_a_verdict_is_explained_down_to_its_facts() -> None:
@@ -252,8 +250,7 @@ def touching_at(depths: dict[int, tuple[str, float]], expected: bool) -> set[str
         ]
         return seen(i, boxes, names=NAMES, depths=depths)
 
-    rules = default_reasoners()
-    thoughts = think((*rules.update, *rules.cogitate, task), (approach(i) for i in range(110)))
+    thoughts = reason((approach(i) for i in range(110)), task)
     return {c.kind for t in thoughts for c in t.conditions}
 
 

@@ -1,6 +1,6 @@
 """Rules at work: groundings, time, unknowns, what tasks expect; sentences."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rules.runs import Thought, think
+from tests.rules.runs import Thought, reason, think
 from tests.rules.scenes import box_region, seen
 from visup.agent import (
     Binding,
@@ -33,11 +33,6 @@ from visup.rules.safety.reasoner import RuleReasoner
 from visup.rules.wording.sentences import describe, sentence
 
 NAMES = {1: [("probe", 0.9)], 2: [("arm_model", 0.9)], 3: [("dish", 0.9)]}
-
-
-def run(observations: Iterable[Observation], *more: Reasoner) -> list[Thought]:
-    rules = default_reasoners()
-    return list(think((*rules.update, *rules.cogitate, *more), observations))
 
 
 def task(expected: tuple[Expectation, ...] = (), unexplained: tuple[int, ...] = ()) -> Reasoner:
@@ -79,12 +74,12 @@ def test_rules_that_serve_two_agents_by_turns_tell_each_what_they_tell_it_alone(
     together = [think(shared, s) for s in scripts]
     by_turns = list(zip(*together, strict=True))
     for k, script in enumerate(scripts):
-        alone = run(script)
+        alone = reason(script)
         assert [t[k].conditions for t in by_turns] == [t.conditions for t in alone]
 
 
 def test_closing_in_is_a_collision_course_where_no_task_wants_it() -> None:
-    thoughts = run(closing())
+    thoughts = reason(closing())
     assert raised(thoughts) == {("collision_course", frozenset({1, 2}))}
     concern = thoughts[-1].conditions[0]
     assert concern.objects == (2, 1)
@@ -98,18 +93,18 @@ def test_closing_in_is_a_collision_course_where_no_task_wants_it() -> None:
 
 @pytest.mark.parametrize("relation", ["converging", "touching", "coupled"])
 def test_a_task_that_expects_it_suspends_collision_course(relation: str) -> None:
-    assert not raised(run(closing(), task((Expectation(relation, (2, 1)),))))
+    assert not raised(reason(closing(), task((Expectation(relation, (2, 1)),))))
 
 
 def test_what_the_task_expects_of_others_does_not_suspend_it() -> None:
-    found = raised(run(closing(), task((Expectation("converging", (2, 3)),))))
+    found = raised(reason(closing(), task((Expectation("converging", (2, 3)),))))
     assert ("collision_course", frozenset({1, 2})) in found
 
 
 def test_bodies_at_different_depths_pass_each_other() -> None:
     far = {1: ("probe", 10.0), 2: ("arm_model", 16.0)}
     observations = (seen(o.frame_index, o.of("region"), names=NAMES, depths=far) for o in closing())
-    assert not raised(run(observations))
+    assert not raised(reason(observations))
 
 
 def test_a_body_threatens_what_it_meets_first_and_not_what_stands_behind() -> None:
@@ -117,18 +112,18 @@ def test_a_body_threatens_what_it_meets_first_and_not_what_stands_behind() -> No
         seen(o.frame_index, [*o.of("region"), box_region(3, (10, 200, 60, 60))], names=NAMES)
         for o in closing()
     )
-    assert raised(run(observations)) == {("collision_course", frozenset({1, 2}))}
+    assert raised(reason(observations)) == {("collision_course", frozenset({1, 2}))}
 
 
 def test_still_objects_raise_nothing() -> None:
-    assert not raised(run(closing(speed=0.0)))
+    assert not raised(reason(closing(speed=0.0)))
 
 
 def test_without_a_task_nothing_is_unexpected_with_one_what_it_does_not_explain_is() -> None:
     still = list(closing(speed=0.0))
-    assert not raised(run(still))
-    assert not raised(run(still, task()))
-    assert raised(run(still, task(unexplained=(2,)))) == {("unexpected_object", frozenset({2}))}
+    assert not raised(reason(still))
+    assert not raised(reason(still, task()))
+    assert raised(reason(still, task(unexplained=(2,)))) == {("unexpected_object", frozenset({2}))}
 
 
 def test_an_actor_that_is_lost_is_missed_and_one_that_is_hidden_is_not() -> None:
@@ -136,7 +131,7 @@ def test_an_actor_that_is_lost_is_missed_and_one_that_is_hidden_is_not() -> None
         regions = [box_region(1, (100, 200, 80, 60))] if i < 60 else []
         return seen(i, [*regions, box_region(2, (400, 200, 80, 60))], names=NAMES)
 
-    found = raised(run((at(i) for i in range(250)), task()))
+    found = raised(reason((at(i) for i in range(250)), task()))
     assert found == {("loss_of_object", frozenset({1}))}
 
 
@@ -145,7 +140,7 @@ def test_perception_that_cannot_be_trusted_is_told(kind: dict[str, ReportState])
     boxes = [box_region(1, (100, 200, 80, 60))]
     good = [seen(i, boxes) for i in range(50)]
     bad = [seen(i, boxes, **kind) for i in range(50, 100)]  # type: ignore[arg-type]
-    thoughts = run([*good, *bad])
+    thoughts = reason([*good, *bad])
     assert not raised(thoughts[:74])
     assert raised(thoughts) == {("stale_perception", frozenset())}
 
@@ -154,7 +149,7 @@ def test_a_concern_ends_with_its_cause_after_the_hold() -> None:
     stops = (o for o in closing(3.0))
     last = list(closing(3.0))[-1].of("region")
     still = (seen(i, last, names=NAMES) for i in range(75, 250))
-    thoughts = run([*stops, *still])
+    thoughts = reason([*stops, *still])
     until = max(t.mind.time for t in thoughts if t.conditions)
     assert 4.0 < until < 8.0
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.oracles.reasoning.recognition import compare, follow
 from tests.oracles.recognition_tasks import Draw, text_of
 from visup.agent import Status
-from visup.evaluation.reasoning.recognition import compare, follow
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.backpointers import Revision, revisions
 from visup.tasks.automaton.derivatives import TaskStep

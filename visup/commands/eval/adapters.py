@@ -39,9 +39,12 @@ def clips_closing(figures: Figures) -> Iterator[RenderableType]:
 
 def scale(folder: Path, views: int, seed: int, progress: Progress) -> Figures:
     """Model databases that grow."""
-    from visup.evaluation.shape.scale import evaluate_scale
+    from visup.evaluation.oracles import oracle
 
-    return evaluate_scale(folder, most=views, seed=seed, progress=progress)
+    figures: Figures = oracle("shape.scale").evaluate_scale(
+        folder, most=views, seed=seed, progress=progress
+    )
+    return figures
 
 
 def scale_closing(figures: Figures) -> Iterator[str]:
@@ -91,9 +94,9 @@ def reasoning_closing(figures: Figures) -> Iterator[RenderableType]:
 
 def relations_settings(given: dict[str, Any]) -> dict[str, Any]:
     """The options of `visup eval relations`, and what is fixed."""
-    from visup.evaluation.reasoning.relations import settings_of_record
+    from visup.evaluation.oracles import oracle
 
-    return {**given, **settings_of_record()}
+    return {**given, **oracle("reasoning.relations").settings_of_record()}
 
 
 def relations_closing(figures: Figures) -> Iterator[str]:
@@ -116,9 +119,11 @@ def rules_differ(figures: Figures) -> bool:
 
 def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Figures:
     """Recognition of random tasks, with its bars."""
-    from visup.evaluation.reasoning.recognition import evaluate_recognition
+    from visup.evaluation.oracles import oracle
 
-    figures, bars = evaluate_recognition(grammars, tasks, seed, progress)
+    figures, bars = oracle("reasoning.recognition").evaluate_recognition(
+        grammars, tasks, seed, progress
+    )
     return {"total": figures, "items": {}, "bars": bars}
 
 
@@ -129,31 +134,6 @@ def recognition_closing(figures: Figures) -> Iterator[RenderableType]:
     yield totals_table(figures)
     for bar, held in figures["bars"].items():
         yield f"{'held' if held else 'MISSED'}: {bar}"
-
-
-def tasks(count: int, seed: int, progress: Progress) -> Figures:
-    """Damaged task files, long ones, and a usual one."""
-    from visup.evaluation.reasoning.task_files import fuzz, long_files, seconds
-    from visup.tasks.checks.files import read_text
-
-    found = fuzz(count, seed)
-    times = {f"long_{name}_s": seconds(text) for name, text in long_files()}
-    times["usual_ms"] = 1000 * seconds(read_text("inspect"), 20)
-    total = {
-        "files": found.count,
-        "tracebacks": len(found.raised),
-        "without_place": len(found.placeless),
-        "layout_unstable": len(found.unstable),
-        "over_1_s": len(found.slow),
-        "slowest_s": round(found.slowest_s, 3),
-        "read_without_mistake": found.good,
-        "codes_given": len(found.codes),
-        **{name: round(value, 3) for name, value in times.items()},
-    }
-    seeds = {"without place": found.placeless[:10], "unstable": found.unstable[:10]}
-    failures = [f"seed {number}: {what}" for number, what in found.raised[:10]]
-    failures += [f"{name}: seeds {some}" for name, some in seeds.items() if some]
-    return {"total": total, "items": {}, "failures": failures, "failed": bool(found.failures)}
 
 
 def tasks_closing(figures: Figures) -> Iterator[RenderableType]:

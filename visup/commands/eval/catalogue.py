@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from visup.commands.eval import adapters
-from visup.commands.eval.evaluation import Evaluation, folder_argument
+from visup.commands.eval.evaluation import EvaluationCommand, folder_argument
 from visup.commands.options import Setting
 from visup.runs.settings import Option
 
@@ -38,7 +38,7 @@ _CLIP_NAMES = Parameter(
 _ADAPTERS = "visup.commands.eval.adapters"
 
 EVALUATIONS = (
-    Evaluation(
+    EvaluationCommand(
         "motion",
         "Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.",
         "visup.evaluation.motion.runner:evaluate_motion",
@@ -47,7 +47,7 @@ EVALUATIONS = (
         (_LIMIT,),
         _FOLDER,
     ),
-    Evaluation(
+    EvaluationCommand(
         "shapes",
         "Shape retrieval, leave one out: nearest neighbour, rank sums, bullseye, time.",
         "visup.evaluation.shape.retrieval:evaluate_shapes",
@@ -57,7 +57,7 @@ EVALUATIONS = (
         _FOLDER,
         adapters.shapes_closing,
     ),
-    Evaluation(
+    EvaluationCommand(
         "missions",
         "Whole missions: identity, events, stages, alerts, verdicts, speed.",
         "visup.evaluation.missions.runner:evaluate_missions",
@@ -71,7 +71,7 @@ EVALUATIONS = (
         (Setting("models", Path | None, None, Option("Model database.")), _LIMIT),
         _FOLDER,
     ),
-    Evaluation(
+    EvaluationCommand(
         "health",
         "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
         "visup.evaluation.health.runner:evaluate_health",
@@ -87,7 +87,7 @@ EVALUATIONS = (
         ),
         folder_argument("Folder with sound video anywhere below it."),
     ),
-    Evaluation(
+    EvaluationCommand(
         "clips",
         """Rendered clips of what footage lacks: pan, shake, zoom, stops, eclipse ...
 
@@ -102,7 +102,7 @@ EVALUATIONS = (
         lambda figures: figures["total"]["passed"] < figures["total"]["clips"],
         lambda given: {"clips": given["names"] or "all"},
     ),
-    Evaluation(
+    EvaluationCommand(
         "scale",
         "Model databases that grow: opening, answering, memory, and what the index loses.",
         f"{_ADAPTERS}:scale",
@@ -115,10 +115,10 @@ EVALUATIONS = (
         folder_argument("Folder of meshes (*.ply)."),
         adapters.scale_closing,
     ),
-    Evaluation(
+    EvaluationCommand(
         "robustness",
         "Damaged database files and odd masks: a clear error, an answer or nothing, within a second.",
-        "visup.evaluation.shape.robustness:evaluate_robustness",
+        "tests.oracles.shape.robustness:evaluate_robustness",
         "damaging",
         ("trials", "refused", "answered", "nothing", "failed", "worst_s"),
         (
@@ -129,7 +129,7 @@ EVALUATIONS = (
         closing=adapters.failures_closing("{kind}, number {number}: {what}, {seconds:.2f} s"),
         failed=adapters.any_failures,
     ),
-    Evaluation(
+    EvaluationCommand(
         "views",
         "Views from unseen directions: clean, with contour noise, cut by a border, both.",
         "visup.evaluation.shape.view_recognition:evaluate_views",
@@ -144,23 +144,23 @@ EVALUATIONS = (
         folder_argument("Folder of mesh files."),
         adapters.views_closing,
     ),
-    Evaluation(
+    EvaluationCommand(
         "faults",
         """Faults put into behaviours: every run ends, every fault is told, nothing unknown reads fine.
 
         Exit code: 0 when that is so, else 1.
         """,
-        "visup.evaluation.runtime.behaviour_faults:evaluate_faults",
+        "tests.oracles.runtime.behaviour_faults:evaluate_faults",
         "injecting",
         ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
         (_count("count", 1000, "How many faults are injected."), _SEED),
         closing=adapters.failures_closing("number {number}, {fault} in '{kind}': {problem}"),
         failed=adapters.any_failures,
     ),
-    Evaluation(
+    EvaluationCommand(
         "relations",
         "Relations of boxes: frames per second, changes of what rests, drift, oracles.",
-        "visup.evaluation.reasoning.relations:evaluate_relations",
+        "tests.oracles.reasoning.relations:evaluate_relations",
         "judging",
         ("fps", "fps_cpu", "plain_fps", "ratio", "changes", "seen_s"),
         (
@@ -171,10 +171,10 @@ EVALUATIONS = (
         closing=adapters.relations_closing,
         recorded=adapters.relations_settings,
     ),
-    Evaluation(
+    EvaluationCommand(
         "rules",
         "Rules over time: equal to an oracle and to rtamt, cost of windows, of rules, of snapshots.",
-        "visup.evaluation.reasoning.rules:evaluate_rules",
+        "tests.oracles.reasoning.rules:evaluate_rules",
         "judging",
         (
             *("formulas", "samples", "online", "different", "us", "samples_per_s", "times_rtamt"),
@@ -184,7 +184,7 @@ EVALUATIONS = (
         closing=adapters.rules_closing,
         failed=adapters.rules_differ,
     ),
-    Evaluation(
+    EvaluationCommand(
         "reasoning",
         "Reasoning alone, on percepts made from the truth with noise: identity, events, verdicts.",
         f"{_ADAPTERS}:reasoning",
@@ -208,10 +208,10 @@ EVALUATIONS = (
         adapters.reasoning_closing,
         recorded=lambda given: {k: v for k, v in given.items() if k != "jobs"},
     ),
-    Evaluation(
+    EvaluationCommand(
         "tasks",
         "Damage task files and read them; time long files and a usual one.",
-        f"{_ADAPTERS}:tasks",
+        "tests.oracles.reasoning.task_files:evaluate_tasks",
         "damaging",
         (),
         (
@@ -221,7 +221,7 @@ EVALUATIONS = (
         closing=adapters.tasks_closing,
         failed=adapters.any_failures,
     ),
-    Evaluation(
+    EvaluationCommand(
         "recognition",
         "Recognise random tasks: as the exact oracle does, seen badly, and fast.",
         f"{_ADAPTERS}:recognition",
@@ -235,7 +235,7 @@ EVALUATIONS = (
         closing=adapters.recognition_closing,
         failed=lambda figures: not all(figures["bars"].values()),
     ),
-    Evaluation(
+    EvaluationCommand(
         "resume",
         "Kill runs with SIGKILL, resume them, and compare them with an unbroken run.",
         f"{_ADAPTERS}:resume",
@@ -249,7 +249,7 @@ EVALUATIONS = (
         closing=lambda figures: iter(figures["failures"]),
         failed=adapters.resume_failed,
     ),
-    Evaluation(
+    EvaluationCommand(
         "soak",
         "A run of hours of scripted percepts: time of a step and memory at its start and end.",
         "visup.evaluation.runtime.soak:evaluate_soak",
@@ -258,7 +258,7 @@ EVALUATIONS = (
         (_count("frames", 200_000, "Length of the run.", None),),
         closing=adapters.totals_closing,
     ),
-    Evaluation(
+    EvaluationCommand(
         "stepping",
         "Going back by 500 steps: its time, the memory that it takes, and whether it leads to the same.",
         "visup.evaluation.runtime.stepping:evaluate_stepping",
@@ -271,7 +271,7 @@ EVALUATIONS = (
         closing=adapters.stepping_closing,
         failed=adapters.stepping_failed,
     ),
-    Evaluation(
+    EvaluationCommand(
         "pace",
         "The time of a step without perception, of replay and observers, and what a kept mind takes.",
         "visup.evaluation.runtime.pace:evaluate_pace",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib import import_module
 from inspect import Parameter, Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,7 +26,7 @@ JSON = Setting(
 
 
 @dataclass(frozen=True, slots=True)
-class Evaluation:
+class EvaluationCommand:
     """One command of `visup eval`.
 
     Attributes:
@@ -72,13 +71,14 @@ class Evaluation:
         from rich.console import Console
 
         from visup.commands.eval.tables import figures_table
+        from visup.evaluation.oracles import evaluation_module
         from visup.evaluation.record import write_record
 
         folder = given.get("folder")
         _check_paths(folder, json_file)
         module, _, function = self.function.partition(":")
         with _progress_line(self.verb) as progress:
-            figures = getattr(import_module(module), function)(**given, progress=progress)
+            figures = getattr(evaluation_module(module), function)(**given, progress=progress)
         console = Console(highlight=False)
         if self.keys:
             title = f"{self.name}: {folder}" if folder else self.name

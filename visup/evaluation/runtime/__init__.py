@@ -1,5 +1,6 @@
-"""Evaluation of a running agent: faults, resume, speed, memory, stepping.
+"""Evaluation of a running agent: resume, speed, memory, stepping.
 
-Read `behaviour_faults` with `fault_injection`, `resume` (runs that are killed), `pace` and `soak` (speed and
-memory), then `stepping` (what going back costs).
+Read `resume` (runs that are killed), `scripted_observations`, `pace`, `soak` and `endurance` (speed and
+memory), then `stepping` (what going back costs). Faults of behaviours are injected in
+`tests/oracles/runtime`.
 """

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.motion.clips import texture
+from visup.evaluation.motion.mask_scores import iou
 from visup.percepts.motion.outlines.outline_refinement import (
     BAND,
     LEAST,
@@ -32,10 +33,6 @@ def painted(mask: np.ndarray, inner: int, outer: int, seed: int = 1) -> np.ndarr
     rng = np.random.default_rng(seed)
     grey = np.where(mask, inner, outer) + rng.normal(0, 3, SHAPE)
     return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-
-
-def iou(a: np.ndarray, b: np.ndarray) -> float:
-    return float((a & b).sum() / (a | b).sum())
 
 
 @settings(deadline=None, max_examples=20)

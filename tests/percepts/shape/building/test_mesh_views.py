@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from visup.agent.model.orientation import orientations, swing_and_roll
+from visup.evaluation.motion.mask_scores import iou
 from visup.percepts.shape.building.build import build_database
 from visup.percepts.shape.building.mesh_views import render_views
 
@@ -39,10 +40,6 @@ def tight(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     cropped = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     small = cv2.resize(cropped.astype(np.uint8) * 255, (64, 64), interpolation=cv2.INTER_AREA)
     return np.asarray(small > 127)
-
-
-def iou(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    return float((a & b).sum() / (a | b).sum())
 
 
 @pytest.mark.parametrize("seed", range(4))

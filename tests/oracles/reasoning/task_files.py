@@ -11,7 +11,9 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
+from visup.evaluation.figures import Progress, silent
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_text, shipped_tasks
@@ -59,6 +61,39 @@ class Fuzz:
     def failures(self) -> int:
         """How many files missed the bar."""
         return len(self.raised) + len(self.placeless) + len(self.unstable) + len(self.slow)
+
+
+def evaluate_tasks(count: int, seed: int, progress: Progress = silent) -> dict[str, Any]:
+    """Corrupted task files, long ones, and a usual one.
+
+    Args:
+        count: How many corrupted files are read.
+        seed: Of the first; one more for each file.
+        progress: Shows what is being done.
+
+    Returns:
+        `total` with counts and times, `failures` in words, and whether it `failed`.
+    """
+    progress(f"{count} corrupted files")
+
+    found = fuzz(count, seed)
+    times = {f"long_{name}_s": seconds(text) for name, text in long_files()}
+    times["usual_ms"] = 1000 * seconds(read_text("inspect"), 20)
+    total = {
+        "files": found.count,
+        "tracebacks": len(found.raised),
+        "without_place": len(found.placeless),
+        "layout_unstable": len(found.unstable),
+        "over_1_s": len(found.slow),
+        "slowest_s": round(found.slowest_s, 3),
+        "read_without_mistake": found.good,
+        "codes_given": len(found.codes),
+        **{name: round(value, 3) for name, value in times.items()},
+    }
+    seeds = {"without place": found.placeless[:10], "unstable": found.unstable[:10]}
+    failures = [f"seed {number}: {what}" for number, what in found.raised[:10]]
+    failures += [f"{name}: seeds {some}" for name, some in seeds.items() if some]
+    return {"total": total, "items": {}, "failures": failures, "failed": bool(found.failures)}
 
 
 def seeds_of_language() -> list[str]:

@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from tests.oracles import relation_oracles as by_definition
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.oracles import oracle
 from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
 from visup.rules.geometry.regions import RCC8, Floats
 from visup.rules.relations._thresholds_jit import components
 from visup.rules.relations.qtc import SIGNS
 from visup.rules.relations.rcc8 import rcc8
-
-by_definition = oracle("relation_oracles")
 
 FPS = 25.0
 OBJECTS = (2, 10, 50)

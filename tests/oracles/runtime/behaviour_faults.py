@@ -23,13 +23,13 @@ from typing import Any
 
 import numpy as np
 
+from tests.oracles.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.agent import Contract, Depth, Health, HealthStatus, Hypothesis
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.records import FAULT_STATES, ReportState
 from visup.agent.model.step import Step
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.runtime.fault_injection import ALLOWED_MB, DEADLY, FAULTS, FaultyBehaviour
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.predicates.inputs_missing import percepts_read

@@ -16,9 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent.model.errors import VisupError
-from visup.evaluation.figures import Progress, silent
-from visup.evaluation.shape.corrupt import (
+from tests.oracles.shape.corrupt import (
     CORRUPTIONS,
     HARMLESS,
     LARGE,
@@ -26,6 +24,8 @@ from visup.evaluation.shape.corrupt import (
     corrupt_file,
     odd_mask,
 )
+from visup.agent.model.errors import VisupError
+from visup.evaluation.figures import Progress, silent
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.index.view_records import NewView
 from visup.percepts.shape.matching.shape_similarity import shape_of

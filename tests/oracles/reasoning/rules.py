@@ -11,10 +11,11 @@ from random import Random
 from statistics import median
 from typing import Any
 
+from tests.oracles import rule_formulas as drawn_formulas
+from tests.oracles import rule_oracle, rule_peer
+from tests.oracles.reasoning.rule_scenes import FPS, minds, twenty_rules
 from visup.agent import Mind, Observation
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.oracles import oracle
-from visup.evaluation.reasoning.rule_scenes import FPS, minds, twenty_rules
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula, shipped_rules
@@ -22,9 +23,6 @@ from visup.rules.monitoring.monitor import Monitor
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.safety.reasoner import SAFETY, RuleReasoner
 
-rule_peer = oracle("rule_peer")
-rule_oracle = oracle("rule_oracle")
-drawn_formulas = oracle("rule_formulas")
 SIGNALS: tuple[str, ...] = drawn_formulas.SIGNALS
 STEP_MS: int = drawn_formulas.STEP_MS
 

@@ -20,9 +20,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.oracles.shape.augment import augmented
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.shape.augment import augmented
+from visup.evaluation.oracles import CHECKOUT
 from visup.percepts.shape.building.build import build_database
 from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
@@ -113,10 +114,10 @@ def noisy(mask: NDArray[np.bool_], sigma: float, rng: np.random.Generator) -> ND
 
 
 def _probed(path: Path, masks: Path, *, exhaustive: bool) -> dict[str, Any]:
-    command = [sys.executable, "-m", "visup.evaluation.shape.scale", str(path), str(masks)]
+    command = [sys.executable, "-m", "tests.oracles.shape.scale", str(path), str(masks)]
     if exhaustive:
         command.append("exhaustive")
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=CHECKOUT)
     figures: dict[str, Any] = json.loads(done.stdout)
     return figures
 

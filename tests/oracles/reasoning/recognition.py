@@ -16,8 +16,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tests.oracles import recognition_oracle, recognition_tasks
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.oracles import oracle
 from visup.evaluation.reasoning.filter_laws import DRAWN_BOUND, drawn_distance
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.hidden_phases import (
@@ -30,9 +30,6 @@ from visup.tasks.automaton.hidden_phases import (
 from visup.tasks.automaton.stage_hmm import ActionStatus, StageHmm
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import read
-
-recognition_oracle = oracle("recognition_oracle")
-recognition_tasks = oracle("recognition_tasks")
 
 MOST_HISTORIES = 4_000
 LONGEST = 6

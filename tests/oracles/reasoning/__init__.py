@@ -1,0 +1,1 @@
+"""Rules, relations and recognition against their oracles; task files that are corrupted."""

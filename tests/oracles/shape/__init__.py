@@ -1,0 +1,1 @@
+"""Model databases that are corrupted (`robustness`, `corrupt`) or grown (`scale`, `augment`)."""
