@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from visup.agent import Alert, Mind, ObjectBelief, Presence, Severity, StageBelief, Status
 from visup.report.image_text import fitted, ink, shade, write
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, Rgb, object_colour
+from visup.wording import prose
 
 WHITE: Rgb = (255, 255, 255)
 INK: Rgb = (12, 16, 22)
@@ -175,7 +176,10 @@ def _banner(image: Image, y: int, alert: Alert, more: str, scale: Scale) -> int:
     mark = 2 * scale.pad + scale.letters // 2
     _triangle(image, (mark, y + scale.row // 2), scale.letters, letters, colour)
     x = mark + scale.letters
-    text = fitted(alert.cause, scale.letters, width - x - scale.pad - _width(more, scale)) + more
+    text = (
+        fitted(prose(alert.cause), scale.letters, width - x - scale.pad - _width(more, scale))
+        + more
+    )
     write(image, text, (x, y + scale.pad - 1), scale.letters, letters)
     return y + scale.row
 
