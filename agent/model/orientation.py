@@ -27,7 +27,7 @@ def image_axes(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.fl
         Two arrays (..., 3) float64 of unit vectors, model frame.
 
     Example:
-        >>> right, up = picture_axes([0.0, -1.0, 0.0])
+        >>> right, up = image_axes([0.0, -1.0, 0.0])
         >>> right.astype(int).tolist(), up.astype(int).tolist()
         ([1, 0, 0], [0, 0, 1])
     """
@@ -93,8 +93,8 @@ def swing_and_roll(
         direction of the one has been swung the shortest way to that of the other; radians, float64.
 
     Example:
-        >>> looks = orientations([[0.0, -1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]], [0, 0.5, 0])
-        >>> swing, roll = swing_and_roll(looks[0], looks)
+        >>> turned = orientations([[0.0, -1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]], [0, 0.5, 0])
+        >>> swing, roll = swing_and_roll(turned[0], turned)
         >>> swing.round(2).tolist(), abs(roll).round(2).tolist()
         ([0.0, 0.0, 1.57], [0.0, 0.5, 0.0])
     """

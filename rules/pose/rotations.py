@@ -16,7 +16,7 @@ def rotation_matrices(vectors: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), radians (Rodrigues).
 
     Example:
-        >>> turned(np.array([0.0, 0.0, np.pi / 2])).round().astype(int).tolist()
+        >>> rotation_matrices(np.array([0.0, 0.0, np.pi / 2])).round().astype(int).tolist()
         [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     """
     sine, versine, k, squared = _series(vectors)
@@ -24,7 +24,7 @@ def rotation_matrices(vectors: Floats) -> Floats:
 
 
 def right_jacobian(vectors: Floats) -> Floats:
-    """How a small change d of a rotation vector v turns: turned(v + d) ~ turned(v) turned(J d).
+    """How a small change d of a rotation vector v turns: R(v + d) ~ R(v) R(J d), R being `rotation_matrices`.
 
     Args:
         vectors: (..., 3) radians.
@@ -46,7 +46,7 @@ def rotation_vectors(matrices: Floats) -> Floats:
 
     Example:
         >>> v = np.array([0.3, -0.2, 0.1])
-        >>> bool(np.allclose(rotation_vectors(turned(v)), v))
+        >>> bool(np.allclose(rotation_vectors(rotation_matrices(v)), v))
         True
     """
     m = matrices

@@ -71,4 +71,5 @@ def _arrival(context: StepContext, belief: ObjectBelief) -> tuple[str, str]:
         return "entry", "{0} {enters} the field of view."
     if since - context.start < STATIONARY_S:
         return "noticed", "{0}, in view from the start, {begins} to move."
-    return "noticed", f"{{0}}, in view since {since:.1f} s, {{begins}} to move."
+    moves = "{0}, in view since SINCE, {begins} to move."
+    return "noticed", moves.replace("SINCE", f"{since:.1f} s")

@@ -11,7 +11,7 @@ CODES = {
     "E106": "tabs",
     "E107": "an angle bracket that is not closed",
     "E108": "something between angle brackets that is not a name",
-    "E109": "a stage that asks for nothing",
+    "E109": "a stage that requires nothing",
     "E110": "a bracket that is not closed",
     "E111": "a closing bracket without an opening one",
     "E112": "brackets of the wrong kind",

@@ -67,7 +67,7 @@ def test_the_campaign_sees_what_is_taken_for_known(
 
 
 def test_the_campaign_sees_rules_that_read_what_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("visup.rules.safety.verdicts.blind", lambda mind, word: False)
+    monkeypatch.setattr("visup.rules.safety.verdicts.inputs_missing", lambda mind, word: False)
     trial = BehaviourFaultTrial(0, "exception", "region", False, 14)
     run(trial)
     assert any(p.startswith("fine: probe_") for p in trial.problems)

@@ -9,7 +9,7 @@ from visup.evaluation.runtime.stepping import evaluate_stepping, missed
 
 
 def test_a_short_course_has_all_figures_and_misses_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    small = {"LEAST_STEPS": 150, "BACK": 60, "BLOCK": 10, "BLOCKS": 2, "PLACES": 4}
+    small = {"LEAST_STEPS": 150, "BACK": 60, "BLOCK": 10, "BLOCKS": 2, "VISITS": 4}
     for name, value in small.items():
         monkeypatch.setattr(f"visup.evaluation.runtime.stepping.{name}", value)
     figures = evaluate_stepping(200)

@@ -281,7 +281,7 @@ def test_the_command_checks_and_lists_rules(tmp_path: Path) -> None:
     assert "r: reported 2 s late, at most" in fine.output
     wrong = CliRunner().invoke(app, ["rules", "check", str(good), str(bad)])
     assert "'sen'" in str(wrong.exception)
-    assert "'for' wants a time" in str(wrong.exception)
+    assert "'for' needs a time" in str(wrong.exception)
     listed = CliRunner().invoke(app, ["rules", "list"])
     assert all(rule.name in listed.output for rule in shipped_rules())
     as_json = CliRunner().invoke(app, ["rules", "list", "--json", str(good)])
