@@ -25,7 +25,7 @@ class Phase(StrEnum):
 class AgentSnapshot:
     """All that an agent has come to believe and ask for: with what was perceived since, its later steps.
 
-    What behaviours hold is not part of it: they are not needed to think again about what was
+    What behaviours hold is not part of it: they are not needed to reason again about what was
     perceived. `visup.agent.storage.checkpoint` keeps them too.
 
     Attributes:

@@ -56,7 +56,7 @@ class PoseSettings:
         spin: How spin is measured.
         every_s: Looks at one object are at least so far apart.
         most_looks: Objects whose trees grow in one step at most; those that have waited longest come
-            first. The budget of the dearest part of thinking: it counts work, not time, so that what
+            first. The budget of the most expensive part of reasoning: it counts work, not time, so that what
             is believed is the same on every machine.
         refit_s: Spin is measured so often.
         least_visible: Below this share in sight an object's hypotheses are not heeded.

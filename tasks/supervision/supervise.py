@@ -81,7 +81,7 @@ def task_reasoner(
     """
     models = tuple(_model(t, actions or known_actions(), settings) for t in tasks)
 
-    def think(mind: Mind, observation: Observation) -> Outcome:
+    def supervise_tasks(mind: Mind, observation: Observation) -> Outcome:
         before = _recall(mind, models)
         each = zip(models, before, strict=True)
         seen = tuple(_follow(f, m, mind) if _due(m, mind.time) else m for f, m in each)
@@ -91,7 +91,7 @@ def task_reasoner(
         events = tuple(e for step in steps for e in _events(*step, mind))
         return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))
 
-    return think
+    return supervise_tasks
 
 
 def finish(belief: TaskBelief) -> Verdict:

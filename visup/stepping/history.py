@@ -1,4 +1,4 @@
-"""All past steps at the price of a few: observations, a mind now and then, and thinking again.
+"""All past steps at the price of a few: observations, a mind now and then, and reasoning again.
 
 Reasoning is deterministic, so that a step need not be kept: it is thought again from the nearest mind
 before it. How far apart the kept minds are settles both what going back costs (at most `SPACING`

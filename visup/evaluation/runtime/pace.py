@@ -1,4 +1,4 @@
-"""How fast an agent thinks: a step without perception, observers, replay, and minds that are kept.
+"""How fast an agent reasons: a step without perception, observers, replay, and minds that are kept.
 
 Scripted observations, twenty rules, two tasks, the journal on. Times are processor time of the
 process, and of each figure the median as well as the lowest decile is told: what else a busy machine
@@ -161,7 +161,7 @@ def _replay_fps(folder: Path) -> float:
 
 
 def _observers(settings: WatchSettings, place: Path) -> float:
-    """Time of the cycle's own thread in observers, as a share of that of thinking."""
+    """Time of the cycle's own thread in observers, as a share of that of reasoning."""
     sinks = Sinks([f"file:{place}", "webhook:http://127.0.0.1:9/"], "scripted")
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     agent = reasoning_agent(settings)
