@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Event
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
-from visup.agent.model.suggestions import did_you_mean
 
 NOBODY = ("unknown", UNKNOWN_OBJECT)
 """Answers that say that an object is none of the models."""

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
-from visup.agent.model.suggestions import did_you_mean
 
 Values = dict[str, dict[str, Any]]
 """Name of a behaviour -> its settings."""

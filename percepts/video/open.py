@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import SettingsError, SourceError
-from visup.agent.model.suggestions import closest
 from visup.percepts.video.capture import (
     Capture,
     CaptureFactory,

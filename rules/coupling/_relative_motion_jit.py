@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from visup.compiled import compiled
-from visup.rules.geometry.hysteresis import Floats
+from visup.rules.smoothing.hysteresis import Floats
 
 
 @compiled

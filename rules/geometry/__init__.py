@@ -1,7 +1,7 @@
-"""The mathematics of outlines and of time series that all reasoners share.
+"""The geometry of outlines, and the fits over time, that all reasoners share.
 
-Read in this order: `regions.py` (boxes, masks, support functions), `outlines.py` (what is worked out once
-for a region or a pair), `pairs.py` (pairs of objects as one flat list), `ema.py` and `hysteresis.py`
-(quantities and states that do not flicker). `_outlines_jit.py` and `_fit_jit.py` hold the compiled loops:
-nearest points and iterated closest points; Theil-Sen lines and velocities of outlines.
+Read in this order: `regions.py` (boxes, masks, support functions), `outlines.py` (what is worked out
+once for a region or a pair) and `pairs.py` (pairs of objects as one flat list). `_outlines_jit.py` and
+`_fit_jit.py` hold the compiled loops: nearest points and iterated closest points; Theil-Sen lines and
+velocities of outlines.
 """

@@ -10,8 +10,8 @@ from typing import cast
 
 from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import RuleError
-from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.diagnostics import Diagnostic, Source, either, raise_all
 from visup.rules.language.transform import read_tree

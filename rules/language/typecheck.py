@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from visup.agent.model.suggestions import did_you_mean
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.formula.nodes import (
     Comparison,
     Formula,

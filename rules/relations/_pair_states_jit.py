@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.compiled import compiled
-from visup.rules.geometry.hysteresis import UNKNOWN, Codes, Floats
 from visup.rules.relations.rows import PairQuantity, StateRow, TableRow, ValueRow
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
+from visup.rules.smoothing.hysteresis import UNKNOWN, Codes, Floats
 
 COUPLED, MERGED = 1, 2
 """Marks of pairs that are one body, or are seen as one region."""

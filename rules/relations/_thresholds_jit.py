@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from visup.compiled import compiled
-from visup.rules.geometry.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN, Codes, Floats
 from visup.rules.relations.direction import AT_PLACE
 from visup.rules.relations.distance import LIMITS
+from visup.rules.smoothing.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN, Codes, Floats
 
 
 @compiled

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from visup.rules.geometry.hysteresis import UNKNOWN, Codes
+from visup.rules.smoothing.hysteresis import UNKNOWN, Codes
 
 DIRECTION_NAMES = (
     "east_of",

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from visup.agent import Region
 from visup.compiled import compiled
-from visup.rules.geometry.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN, Codes
 from visup.rules.geometry.outlines import signed_distances
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import RCC8, Floats
 from visup.rules.relations._thresholds_jit import edge_differences
+from visup.rules.smoothing.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN, Codes
 
 DC, EC, PO, EQ, TPP, NTPP, TPPI, NTPPI = range(8)
 CONVERSE: Codes = np.array(

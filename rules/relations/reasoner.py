@@ -44,8 +44,6 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import ColumnLayout, RelationBlock
 from visup.rules.geometry._fit_jit import binned_trends
-from visup.rules.geometry.ema import new_share
-from visup.rules.geometry.hysteresis import UNKNOWN, Codes, HysteresisState, advance, unknown_states
 from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import RCC8, Floats, image_diagonal
 from visup.rules.presence.object_tracks import merged_pairs
@@ -93,6 +91,14 @@ from visup.rules.relations.rows import ValueRow as V
 from visup.rules.relations.samples import SampleWindow, covers_window, sampled
 from visup.rules.relations.thresholds import least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
+from visup.rules.smoothing.ema import new_share
+from visup.rules.smoothing.hysteresis import (
+    UNKNOWN,
+    Codes,
+    HysteresisState,
+    advance,
+    unknown_states,
+)
 
 DEPTH_NAMES = ("nearing_in_depth", "keeping_in_depth", "parting_in_depth")
 TOWARDS_NAMES = ("moving_towards", "steady_to", "moving_away_from")

@@ -12,8 +12,8 @@ from math import radians
 
 import numpy as np
 
-from visup.rules.geometry.hysteresis import Floats
 from visup.rules.relations.rows import BOX_ROWS, MOVEMENT
+from visup.rules.smoothing.hysteresis import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind, ObjectBelief, Observation, Outcome, Relation, Truth, Zone
 from visup.agent.model.memory import MemoryKey
-from visup.rules.geometry.ema import exponential_mean
-from visup.rules.geometry.hysteresis import (
+from visup.rules.geometry.regions import Floats, densified, image_diagonal, outline
+from visup.rules.smoothing.ema import exponential_mean
+from visup.rules.smoothing.hysteresis import (
     ABOVE,
     BELOW,
     UNKNOWN,
@@ -36,7 +37,6 @@ from visup.rules.geometry.hysteresis import (
     advance,
     unknown_states,
 )
-from visup.rules.geometry.regions import Floats, densified, image_diagonal, outline
 
 QUESTIONS = ("inside", "reaching", "wholly_inside")
 

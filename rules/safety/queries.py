@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import product
 
 from visup.agent import Mind, Truth
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import RuleError
-from visup.agent.model.suggestions import did_you_mean
 from visup.rules.formula.nodes import Rule
 from visup.rules.monitoring.intervals import verdict
 from visup.rules.predicates.snapshot import Snapshot

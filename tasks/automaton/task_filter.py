@@ -1,6 +1,6 @@
 """The task filter: where a task is, from observations that may be wrong or missing.
 
-One filter supervises and is certified. It is the forward algorithm (`forward.py`) over hypotheses
+One filter supervises and is certified. It is the forward algorithm (`forward_recursion.py`) over hypotheses
 that a model gives it: `HiddenPhases`, where the phase of a step is hidden and the posterior exact,
 and the model of supervision, which reads the phases off what was seen. It is a probabilistic
 parser: the mass of what is followed is the prefix probability of what was seen, the states of the
@@ -16,7 +16,7 @@ from typing import Generic, Protocol, TypeVar
 
 from visup.agent import Status
 from visup.tasks.automaton.automaton import Automaton
-from visup.tasks.automaton.forward import Weighted, merged, pruned
+from visup.tasks.automaton.forward_recursion import Weighted, merged, pruned
 
 K = TypeVar("K", bound=Hashable)
 H = TypeVar("H")

@@ -6,8 +6,8 @@ from importlib.resources import files
 from os.path import normpath
 from pathlib import Path
 
+from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import TaskError
-from visup.agent.model.suggestions import closest
 
 
 def read_text(path_or_name: str | Path) -> str:

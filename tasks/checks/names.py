@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isinf
 
-from visup.agent.model.suggestions import did_you_mean
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.formula.nodes import Comparison
 from visup.rules.formula.units import Number, Span
 from visup.rules.language.diagnostics import Diagnostic, Source

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from functools import cached_property
 
-from visup.agent.model.suggestions import closest, did_you_mean
+from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition

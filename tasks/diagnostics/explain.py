@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import TaskError
-from visup.agent.model.suggestions import did_you_mean
 from visup.tasks.diagnostics.codes import CODES
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from visup.agent.model.suggestions import did_you_mean
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.diagnostics.error_patterns import recognise_error
 from visup.tasks.grammar.nodes import Task

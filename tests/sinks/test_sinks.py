@@ -26,7 +26,7 @@ from visup.evaluation.runtime.soak import evaluate_soak, sinks_ratio
 from visup.runs.runner import fresh_folder, supervise
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.sinks import Outbox, Sinks, open_sink
-from visup.sinks.builtin import JsonLines, Webhook
+from visup.sinks.file_and_webhook import JsonLines, Webhook
 
 ALERT = Alert(3, "worry", Severity.WARNING, 1.0, 1.5, (1, 2), "This is a worry.", ("because",))
 FRAME = Frame(7, 1.5, np.zeros((4, 6, 3), np.uint8))

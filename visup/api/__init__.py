@@ -1,6 +1,6 @@
 """The public API: watch a source, open a recorded run, and have both as tables and pictures.
 
-Read in this order: `watching.py` (`visup.watch` and the run that it gives), `options.py` (what may be
+Read in this order: `watching.py` (`visup.watch` and the run that it gives), `watch_options.py` (what may be
 said about a run), `recorded.py` (`visup.open_run`), `records.py` (sequences of records that become
 tables). Users take these names from `visup` itself.
 """

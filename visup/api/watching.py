@@ -19,8 +19,8 @@ from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import Verdict
 from visup.api.display import html_with_picture, story, with_picture
-from visup.api.options import TaskLike, WatchOptions, settings_from
 from visup.api.records import Records
+from visup.api.watch_options import TaskLike, WatchOptions, settings_from
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.runs.result import RunResult
 from visup.runs.runner import Audience, fresh_folder, supervised

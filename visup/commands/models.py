@@ -41,7 +41,7 @@ def build(
 
     from rich.progress import Progress
 
-    from visup.percepts.shape.building.build import build_database
+    from visup.percepts.shape.building.database_builder import build_database
 
     with Progress(transient=True) as bar:
         task = bar.add_task("views", total=len(meshes) * max(1, views))
@@ -76,7 +76,11 @@ def add(
     Silhouettes may be cut by the pictures' borders, and are then stored as such.
     """
     from visup.agent.model.errors import SettingsError
-    from visup.percepts.shape.building.build import read_masks, read_silhouettes, silhouette_views
+    from visup.percepts.shape.building.database_builder import (
+        read_masks,
+        read_silhouettes,
+        silhouette_views,
+    )
     from visup.percepts.shape.database.model_database import ModelDatabase
 
     if clusters < 1 or not name.strip():
@@ -129,7 +133,7 @@ def match_picture(
 ) -> None:
     """Rank the views that a silhouette looks like; with --out, draw why."""
     from visup.agent.model.errors import DatabaseError, SettingsError
-    from visup.percepts.shape.building.build import read_silhouette
+    from visup.percepts.shape.building.database_builder import read_silhouette
     from visup.percepts.shape.database.model_database import ModelDatabase
     from visup.percepts.shape.silhouette.silhouette import looks_cut, normalise
 

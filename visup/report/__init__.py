@@ -1,9 +1,10 @@
 """The report of a run: data collected while it goes on, annotated pictures and video, one page to read.
 
-Read in this order: `records` (what a report is made of), `bounded`, `moments` and `collector` (collected
-during a run), `annotate`, `crops` and `video` (pictures). The folder `page` makes the HTML page of it,
-`motion_debug` draws the internals of the segmenter.
+Read in this order: `records` (what a report is made of), `bounded_buffers`, `moments` and `collector`
+(collected during a run), `annotate`, `crops` and `video` (pictures). The folder `page` makes the HTML
+page of it, `motion_debug` draws the internals of the segmenter.
 
 Public names: `collector.Collector`, `records.RunData`, `page.html.write_report`, `annotate.annotate`,
-`video.AnnotatedVideo`. Import from those modules; this one stays empty, so that the command starts quickly.
+`video.AnnotatedVideo`. Import from those modules; this one stays empty, so that the command starts
+quickly.
 """

@@ -17,7 +17,7 @@ from visup.agent import (
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.report.annotate import annotate
-from visup.report.bounded import Heaviest, SpanRecorder, Thinned
+from visup.report.bounded_buffers import Heaviest, SpanRecorder, Thinned
 from visup.report.crops import cut_out, jpeg_of, shrunk
 from visup.report.moments import matches_of, sample_of, state_of, weight_of
 from visup.report.records import (

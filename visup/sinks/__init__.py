@@ -1,11 +1,11 @@
 """Sinks: alerts and figures for other programs, outside of the cycle.
 
-Read `outbox.py` (how nothing waits for a sink), then `builtin.py` (what needs only Python), and
-`sinks.py` (what `--sink` means).
+Read `outbox.py` (how nothing waits for a sink), then `file_and_webhook.py` (what needs only Python), and
+`registry.py` (what `--sink` means).
 """
 
 from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import Outbox, Sink
-from visup.sinks.sinks import Sinks, open_sink
+from visup.sinks.registry import Sinks, open_sink
 
 __all__ = ["AlertSender", "Outbox", "Sink", "Sinks", "open_sink"]

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 from visup.agent import Mind
 from visup.agent.contract.phases import Phase
+from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.suggestions import closest, did_you_mean
 from visup.rules.safety.expression import expression
 from visup.stepping.breakpoints import (
     AnyStop,

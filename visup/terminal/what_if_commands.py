@@ -8,9 +8,9 @@ from collections.abc import Iterable, Sequence
 from visup.agent import Mind, Presence, Truth
 from visup.agent.cycle.agent import Reasoners
 from visup.agent.cycle.answers import resolve_answer
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
-from visup.agent.model.suggestions import did_you_mean
 from visup.rules.language.parser import load_rules
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.what_if import (

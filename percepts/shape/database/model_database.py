@@ -1,6 +1,7 @@
 """The model database: names, views and shapes, and what a silhouette looks like of them.
 
-Read `search.py` for the search, `file_format.py` for the file and `build.py` for what goes into it.
+Read `search.py` for the search, `file_format.py` for the file and `database_builder.py` for what goes
+into it.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ class ModelDatabase:
         return tuple(self.query(shape, budget=budget, **options) for shape in shapes)
 
     def add(self, views: Iterable[NewView]) -> ModelDatabase:
-        """Add views, to names new or known; the database as it is then. See `build.py`.
+        """Add views, to names new or known; the database as it is then. See `database_builder.py`.
 
         Raises:
             DatabaseError: The file cannot be written; it stays as it was.

@@ -17,7 +17,6 @@ from tests.oracles.reasoning.relations import (
 )
 from tests.oracles.relation_oracles import plain_relations, qtc_by_definition
 from visup.evaluation.reasoning.boxes import Boxes, BoxSettings, watch_boxes
-from visup.rules.geometry.hysteresis import UNKNOWN
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import RCC8, Floats
 from visup.rules.relations._thresholds_jit import (
@@ -33,6 +32,7 @@ from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import rcc8
 from visup.rules.relations.rows import AWAY, DIRECTION, DISTANCE, SIDE
 from visup.rules.relations.thresholds import ThresholdSettings
+from visup.rules.smoothing.hysteresis import UNKNOWN
 
 A = (100.0, 200.0, 80.0, 60.0)
 MIRROR = {"converging": "diverging", "diverging": "converging"}

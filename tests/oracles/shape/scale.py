@@ -24,7 +24,7 @@ from tests.oracles.shape.augment import augmented
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.oracles import CHECKOUT
-from visup.percepts.shape.building.build import build_database
+from visup.percepts.shape.building.database_builder import build_database
 from visup.percepts.shape.building.mesh_views import load_mesh, render_views, sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.matching.shape_similarity import Shape, shape_of

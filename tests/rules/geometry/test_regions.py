@@ -9,7 +9,6 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from tests.oracles.relation_oracles import rcc8_by_definition
 from tests.rules.scenes import SIZE, box_region, reach_of
 from visup.agent import Region
-from visup.rules.geometry.hysteresis import UNKNOWN
 from visup.rules.geometry.outlines import outline_gap
 from visup.rules.geometry.regions import (
     DIRECTIONS,
@@ -21,6 +20,7 @@ from visup.rules.geometry.regions import (
 )
 from visup.rules.relations._thresholds_jit import signs_with_hysteresis
 from visup.rules.relations.rcc8 import from_outline_signs, outline_differences, rcc8
+from visup.rules.smoothing.hysteresis import UNKNOWN
 
 some = settings(max_examples=80, deadline=None)
 rect = st.tuples(st.integers(0, 60), st.integers(0, 60), st.integers(2, 40), st.integers(2, 40))

@@ -29,11 +29,20 @@ from visup.rules.formula.nodes import (
 )
 from visup.rules.formula.terms import Arithmetic, Measure, PointwiseFunction, Term, WindowFunction
 from visup.rules.formula.units import UNITS, Number, Unit
-from visup.rules.language import build
-from visup.rules.language.build import always, exists, fact, number, percent, px, px_s, quantity
-from visup.rules.language.build import s as seconds
+from visup.rules.language import rule_builder as build
 from visup.rules.language.cost import cost_of
 from visup.rules.language.parser import load_rules, parse_formula, parse_rules, shipped_rules
+from visup.rules.language.rule_builder import (
+    always,
+    exists,
+    fact,
+    number,
+    percent,
+    px,
+    px_s,
+    quantity,
+)
+from visup.rules.language.rule_builder import s as seconds
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES, signals
 

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.rules.relations import thresholds_by_arrays as twin
-from visup.rules.geometry.hysteresis import Codes, Floats
 from visup.rules.geometry.pairs import pairs
 from visup.rules.geometry.regions import DIRECTIONS
 from visup.rules.relations import _kinematics_jit as kinematics_jit
@@ -17,6 +16,7 @@ from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.rcc8 import CONVERSE, from_outline_signs, from_signs
 from visup.rules.relations.rows import BOX_ROWS, ROWS
 from visup.rules.relations.thresholds import ThresholdSettings, limits
+from visup.rules.smoothing.hysteresis import Codes, Floats
 
 some = settings(max_examples=80, deadline=None)
 seeds = st.integers(0, 2**32 - 1)

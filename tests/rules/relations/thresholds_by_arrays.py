@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.rules.geometry.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN
 from visup.rules.geometry.pairs import pairs
 from visup.rules.relations.direction import AT_PLACE
 from visup.rules.relations.distance import LIMITS
@@ -13,6 +12,7 @@ from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.rcc8 import CONVERSE, DC, EC, EQ, NTPP, NTPPI, PO, TPP, TPPI
 from visup.rules.relations.thresholds import Limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING
+from visup.rules.smoothing.hysteresis import ABOVE, BELOW, UNKNOWN, WITHIN
 
 Array = NDArray[np.generic]
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tests.oracles.reasoning.task_files import fuzz, long_files, seconds
 from tests.paths import ROOT
+from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import ErrorGroup, SourceLocation, TaskError
-from visup.agent.model.suggestions import closest
 from visup.rules.language.diagnostics import Diagnostic
 from visup.tasks import load_task, parse_task, shipped_tasks
 from visup.tasks.actions.actions import ActionDefinition

@@ -72,7 +72,7 @@ def evaluate_missions(
 
 def _database(folder: Path, missions: Sequence[Path], scratch: Path, progress: Progress) -> Path:
     """A model database from the meshes and silhouettes that stand beside the missions."""
-    from visup.percepts.shape.building.build import build_database, read_silhouettes
+    from visup.percepts.shape.building.database_builder import build_database, read_silhouettes
 
     beside = missions[0].resolve().parent.parent
     meshes = sorted((beside / "models").glob("*.ply"))

@@ -20,8 +20,6 @@ from functools import lru_cache
 import numpy as np
 
 from visup.rules.geometry._fit_jit import binned_trends, slope_noise
-from visup.rules.geometry.ema import exponential_mean
-from visup.rules.geometry.hysteresis import UNKNOWN, Codes, HysteresisState, advance, unknown_states
 from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import RCC8, Floats
 from visup.rules.relations._thresholds_jit import box_gaps, classify_boxes, moving_signs
@@ -32,6 +30,14 @@ from visup.rules.relations.qtc import text
 from visup.rules.relations.rcc8 import CONVERSE, from_signs
 from visup.rules.relations.rows import AWAY, BOX_ROWS, DIRECTION, DISTANCE, ORDER, SIDE
 from visup.rules.relations.thresholds import ThresholdSettings, least_durations, limits
+from visup.rules.smoothing.ema import exponential_mean
+from visup.rules.smoothing.hysteresis import (
+    UNKNOWN,
+    Codes,
+    HysteresisState,
+    advance,
+    unknown_states,
+)
 
 APPROACH = BOX_ROWS
 APPROACH_NAMES = ("converging", "keeping_distance", "diverging")

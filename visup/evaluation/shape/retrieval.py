@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
-from visup.percepts.shape.building.build import PICTURES, read_silhouette
+from visup.percepts.shape.building.database_builder import PICTURES, read_silhouette
 from visup.percepts.shape.database.model_database import candidates_wanted
 from visup.percepts.shape.index.view_index import ViewIndex
 from visup.percepts.shape.matching.graph_matching import WEIGHTS, match_nodes

@@ -22,7 +22,7 @@ from visup.evaluation.figures import Progress, silent
 from visup.evaluation.shape.descriptors import Descriptor, descriptors, nearest
 from visup.evaluation.shape.symmetry import angle_to, silhouette_symmetries
 from visup.evaluation.shape.view_queries import CONDITIONS, Query, draw_queries
-from visup.percepts.shape.building.build import build_database
+from visup.percepts.shape.building.database_builder import build_database
 from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
 

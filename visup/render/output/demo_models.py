@@ -17,7 +17,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from visup.percepts.shape.building.build import rendered, silhouette_views
+from visup.percepts.shape.building.database_builder import rendered, silhouette_views
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.index.view_records import NewView

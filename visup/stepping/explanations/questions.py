@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from visup.agent import Mind, Presence
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
-from visup.agent.model.suggestions import did_you_mean
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import why_not as whynot

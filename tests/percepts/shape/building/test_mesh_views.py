@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.orientation import orientations, swing_and_roll
 from visup.evaluation.motion.mask_scores import iou
-from visup.percepts.shape.building.build import build_database
+from visup.percepts.shape.building.database_builder import build_database
 from visup.percepts.shape.building.mesh_views import render_views
 
 trimesh = pytest.importorskip("trimesh", reason="views of meshes need the extra 'render'")

@@ -15,7 +15,7 @@ import pytest
 
 from tests.percepts.shape.shapes import ZOO, limbs, shape, small_database
 from visup.agent.model.errors import DatabaseError
-from visup.percepts.shape.building.build import (
+from visup.percepts.shape.building.database_builder import (
     silhouette_views,
 )
 from visup.percepts.shape.database.file_format import APPLICATION_ID, VERSION

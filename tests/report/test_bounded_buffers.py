@@ -7,7 +7,7 @@ from functools import partial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.report.bounded import Heaviest, SpanRecorder, Thinned
+from visup.report.bounded_buffers import Heaviest, SpanRecorder, Thinned
 from visup.report.records import StateSpan
 
 

@@ -14,7 +14,7 @@ from visup.agent.contract.behaviour import Contract
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
-from visup.rules.identity.questions import question_text
+from visup.rules.identity.operator_questions import question_text
 from visup.rules.reasoners import default_reasoners
 from visup.runs.operator import HumanOperator, parse_answers
 

@@ -1,6 +1,6 @@
 """Rules in Python: the same trees as rule files give, built with operators.
 
->>> from visup.rules.language.build import fact, quantity, px, rule, s
+>>> from visup.rules.language.rule_builder import fact, quantity, px, rule, s
 >>> near = (quantity.gap("a", "b") < px(20)).lasting(s(1)) & ~fact.coupled("a", "b")
 >>> made = rule("near", "a b", "warning", near, "{a} {is} near {b}.", hold=s(3))
 >>> print(made)

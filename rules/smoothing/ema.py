@@ -11,7 +11,7 @@ from math import exp
 import numpy as np
 
 from visup.compiled import compiled
-from visup.rules.geometry.hysteresis import Floats
+from visup.rules.smoothing.hysteresis import Floats
 
 TAU_S = 0.15
 """Time constant, seconds; less than the least duration of the states that are judged."""

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.rules.geometry.hysteresis import UNKNOWN, advance, unknown_states
+from visup.rules.smoothing.hysteresis import UNKNOWN, advance, unknown_states
 
 DT, LEAST = 0.1, 0.3
 

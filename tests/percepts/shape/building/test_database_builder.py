@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import ZOO, flower, small_database
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.percepts.shape.building import build, build_parts
-from visup.percepts.shape.building.build import (
+from visup.percepts.shape.building import build_parts, database_builder
+from visup.percepts.shape.building.build_parts import parts_of
+from visup.percepts.shape.building.database_builder import (
     build_database,
     building_folder,
     mesh_views,
     read_silhouettes,
     silhouette_views,
 )
-from visup.percepts.shape.building.build_parts import parts_of
 from visup.percepts.shape.building.mesh_views import (
     half_sphere_directions,
     load_mesh,
@@ -86,7 +86,7 @@ def test_a_build_that_was_killed_goes_on_where_it_was(
     whole = build_database(tmp_path / "whole.db", meshes, views=5)
     target = tmp_path / "killed.db"
     rendered: list[str] = []
-    once = build.rendered
+    once = database_builder.rendered
 
     def dies(mesh: Path, directions: np.ndarray) -> list[NewView]:
         rendered.append(f"{mesh.stem} {len(directions)}")
@@ -94,7 +94,7 @@ def test_a_build_that_was_killed_goes_on_where_it_was(
             raise KeyboardInterrupt
         return once(mesh, directions)
 
-    monkeypatch.setattr(build, "rendered", dies)
+    monkeypatch.setattr(database_builder, "rendered", dies)
     with pytest.raises(KeyboardInterrupt):
         build_database(target, meshes, views=5)
     assert not target.exists()
@@ -133,7 +133,9 @@ def test_symmetric_views_are_merged_with_the_direction_that_shows_them(tmp_path:
     # Across a plane of symmetry the silhouette is mirrored: unmirrored it is seen from the opposite.
     across = toward * (-1, 1, 1)
     other = np.array([0.8, -0.36, 0.48])
-    views = merge_symmetric(build.rendered(tmp_path / "box.ply", np.stack([toward, across, other])))
+    views = merge_symmetric(
+        database_builder.rendered(tmp_path / "box.ply", np.stack([toward, across, other]))
+    )
     assert [v.direction for v in views] == [tuple(toward), tuple(other)]
     assert views[0].also == (tuple(-across),)
     seen = render_views(mesh, np.stack([toward, -across]))

@@ -8,7 +8,7 @@ from pathlib import Path
 from visup.agent import AlertCondition, Frame, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
-from visup.sinks.builtin import Webhook, to_file, to_stdout
+from visup.sinks.file_and_webhook import Webhook, to_file, to_stdout
 from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import MOST_WAITING, Outbox, Sink
 
