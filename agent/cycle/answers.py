@@ -62,7 +62,7 @@ def resolve_model(
     if _plain(said) in meant:
         return meant[_plain(said)]
     raise SettingsError(
-        f"nobody knows a '{said}': there is no such model or actor",
+        f"'{said}' is neither a model nor an actor",
         expected=f"one of: {', '.join([*sorted(meant), 'unknown'])}",
         hint=did_you_mean(_plain(said), meant),
     )

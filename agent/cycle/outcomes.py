@@ -20,7 +20,7 @@ def merge_outcomes(so_far: Outcome, more: Outcome, observation: Observation) -> 
 
     Raises:
         TypeError: It is no outcome, or holds what is none of its parts.
-        ValueError: Its mind is of another moment, or a confidence or time is no number.
+        ValueError: Its mind is of another moment, or a confidence or time is not a number.
     """
     _expect(more, Outcome, "the reasoner returned")
     _expect(more.mind, Mind, "the mind is")

@@ -225,7 +225,7 @@ def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
     said = ", ".join("N" if n is None else str(n) for n in shape)
     _expect(like, f"{who} has shape {found.shape}", f"({said})")
     numbers = found.dtype.kind in "iuf" and bool(np.isfinite(found).all())
-    _expect(numbers, f"{who} holds what is no finite number", "finite numbers")
+    _expect(numbers, f"{who} contains a number that is not finite", "finite numbers")
 
 
 def _expect(fine: bool, what: str, expected: str) -> None:

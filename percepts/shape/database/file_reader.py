@@ -195,7 +195,7 @@ def _check_views(views: Records, also: Records, models: int) -> None:
     unknown[len(views) :] = False
     area, smoothing = views["area"], views["smoothing"]
     for sound, what in (
-        (unknown | (np.abs(length - 1) < 1e-3), "a direction that is no unit vector"),
+        (unknown | (np.abs(length - 1) < 1e-3), "a direction that is not a unit vector"),
         (np.isnan(area) | ((area > 0) & np.isfinite(area)), "an area that cannot be"),
         ((smoothing >= 0) & (smoothing < 1), "a smoothing that cannot be"),
         (views["cut"] <= 1, "a mark of a cut that is none"),

@@ -215,7 +215,7 @@ REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
     "no name": (run_sql("UPDATE models SET name = x'ff' WHERE code = 0"), "model 0 without a name"),
     "no model": (in_block("model", 99), "a view of no model"),
     "bad number": (in_block("number", 3), "not numbered"),
-    "bad direction": (in_block("direction", 9e9), "no unit vector"),
+    "bad direction": (in_block("direction", 9e9), "not a unit vector"),
     "bad area": (in_block("area", -1.0), "an area"),
     "bad mark": (in_block("cut", 7), "mark of a cut"),
     "bad smoothing": (in_block("smoothing", np.nan), "a smoothing"),
