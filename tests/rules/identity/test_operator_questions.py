@@ -103,7 +103,7 @@ def test_none_of_the_models_is_an_answer() -> None:
 
 @pytest.mark.parametrize(
     ("number", "name", "what"),
-    [(7, "arm", "no object 7"), (1, "gitar", "gitar"), (1, "", "nobody knows")],
+    [(7, "arm", "no object 7"), (1, "gitar", "gitar"), (1, "", "neither a model nor an actor")],
 )
 def test_answers_that_cannot_be_are_refused_in_the_users_words(
     number: int, name: str, what: str
