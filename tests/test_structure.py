@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter, defaultdict
 from pathlib import Path
 from statistics import median
@@ -95,3 +96,17 @@ def test_every_room_says_what_it_is_for(room: Path) -> None:
     said = ast.get_docstring(TREES[room]) or ""
     assert len(said.split()) >= 5
     assert "Placeholder" not in said
+
+
+EXAMPLES_OF_NAMES = {"FILE.py"}
+"""Names in backticks that stand for a file of the user's."""
+
+
+def test_files_that_the_sources_name_exist() -> None:
+    known = {path.name for path in TREES} | EXAMPLES_OF_NAMES
+    named = {
+        (path.relative_to(ROOT).as_posix(), name)
+        for path in TREES
+        for name in re.findall(r"`(?:\w+/)*(\w+\.py)`", path.read_text(encoding="utf-8"))
+    }
+    assert {(where, name) for where, name in named if name not in known} == set()

@@ -8,7 +8,7 @@
     delete from any state: merged into a known object (`reidentification.py`), or forgotten (`objects.py`)
 
 A region that appears initiates an object; who decides about the other changes are `initiation.py`,
-`occlusion.py`, `exits.py` and `reidentification.py`. The state is held once: `ObjectBelief.confirmed` and
+`occlusion.py` and `reidentification.py`. The state is held once: `ObjectBelief.confirmed` and
 `ObjectBelief.presence` are it, and the track adds only whether a hidden object is lost.
 """
 

@@ -1,7 +1,7 @@
 """What each action means: when it holds, begins, progresses, is over, and what is its contrary.
 
 The actions of tasks stand in one table, `ACTIONS`; the words in it are names of relations in the
-mind. `known_actions` adds the words and quantities of rules (`task_vocabulary.py`) and what installed
+mind. `known_actions` adds the words and quantities of rules (`vocabulary.py`) and what installed
 packages offer under the entry point group `visup.actions`.
 """
 

@@ -1,6 +1,6 @@
 """How a task goes and how it is seen, as probabilities: the model behind recognition.
 
-Hidden is where the task is: the state of its course (which steps are under way, `course.py`) and
+Hidden is where the task is: the state of its course (which steps are under way, `derivatives.py`) and
 the *phase* of each of these steps. A step waits to begin, is going on (in one phase, or in several
 one after the other where its course says `for`), is failing, or is lost for good:
 

@@ -1,6 +1,6 @@
 """What a tree must satisfy beyond its syntax: known names, the right actors, stages that are reached.
 
-Courses and their clauses are checked in `check_courses.py`. Each check tells a fault where it
+Courses and their clauses are checked in `courses.py`. Each check tells a fault where it
 stands and none that merely follows from another.
 """
 

@@ -68,7 +68,7 @@ def task_reasoner(
 
     Args:
         tasks: Tasks, checked (see `parse_task`). One is taken to be going on; of several it is
-            inferred which are (see `activity.py`), and the others are not told about.
+            inferred which are (see `task_inference.py`), and the others are not told about.
         settings: Patience and thresholds.
         actions: Meanings of actions; None for all that are known, with those of plug-ins.
 

@@ -10,7 +10,7 @@ Three sieves, each finer and dearer than the one before:
    them are views of models that would have none otherwise, so that a ranking of models is full.
 3. *Bounds.* One product of all nodes of the query with all nodes of these bounds each similarity: every
    node takes its best partner, whoever else wants it and whatever hangs below. The matching of
-   `match_graphs.py` can only do worse, so that views can be matched best bound first until no bound left
+   `graph_matching.py` can only do worse, so that views can be matched best bound first until no bound left
    can change the result.
 """
 

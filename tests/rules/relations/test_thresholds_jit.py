@@ -83,7 +83,7 @@ def test_rcc8_follows_from_signs_case_by_case(seed: int) -> None:
 
 
 def measured(rng: np.random.Generator, m: int) -> Kinematics:
-    """Quantities as they may come out of `measure.py`."""
+    """Quantities as they may come out of `kinematics.py`."""
     tables = holed(rng, rng.normal(0.0, 3.0, (5, m, m)))
     tables = np.ascontiguousarray(np.triu(tables, 1) + np.triu(tables, 1).transpose(0, 2, 1))
     tables[2:4] = np.abs(tables[2:4])
