@@ -103,7 +103,8 @@ EXAMPLES_OF_NAMES = {"FILE.py"}
 
 
 def test_files_that_the_sources_name_exist() -> None:
-    known = {path.name for path in TREES} | EXAMPLES_OF_NAMES
+    tests = {path.name for path in (ROOT / "tests").rglob("*.py")}
+    known = {path.name for path in TREES} | tests | EXAMPLES_OF_NAMES
     named = {
         (path.relative_to(ROOT).as_posix(), name)
         for path in TREES
