@@ -7,6 +7,7 @@ Read in this order:
 3. `motion/`: what moves by itself: regions with a mask, a velocity and an id (paper, section 3).
 4. `shape/`: what a region looks like: its silhouette matched against known models (section 4).
 5. `depth.py`: how far away a region is, from its size and its model's (section 7.4).
+6. `taught/`: things that a user has shown once, as they are kept.
 
 `health`, `motion`, `shape` and `depth` are behaviours: each takes a frame and what was reported of it
 before, and reports percepts. None of them knows another but by percepts; `depth` alone also reads the

@@ -11,7 +11,7 @@ LIBRARIES = {
     "numpy": "arrays",
     "numba": "compiled loops",
     "scipy": "assignment, sparse systems, distances",
-    "opencv-python-headless": "reading video, image processing",
+    "opencv-contrib-python-headless": "reading video, image processing",
     "networkx": "shock graphs and task graphs",
     "pillow": "pictures with text",
     "lark": "grammars of tasks and rules",

@@ -1,0 +1,4 @@
+"""What a user has shown once: outlines drawn in one picture, as they are kept.
+
+Read `view.py`. The model database stores these views beside those of meshes and silhouettes.
+"""

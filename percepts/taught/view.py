@@ -1,0 +1,105 @@
+"""A thing as it was shown: an outline drawn once in a picture, with the pixels in and around it.
+
+Only what was seen is kept. Colours, keypoints, silhouettes and shock graphs follow from it when they
+are needed, so that a better way of recognising serves things that were taught before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import SettingsError
+
+SCENE_WIDTH = 480
+"""The picture in which a thing was shown is kept at most this wide, pixels."""
+
+LEAST_PIXELS = 24
+"""A smaller outline shows nothing that could be recognised."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaughtView:
+    """One outline of one thing, in one picture.
+
+    Attributes:
+        name: Of the thing; a task's actors may stand for it.
+        image: (h, w, 3) uint8, BGR: the outline's box, with half its longer side around it as far as
+            the picture reaches.
+        mask: (h, w) bool, the thing in `image`.
+        origin: (x, y) of `image` in the picture, pixels.
+        frame_size: (width, height) of the picture, pixels.
+        scene: (H, W, 3) uint8, BGR: the whole picture, at most `SCENE_WIDTH` wide.
+    """
+
+    name: str
+    image: NDArray[np.uint8]
+    mask: NDArray[np.bool_]
+    origin: tuple[int, int]
+    frame_size: tuple[int, int]
+    scene: NDArray[np.uint8]
+
+    @property
+    def bbox(self) -> tuple[int, int, int, int]:
+        """(x, y, width, height) of the thing in the picture, pixels, half open."""
+        x, y, w, h = cv2.boundingRect(self.mask.astype(np.uint8))
+        return self.origin[0] + x, self.origin[1] + y, w, h
+
+
+def taught_view(
+    name: str, picture: NDArray[np.uint8], outline: Sequence[Sequence[float]]
+) -> TaughtView:
+    """The view that an outline drawn in a picture shows.
+
+    Args:
+        name: Of the thing.
+        picture: (H, W, 3) uint8, BGR.
+        outline: At least three corners (x, y), pixels of the picture.
+
+    Raises:
+        SettingsError: The outline has too few corners, or hardly any pixel of the picture in it.
+    """
+    corners = np.asarray(outline, dtype=np.float64)
+    if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
+        raise SettingsError(
+            f"the outline of '{name}' has too few corners",
+            expected="at least three corners x,y",
+        )
+    if not np.isfinite(corners).all() or abs(corners).max() > 1 << 15:
+        raise SettingsError(f"the outline of '{name}' has a corner far outside the picture")
+    mask = np.zeros(picture.shape[:2], dtype=np.uint8)
+    cv2.fillPoly(mask, [np.round(corners).astype(np.int32)], (1,))
+    return taught_mask(name, picture, mask > 0)
+
+
+def taught_mask(name: str, picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> TaughtView:
+    """The view that a mask over a whole picture shows; see `taught_view`.
+
+    Raises:
+        SettingsError: Hardly any pixel is in the mask.
+    """
+    height, width = mask.shape
+    if np.count_nonzero(mask) < LEAST_PIXELS:
+        raise SettingsError(
+            f"there is nothing in the outline of '{name}'",
+            expected=f"at least {LEAST_PIXELS} pixels within the picture of {width} x {height}",
+        )
+    x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
+    margin = max(w, h) // 2 + 1
+    left, top = max(0, x - margin), max(0, y - margin)
+    right, bottom = min(width, x + w + margin), min(height, y + h + margin)
+    small = min(1.0, SCENE_WIDTH / width)
+    size = max(1, round(width * small)), max(1, round(height * small))
+    scene = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return TaughtView(
+        name=name,
+        image=picture[top:bottom, left:right].copy(),
+        mask=mask[top:bottom, left:right].copy(),
+        origin=(left, top),
+        frame_size=(width, height),
+        scene=np.asarray(scene, dtype=np.uint8),
+    )
