@@ -37,8 +37,10 @@ from visup.agent import (
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
+from visup.rules.coupling.contact import Contact, ContactSettings, updated_contact
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
+    RelativeVelocity,
     begin_relative_track,
     relative_velocity,
     update_relative_track,
@@ -53,7 +55,13 @@ from visup.rules.wording.sentences import sentence
 CONFIDENCE = 0.9
 """How sure couplings are: outlines at rest to each other may still be apart in depth."""
 
-COLUMNS = ColumnLayout((Column(("", "coupled"), (0, 0), 0),))
+COLUMNS = ColumnLayout(
+    (
+        Column(("", "coupled"), (0, 0), 0),
+        Column(("", "in_contact"), (1, 1), 0, listed="none"),
+        Column(("", "passing_by"), (2, 2), 0, listed="none"),
+    )
+)
 
 YES, MAYBE, NO = 1, 0, -1
 """Codes of truths."""
@@ -72,10 +80,15 @@ class CouplingSettings:
             count as one.
         path_s: How far back their relative path is kept.
         moving: Usual relative speed of bodies that are not at rest, image diagonals per second.
+        still_share: Relative speed that still is rest, as a share of the speed at which both move: what is
+            carried sways and turns, and errors of velocities grow with these; and
+        moving_share: usual relative speed of bodies that move each by itself, as such a share.
+        rest_s: For how long they must be at rest, where they do not move: what turns back rests, too.
         odds: Logarithm of the odds of rest from which on it is believed.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
+        contact: When outlines that meet are in contact.
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
@@ -83,10 +96,14 @@ class CouplingSettings:
     window_s: float = 0.3
     path_s: float = 1.2
     moving: float = 0.0125
+    still_share: float = 0.12
+    moving_share: float = 0.6
+    rest_s: float = 0.8
     odds: float = 5.0
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.5
+    contact: ContactSettings = field(default_factory=ContactSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,14 +113,18 @@ class CouplingEvidence:
     Attributes:
         converged_at: When they last were converging, not touching yet.
         rest_odds: Logarithm of the odds, from 0 on, that they touch and are at rest.
+        rest_since: Since when these are above 0.
         apart_since: Since when they are apart.
         relative_track: How they have moved relative to each other since they are near.
+        contact: Whether their outlines meet, and whether that is meant.
     """
 
     converged_at: float | None = None
     rest_odds: float = 0.0
+    rest_since: float | None = None
     apart_since: float | None = None
     relative_track: RelativeTrack | None = None
+    contact: Contact | None = None
 
 
 COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
@@ -185,7 +206,7 @@ class CouplingReasoner:
                 evidence = replace(evidence, apart_since=None)
             kept[pair] = evidence
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_block(_coupled_cells(observed, coupled, mind))
+        table = table.with_block(_cells(observed, coupled, kept, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         return Outcome(mind, tuple(events))
@@ -197,17 +218,29 @@ class CouplingReasoner:
         far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
         apart = seen.touching == NO and far
         track = self._follow(before.relative_track, seen, mind)
-        odds = before.rest_odds
+        odds, contact, found = before.rest_odds, before.contact, None
+        if track is not None and track is not before.relative_track:
+            found = relative_velocity(track, mind.time, self.settings.window_s)
         if track is None or seen.touching != YES:
             odds = 0.0
-        elif track is not before.relative_track:
-            odds = self._rest(odds, before.relative_track, track, mind)
+        elif found is not None:
+            odds = self._rest(odds, before.relative_track, found, seen, mind)
+        if seen.touching == YES:
+            contact = self._contact(before, found, seen, mind)
+        elif seen.touching == NO:
+            contact = None
         same = track is before.relative_track and odds == before.rest_odds and not converging
+        same = same and contact is before.contact
         if same and apart == (before.apart_since is not None):
             return before  # as nearly always: most pairs are far from each other
         converged = mind.time if converging else before.converged_at
         return CouplingEvidence(
-            converged, odds, _since(before.apart_since, apart, mind.time), track
+            converged,
+            odds,
+            _since(before.rest_since, odds > 0.0, mind.time),
+            _since(before.apart_since, apart, mind.time),
+            track,
+            contact,
         )
 
     def _follow(
@@ -236,18 +269,37 @@ class CouplingReasoner:
         )
 
     def _rest(
-        self, odds: float, before: RelativeTrack | None, track: RelativeTrack, mind: Mind
+        self,
+        odds: float,
+        before: RelativeTrack | None,
+        found: RelativeVelocity,
+        seen: PairObservation,
+        mind: Mind,
     ) -> float:
         """The odds of rest after another sight of both."""
         s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
-        found = relative_velocity(track, mind.time, s.window_s)
-        if found is None:
-            return odds
         diagonal = image_diagonal(mind.frame_size)
-        told = found.rest_odds(s.relations.still_speed * diagonal, s.moving * diagonal)
+        both = common_speed(mind, seen.pair)
+        still = max(s.relations.still_speed * diagonal, s.still_share * both)
+        told = found.rest_odds(still, max(s.moving * diagonal, s.moving_share * both))
         told *= min(1.0, waited / found.span)
         # Odds beyond the bound would only delay that the opposite is believed.
         return min(max(0.0, odds + told), 2 * s.odds)
+
+    def _contact(
+        self,
+        before: CouplingEvidence,
+        found: RelativeVelocity | None,
+        seen: PairObservation,
+        mind: Mind,
+    ) -> Contact:
+        """Two whose outlines meet: whether one goes past the other."""
+        s, track = self.settings.contact, before.relative_track
+        limit = s.passing * image_diagonal(mind.frame_size)
+        limit = max(limit, s.passing_share * common_speed(mind, seen.pair))
+        speed = None if found is None else float(np.hypot(*found.velocity))
+        dt = mind.time - track.path_end if track is not None else 0.0
+        return updated_contact(before.contact, speed, limit, (mind.time, dt), s)
 
     def _coupling(
         self, evidence: CouplingEvidence, seen: PairObservation, mind: Mind
@@ -258,8 +310,15 @@ class CouplingReasoner:
         yield Condition("both are seen near each other", watched)
         text = "log odds that they touch and are at rest"
         yield at_least(text, evidence.rest_odds, s.odds)
+        least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
+        moving = common_speed(mind, seen.pair) > least
+        if not moving and evidence.rest_since is not None:
+            lasted = mind.time - evidence.rest_since
+            yield at_least("at rest for", lasted, s.rest_s, " s", slack=1e-6)
         if seen.host is not None or mind.truth("moving_together", *seen.pair) is Truth.TRUE:
             return
+        if moving:
+            return  # at rest to each other, and on the move: as one
         at = evidence.converged_at
         if at is None:
             yield Condition("they have come together, move together, or share a region", False)
@@ -274,6 +333,13 @@ class CouplingReasoner:
         if evidence.apart_since is not None:
             lasted = mind.time - evidence.apart_since
             yield at_least("apart for", lasted, self.settings.part_s, " s", slack=1e-6)
+
+
+def common_speed(mind: Mind, pair: Pair) -> float:
+    """The speed of the slower of two, pixels per second; that of the one whose speed is known; else 0."""
+    now = kinematics(mind)
+    speeds = [s for s in (now.one("speed", i) for i in pair) if s == s]  # NaN is not equal to itself
+    return min(speeds, default=0.0)
 
 
 def _both_present(pair: Pair, mind: Mind) -> bool:
@@ -309,19 +375,36 @@ def _table(mind: Mind) -> RelationTable:
     return RelationTable(ids, extra=tuple(table))
 
 
-def _coupled_cells(
-    observed: Sequence[PairObservation], coupled: Mapping[Pair, Coupling], mind: Mind
+def _cells(
+    observed: Sequence[PairObservation],
+    coupled: Mapping[Pair, Coupling],
+    kept: Mapping[Pair, CouplingEvidence],
+    mind: Mind,
 ) -> RelationBlock:
-    """The relation of being coupled."""
+    """The relations of being coupled and in contact."""
     hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
-    state, since = [0] * len(observed), [mind.time] * len(observed)
+    state = np.zeros((3, len(observed)), dtype=np.int8)
+    since = np.full(state.shape, mind.time)
     for k, seen in enumerate(observed):
+        contact = kept[seen.pair].contact
+        if contact is not None:
+            settled = contact.settled_since
+            state[1, k] = UNKNOWN_CODE if settled is None else 1
+            since[1, k] = contact.met_at if settled is None else settled
+            state[2, k] = _in_front(contact, seen.pair, mind)
+            since[2, k] = contact.changed_at
         if seen.pair in coupled:
-            state[k], since[k] = 1, coupled[seen.pair].since
+            state[:2, k], state[2, k] = 1, 0
+            since[0, k] = coupled[seen.pair].since
         elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
-            state[k] = UNKNOWN_CODE
-    sure = np.full((1, len(observed)), CONFIDENCE)
-    return RelationBlock(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
+            state[:, k] = UNKNOWN_CODE
+    return RelationBlock(COLUMNS, state, since, np.full((1, len(observed)), CONFIDENCE))
+
+
+def _in_front(contact: Contact, pair: Pair, mind: Mind) -> bool:
+    """Whether one of two whose outlines meet has gone so far across the other that it does not touch it."""
+    size = min(float(np.sqrt(mind.objects[i].region.area)) for i in pair)
+    return contact.passing and contact.path > ContactSettings().doubt_share * size
 
 
 def _regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:

@@ -263,7 +263,7 @@ def velocities(
 def quick_trend(
     times: Floats, values: Floats, recent: int, limits: tuple[float, float, float], room: Floats
 ) -> tuple[float, float]:
-    """Slope over the window, or over its last part where that is strong and of another sign.
+    """Slope over the window, or over its last part where that is strong and of another sign, or at rest.
 
     Args:
         times: (T,) seconds.
@@ -290,6 +290,10 @@ def quick_trend(
         spread = floor
     turned = abs(quick) > least and abs(quick) > sigmas * spread
     if turned and np.sign(quick) != np.sign(slope):
+        return quick, spread
+    # What moved and has come to rest does not move on for as long as the window reaches back.
+    ended = abs(slope) > least and abs(quick) < 0.25 * abs(slope)
+    if ended and abs(slope - quick) > sigmas * spread:
         return quick, spread
     return slope, sigma
 

@@ -122,7 +122,7 @@ _TABLE = (
     ActionDefinition(
         "coupled",
         holds=("coupled",),
-        entry=("coupled", "touching"),
+        entry=("coupled", "in_contact"),
         while_not=("converging",),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),

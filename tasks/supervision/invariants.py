@@ -47,6 +47,34 @@ def _under_way(memory: TaskMemory) -> frozenset[str]:
     return frozenset().union(*(s.inside for s in steps))
 
 
+def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
+    """Whether an invariant speaks of how bodies stand to each other, or to a zone: then to break it is unsafe.
+
+    What must never be of one body alone (that the charger moves) is a matter of the work: it fails.
+    """
+    facts = facts_of(invariant.condition)
+    zones = {z.name for z in model.task.zones}
+    return any(len(f.words) > 1 or zones & {str(w) for w in f.words} for f in facts)
+
+
+def violation(
+    model: MonitoredPhases, broken: tuple[float | None, ...], now: float, *, safety: bool
+) -> str:
+    """What an invariant that has been broken for as long as counts says, or empty.
+
+    Args:
+        model: The task.
+        broken: Since when each invariant has been broken.
+        now: Seconds.
+        safety: Of those of safety, or of the others.
+    """
+    for invariant, since in zip(model.task.invariants, broken, strict=True):
+        lasted = since is not None and now - since >= patience(model, invariant)
+        if lasted and is_of_safety(model, invariant) is safety:
+            return f"`{invariant}` does not hold"
+    return ""
+
+
 def patience(model: MonitoredPhases, invariant: Invariant) -> float:
     """For how long an invariant must be broken to count, seconds."""
     if invariant.lasting is None:

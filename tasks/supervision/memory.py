@@ -28,6 +28,7 @@ class TaskMemory:
         activity: Whether it is going on, where several tasks are given.
         gain: The evidence that it is, of each second, as it was seen last.
         inferred: Seconds of the step in which it was last inferred whether it is.
+        violated: What must never be of one body and was, by which the task has failed; or empty.
     """
 
     time: float
@@ -43,3 +44,4 @@ class TaskMemory:
     activity: TaskActivity = ALONE
     gain: float = 0.0
     inferred: float = 0.0
+    violated: str = ""
