@@ -142,7 +142,9 @@ def _shading(
                 for j in range(i + 1):
                     products[i, j] += h[i] * h[j]
     total = squares - grey * grey / max(count, 1.0)
-    if count < _FEWEST or total < count:  # of a tone within one grey value there is nothing to explain
+    if (
+        count < _FEWEST or total < count
+    ):  # of a tone within one grey value there is nothing to explain
         return 0.0
     for i in range(HARMONICS):
         along[i] -= sums[i] * grey / count
@@ -223,7 +225,11 @@ def climb(
         mesh's radius takes at its centre.
     """
     side = len(seen[0])
-    scratch = (np.empty((len(mesh[0]), 3)), np.empty((side, side)), np.empty((side, side), np.int32))
+    scratch = (
+        np.empty((len(mesh[0]), 3)),
+        np.empty((side, side)),
+        np.empty((side, side), np.int32),
+    )
     turn = start.copy()
     overlap, explained, scale = fit_of(mesh, seen, turn, distance, scratch)
     for step in steps:

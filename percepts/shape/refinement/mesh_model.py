@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import DatabaseError
 
 MOST_FACES = 2500
-"""A mesh of more triangles is simplified: at the size at which poses are fitted nobody sees the difference."""
+"""A mesh of more triangles is simplified: at the size at which poses are fitted nobody can tell."""
 
 _CELLS = 40
 

@@ -135,9 +135,9 @@ class PoseRefiner:
             fits = self._search(frame, best.name, picture, starts, FINE)
             if fits and fits[0].overlap >= before.overlap - s.lost:
                 return self._remembered(key, before.time, before.overlap, fits, numbers, best)
-        wide = _with_directions([h for h, _ in [*own, *more(best.name)]])[: s.starts]
-        starts = [orientations(h.direction, h.rotation) for h in wide]
-        numbers = tuple(h.view for h in wide)
+        wide = _orientations([h for h, _ in [*own, *more(best.name)]])[: s.starts]
+        starts = [turn for _, turn in wide]
+        numbers = tuple(view for view, _ in wide)
         if before is not None:
             starts, numbers = [*before.orientations, *starts], (*before.views, *numbers)
         fits = self._search(frame, best.name, picture, starts, COARSE)
@@ -188,9 +188,11 @@ class PoseRefiner:
         ]
 
 
-def _with_directions(said: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Each view once, those alone that tell an orientation."""
+def _orientations(said: Sequence[Hypothesis]) -> list[tuple[int, NDArray[np.float64]]]:
+    """(view, orientation) of each view once, those alone that tell an orientation."""
     once = {
-        (h.view, h.direction): h for h in said if h.direction is not None and h.rotation is not None
+        (h.view, h.direction): (h.view, orientations(h.direction, h.rotation))
+        for h in said
+        if h.direction is not None and h.rotation is not None
     }
     return list(once.values())

@@ -44,12 +44,13 @@ def region_picture(frame: Frame, region: Region) -> RegionPicture:
     # Only what is needed is converted: the square's surroundings at most.
     left, top = max(0, x - pad), max(0, y - pad)
     crop = frame.image[top : y + h + pad, left : x + w + pad]
-    grey = cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY).astype(np.float32)
+    grey = np.asarray(cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY), np.float32)
     mask = np.zeros(grey.shape, dtype=np.float32)
     mask[y - top : y - top + h, x - left : x - left + w] = region.mask
     pixel = side / SIDE
     if pixel > 1.0:
-        mask, grey = (cv2.GaussianBlur(part, (0, 0), 0.35 * pixel) for part in (mask, grey))
+        mask = np.asarray(cv2.GaussianBlur(mask, (0, 0), 0.35 * pixel), np.float32)
+        grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 0.35 * pixel), np.float32)
     centre = np.array([x - left + w / 2 - 0.5, y - top + h / 2 - 0.5])
     shift = (SIDE - 1) / 2 - centre / pixel
     warp = np.array([[1 / pixel, 0.0, shift[0]], [0.0, 1 / pixel, shift[1]]])
