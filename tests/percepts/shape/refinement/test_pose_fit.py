@@ -55,7 +55,8 @@ def apart_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 def nearby(true: NDArray[np.float64], away: float, seed: int) -> NDArray[np.float64]:
     axis = np.random.default_rng(seed).normal(size=3)
-    return Rotation.from_rotvec(axis / np.linalg.norm(axis) * away).as_matrix() @ true
+    turn = Rotation.from_rotvec(axis / np.linalg.norm(axis) * away).as_matrix()
+    return np.asarray(turn @ true)
 
 
 def test_poses_are_found_again_from_nearby() -> None:
