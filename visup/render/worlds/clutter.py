@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from visup.render.meshes.solids import Colour, Solid, ball, box, cone, join, lathe
 from visup.render.worlds.motion import along, posed, still
@@ -18,7 +18,11 @@ Doubles = NDArray[np.float64]
 def cup(r: float, colour: Colour) -> Solid:
     """An open cup standing at z = 0."""
     h = 2.2 * r
-    return lathe([(0, 0), (0.75 * r, 0), (r, h), (0.9 * r, h), (0.68 * r, 0.08 * h), (0, 0.08 * h)], colour, 24)
+    return lathe(
+        [(0, 0), (0.75 * r, 0), (r, h), (0.9 * r, h), (0.68 * r, 0.08 * h), (0, 0.08 * h)],
+        colour,
+        24,
+    )
 
 
 def bottle(r: float, colour: Colour) -> Solid:
@@ -84,13 +88,12 @@ def scattered(
     return found
 
 
-def corridor(start: Sequence[float], end: Sequence[float], width: float) -> list[tuple[float, float, float]]:
-    """Discs that keep a straight way free."""
-    steps = max(int(np.hypot(end[0] - start[0], end[1] - start[1]) / (width / 2)), 1)
-    return [
-        (float(start[0] + u * (end[0] - start[0])), float(start[1] + u * (end[1] - start[1])), width / 2)
-        for u in np.linspace(0, 1, steps + 1)
-    ]
+def corridor(start: ArrayLike, end: ArrayLike, width: float) -> list[tuple[float, float, float]]:
+    """Discs (x, y, radius) that keep a straight way free."""
+    a, b = np.asarray(start, float)[:2], np.asarray(end, float)[:2]
+    steps = max(int(np.linalg.norm(b - a) / (width / 2)), 1)
+    points = a + np.linspace(0, 1, steps + 1)[:, None] * (b - a)
+    return [(float(x), float(y), width / 2) for x, y in points]
 
 
 def random_part(rng: np.random.Generator, half: float, colour: Colour) -> tuple[Solid, float]:
@@ -107,7 +110,14 @@ def random_part(rng: np.random.Generator, half: float, colour: Colour) -> tuple[
         return join(low, knob), tall
     if style == 3:
         tall = 1.8 * half
-        profile = [(0, 0), (0.75 * half, 0), (half, tall), (0.85 * half, tall), (0.7 * half, 0.1 * tall), (0, 0.1 * tall)]
+        profile = [
+            (0, 0),
+            (0.75 * half, 0),
+            (half, tall),
+            (0.85 * half, tall),
+            (0.7 * half, 0.1 * tall),
+            (0, 0.1 * tall),
+        ]
         return lathe(profile, colour, 24), tall
     sides = lathe([(0, 0), (half, 0), (half, tall), (0, tall)], colour, 6)
     return sides, tall
@@ -148,7 +158,7 @@ def walking(
     swing = 0.5 * np.clip(speed / 1.2, 0, 1) * np.sin(2 * np.pi * steps / 1.3)
     ground = np.column_stack([way, 0.02 * np.abs(np.sin(2 * np.pi * steps / 1.3))])
     side = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(heading))])
-    hip = ground + [0, 0, 0.88]
+    hip = ground + np.array([0, 0, 0.88])
     surface = Surface("grain", 0.3, 0.15, seed_of(rng))
     return [
         Thing(name, trunk, posed(ground, heading), label, surface),

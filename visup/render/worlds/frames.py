@@ -98,7 +98,12 @@ class WorldRenderer:
         return np.asarray(cv2.GaussianBlur(hidden, (0, 0), softness) if softness else hidden)
 
     def _draw(
-        self, plate: Plate, scene: PlacedThings, light: Floats, window: NDArray[np.bool_], index: int
+        self,
+        plate: Plate,
+        scene: PlacedThings,
+        light: Floats,
+        window: NDArray[np.bool_],
+        index: int,
     ) -> NDArray[np.uint8]:
         """Draw what moves over what rests, into `light`; returns the (H, W) mask."""
         width, height = self.world.size

@@ -18,7 +18,15 @@ def wheels(length: float, width: float, radius: float) -> Solid:
     for x in (-0.32 * length, 0.32 * length):
         for side in (-1, 1):
             y = side * width / 2
-            found.append(cone((x, y - 0.06 * width, radius), (x, y + 0.06 * width, radius), radius, None, BLACK))
+            found.append(
+                cone(
+                    (x, y - 0.06 * width, radius),
+                    (x, y + 0.06 * width, radius),
+                    radius,
+                    None,
+                    BLACK,
+                )
+            )
     return join(*found)
 
 
@@ -33,7 +41,13 @@ def vehicle(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
     if style == 0:
         extra = [
             box((0.45 * length, 0.8 * width, 0.22), (-0.12 * length, 0, high + 0.11), second),
-            cone((-0.35 * length, 0.2 * width, high), (-0.35 * length, 0.2 * width, high + 0.45), 0.02, None, STEEL),
+            cone(
+                (-0.35 * length, 0.2 * width, high),
+                (-0.35 * length, 0.2 * width, high + 0.45),
+                0.02,
+                None,
+                STEEL,
+            ),
             box((0.12, 0.16, 0.1), (0.3 * length, 0, high + 0.05), BLACK),
         ]
     elif style == 1:
@@ -52,7 +66,13 @@ def vehicle(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
             box((0.06, 0.1 * width, 0.7), (0.36 * length, 0.3 * width, high + 0.3), STEEL),
             box((0.06, 0.1 * width, 0.7), (0.36 * length, -0.3 * width, high + 0.3), STEEL),
             box((0.3 * length, 0.7 * width, 0.3), (-0.3 * length, 0, high + 0.15), second),
-            cone((-0.3 * length, 0, high + 0.3), (-0.3 * length, 0, high + 0.42), 0.06, None, (0.9, 0.5, 0.1)),
+            cone(
+                (-0.3 * length, 0, high + 0.3),
+                (-0.3 * length, 0, high + 0.42),
+                0.06,
+                None,
+                (0.9, 0.5, 0.1),
+            ),
         ]
     return join(body, wheels(length, width, r), *extra), length
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ def clock(frames: int) -> Doubles:
     return np.arange(frames) / FPS
 
 
-def eased(at: Doubles, keys: Sequence[tuple[float, ArrayLike]]) -> Doubles:
+def eased(at: Doubles, keys: Sequence[tuple[float, Any]]) -> Doubles:
     """Values between keyframes, each reached with no speed (minimum jerk); held outside.
 
     Args:
@@ -42,7 +43,10 @@ def eased(at: Doubles, keys: Sequence[tuple[float, ArrayLike]]) -> Doubles:
 
 
 def cruised(at: Doubles, begin: float, end: float, ramp: float = 0.2) -> Doubles:
-    """(F,) shares of a way, 0 to 1: speeds up, goes evenly, slows down (`ramp`: share of the time for each)."""
+    """(F,) shares of a way, 0 to 1: speeds up, goes evenly, slows down.
+
+    `ramp` is the share of the time that each of speeding up and slowing down takes.
+    """
     u = np.clip((at - begin) / (end - begin), 0, 1)
     speed = 1 / (1 - ramp)
     up, down = speed * u**2 / (2 * ramp), 1 - speed * (1 - u) ** 2 / (2 * ramp)

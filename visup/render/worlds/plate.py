@@ -7,6 +7,7 @@ homography; only what moves has to be drawn anew.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -49,12 +50,13 @@ class Plate:
         """
         if matrix is None:
             return self
-        smooth, sharp = (
-            lambda image, how=how: cv2.warpPerspective(
-                image, matrix, size, flags=how | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE
-            )
-            for how in (cv2.INTER_LINEAR, cv2.INTER_NEAREST)
-        )
+
+        def smooth(image: Any) -> Any:
+            return _warp(image, matrix, size, cv2.INTER_LINEAR)
+
+        def sharp(image: Any) -> Any:
+            return _warp(image, matrix, size, cv2.INTER_NEAREST)
+
         return Plate(
             smooth(self.shade),
             smooth(self.lamp),
@@ -63,6 +65,11 @@ class Plate:
             {label: sharp(seen) for label, seen in self.amodal.items()},
             sharp(self.water),
         )
+
+
+def _warp(image: Any, matrix: Any, size: tuple[int, int], how: int) -> Any:
+    flags = how | cv2.WARP_INVERSE_MAP
+    return cv2.warpPerspective(image, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
 
 class PlateCamera:
@@ -87,7 +94,9 @@ class PlateCamera:
     def directions(self, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
         """(H * W, 3) world directions through the plate's pixels, shifted by parts of a pixel."""
         y, x = np.mgrid[: self.size[1], : self.size[0]]
-        flat = np.column_stack([x.ravel() + shift[0], y.ravel() + shift[1]]) / self.focal + self.origin
+        flat = (
+            np.column_stack([x.ravel() + shift[0], y.ravel() + shift[1]]) / self.focal + self.origin
+        )
         own = np.column_stack([flat, np.ones(len(flat))])
         return np.asarray(own @ self.rotation.T, np.float32)
 
@@ -97,7 +106,11 @@ class PlateCamera:
             return None
         focal = vp.focal_px(self.view, self.height, float(self.view.zoom[index]))
         lens = np.array(
-            [[1 / focal, 0, -(self.width - 1) / 2 / focal], [0, 1 / focal, -(self.height - 1) / 2 / focal], [0, 0, 1]]
+            [
+                [1 / focal, 0, -(self.width - 1) / 2 / focal],
+                [0, 1 / focal, -(self.height - 1) / 2 / focal],
+                [0, 0, 1],
+            ]
         )
         place = np.array(
             [
@@ -113,7 +126,9 @@ class PlateCamera:
         focal = vp.focal_px(self.view, self.height, float(self.view.zoom[index]))
         x, y = self.width - 1, self.height - 1
         at = np.array([(a * x, b * y) for a in (0, 0.5, 1) for b in (0, 0.5, 1)], float)
-        turned = vp.rays(self.width, self.height, focal, at).astype(float) @ vp.turn(self.view, index).T
+        turned = (
+            vp.rays(self.width, self.height, focal, at).astype(float) @ vp.turn(self.view, index).T
+        )
         return np.asarray(turned[:, :2] / turned[:, 2:])
 
 

@@ -52,9 +52,7 @@ class RobotDesign:
     surface: Surface
 
 
-def random_robot(
-    rng: np.random.Generator, foot: tuple[float, float], reach: float
-) -> RobotDesign:
+def random_robot(rng: np.random.Generator, foot: tuple[float, float], reach: float) -> RobotDesign:
     """An arm that reaches as far as asked for, metres from its foot."""
     upper = reach * rng.uniform(0.58, 0.68)
     colours: tuple[Colour, ...] = (
@@ -66,7 +64,12 @@ def random_robot(
         (0.7, 0.12, 0.1),
         (0.35, 0.55, 0.4),
     )
-    joints: tuple[Colour, ...] = ((0.25, 0.25, 0.28), (0.5, 0.5, 0.53), (0.1, 0.1, 0.12), (0.7, 0.7, 0.72))
+    joints: tuple[Colour, ...] = (
+        (0.25, 0.25, 0.28),
+        (0.5, 0.5, 0.53),
+        (0.1, 0.1, 0.12),
+        (0.7, 0.7, 0.72),
+    )
     return RobotDesign(
         foot,
         float(rng.uniform(0.22, 0.34)),
@@ -140,7 +143,12 @@ def robot_things(
     links = [
         part("robot_base", _base(design), still(*design.foot), 0),
         part(arm, _turret(design), posed(foot, yaw), arm_label),
-        part(arm, _link(design, design.upper, 1.15), posed(np.tile(foot, (len(yaw), 1)), yaw, -first), arm_label),
+        part(
+            arm,
+            _link(design, design.upper, 1.15),
+            posed(np.tile(foot, (len(yaw), 1)), yaw, -first),
+            arm_label,
+        ),
         part(arm, _link(design, design.lower, 0.9), posed(elbow, yaw, -second), arm_label),
     ]
     hand = hand_poses(design, course)

@@ -157,7 +157,9 @@ def hall(rng: np.random.Generator, depth: float) -> tuple[Thing, ...]:
     while x < depth * 1.2:
         size = rng.uniform(0.6, 1.6, 3) * [1, 0.7, 1]
         if rng.random() < 0.65:
-            solid: Solid = box(size, (0, 0, size[2] / 2), pick_colour(rng, bool(rng.random() < 0.6)))
+            solid: Solid = box(
+                size, (0, 0, size[2] / 2), pick_colour(rng, bool(rng.random() < 0.6))
+            )
             surface = Surface("grain", 0.4, 0.2, seed_of(rng))
             at = still(x, depth - size[1] / 2 - rng.uniform(0.05, 0.4), 0, rng.uniform(-0.15, 0.15))
             found.append(Thing("stock", solid, at, 0, surface))
@@ -174,10 +176,18 @@ def meadow(rng: np.random.Generator) -> tuple[Thing, ...]:
         (0.6, 0.55, 0.42),
         (0.3, 0.3, 0.32),
     )
-    surface = Surface("speckles", float(rng.uniform(0.6, 2.5)), float(rng.uniform(0.25, 0.5)), seed_of(rng))
+    surface = Surface(
+        "speckles", float(rng.uniform(0.6, 2.5)), float(rng.uniform(0.25, 0.5)), seed_of(rng)
+    )
     ground = slab("ground", (400, 400, 0.1), (0, 0, -0.05), grounds[rng.integers(5)], surface)
     if rng.random() < 0.5:
         return (ground,)
     path = Surface("speckles", 0.5, 0.2, seed_of(rng))
-    strip = slab("path", (400, float(rng.uniform(1, 3)), 0.02), (0, float(rng.uniform(-6, -3)), 0.0), (0.5, 0.47, 0.42), path)
+    strip = slab(
+        "path",
+        (400, float(rng.uniform(1, 3)), 0.02),
+        (0, float(rng.uniform(-6, -3)), 0.0),
+        (0.5, 0.47, 0.42),
+        path,
+    )
     return ground, strip

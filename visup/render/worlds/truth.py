@@ -45,7 +45,9 @@ def world_truth(world: World, frames: Sequence[Mapping[str, Any]]) -> dict[str, 
         "labels": world.labels,
         "roles": dict(world.actors),
         "tolerance_s": TOLERANCE_S,
-        "events": [e for name in world.labels if _ever(name, frames) for e in presence_events(name, frames)],
+        "events": [
+            e for name in world.labels if _ever(name, frames) for e in presence_events(name, frames)
+        ],
         "boxes": [_boxes(world, f) for f in frames[::BOX_EVERY]],
         "frames": list(frames),
     }
@@ -102,7 +104,7 @@ def _seen(record: Mapping[str, Any], size: tuple[int, int]) -> float:
         return 0.0
     x, y, w, h = record["bbox"]
     cut = x <= 0 or y <= 0 or x + w >= size[0] or y + h >= size[1]
-    return visible * (visible / max(record["amodal_px"], 1)) ** 2 * (0.5 if cut else 1.0)
+    return visible * (visible / max(float(record["amodal_px"]), 1.0)) ** 2 * (0.5 if cut else 1.0)
 
 
 def _ever(name: str, frames: Sequence[Mapping[str, Any]]) -> bool:

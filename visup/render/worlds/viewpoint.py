@@ -22,13 +22,14 @@ def base_rotation(view: Viewpoint) -> Doubles:
     ahead = np.subtract(view.look_at, view.position)
     steep = abs(ahead[2]) > 0.995 * float(np.linalg.norm(ahead))
     up = np.array([0.0, 1.0, 0.0]) if steep else UP
-    return look_at(np.asarray(view.position), np.asarray(view.look_at), up).as_matrix()
+    turned = look_at(np.asarray(view.position), np.asarray(view.look_at), up)
+    return np.asarray(turned.as_matrix(), float)
 
 
 def turn(view: Viewpoint, index: int) -> Doubles:
     """(3, 3) from the camera's frame in a frame of the clip to the undisturbed one's."""
     pan, tilt, roll = np.radians(view.turns[index])
-    return Rotation.from_euler("YXZ", [pan, tilt, roll]).as_matrix()
+    return np.asarray(Rotation.from_euler("YXZ", [pan, tilt, roll]).as_matrix(), float)
 
 
 def focal_px(view: Viewpoint, height: int, zoom: float = 1.0) -> float:
@@ -37,7 +38,7 @@ def focal_px(view: Viewpoint, height: int, zoom: float = 1.0) -> float:
 
 
 def rays(width: int, height: int, focal: float, at: Doubles | None = None) -> Floats:
-    """(N, 3) float32 directions in the camera's frame, z = 1, through pixels or points (x, y) of the picture."""
+    """(N, 3) float32 in the camera's frame, z = 1, through all pixels or through points (x, y)."""
     if at is None:
         y, x = np.mgrid[:height, :width]
         at = np.column_stack([x.ravel(), y.ravel()]).astype(float)
@@ -58,16 +59,11 @@ def shows(view: Viewpoint, points: ArrayLike, size: tuple[int, int], margin: flo
     return bool(((share > margin) & (share < 1 - margin)).all())
 
 
-def steady(
-    position: tuple[float, float, float],
-    aim: tuple[float, float, float],
-    fov_vertical_deg: float,
-    frames: int,
-) -> Viewpoint:
-    """A camera on a tripod."""
-    return Viewpoint(
-        position, aim, fov_vertical_deg, np.zeros((frames, 3)), np.ones(frames), "fixed"
-    )
+def steady(position: ArrayLike, aim: ArrayLike, fov_vertical_deg: float, frames: int) -> Viewpoint:
+    """A camera on a tripod; position and aim are (3,), metres."""
+    (x, y, z), (a, b, c) = np.asarray(position, float).tolist(), np.asarray(aim, float).tolist()
+    zero, one = np.zeros((frames, 3)), np.ones(frames)
+    return Viewpoint((x, y, z), (a, b, c), fov_vertical_deg, zero, one, "fixed")
 
 
 def disturbed(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoint:

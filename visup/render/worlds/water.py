@@ -28,14 +28,18 @@ def radiance(
     x, y = points[:, 0], points[:, 1]
     rough = np.zeros(len(points), np.float32)
     for number, (kx, ky, speed, steep) in enumerate(water.waves.astype(np.float32)):
-        rough += steep * np.sin(kx * x + ky * y - np.float32(speed * time) + np.float32(2.4 * number))
+        rough += steep * np.sin(
+            kx * x + ky * y - np.float32(speed * time) + np.float32(2.4 * number)
+        )
     away = np.asarray(eye, np.float32) - points
     distance = np.linalg.norm(away, axis=1)
     steepness = away[:, 2] / np.maximum(distance, 1e-6)
     rough /= 1 + (distance / SMOOTH_AT) ** 2
     # Schlick's approximation, with the share that water mirrors at right angles.
     mirror = np.clip(0.04 + 0.96 * (1 - np.clip(steepness, 0, 1)) ** 4 + rough, 0, 1)[:, None]
-    glow = np.asarray(heaven.horizon, np.float32) * 0.75 + np.asarray(heaven.zenith, np.float32) * 0.25
+    glow = (
+        np.asarray(heaven.horizon, np.float32) * 0.75 + np.asarray(heaven.zenith, np.float32) * 0.25
+    )
     deep = np.asarray(water.colour, np.float32) * (1 + 1.5 * rough[:, None])
     return np.asarray((1 - mirror) * deep + mirror * glow, np.float32)
 

@@ -159,7 +159,7 @@ class StageSpan:
         stage: Its name in the task file.
         from_s: When it began.
         to_s: When it was over, or when the clip ends.
-        outcome: `complete`, `failing`, `unsafe`, or `progressing` when the clip ends before it does.
+        outcome: `complete`, `failing` or `unsafe`; `complete` as well where the clip ends before it does.
     """
 
     stage: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,13 +40,17 @@ def write_world(
         OutputError: The folder cannot be written, or something is in it already.
     """
     _make_folder(out)
+    # Outlines name the clip that they are drawn in by its folder.
+    world = replace(world, name=out.resolve().name)
     renderer = WorldRenderer(world)
     frames, masks = [], []
     with ClipWriter(out / "video.mp4", FPS, world.size) as video:
         for index in range(world.frames):
             picture = renderer.picture(index)
             video.write(picture.image)
-            _write(out / "masks" / f"{index:05d}.png", cv2.imencode(".png", picture.mask)[1].tobytes())
+            _write(
+                out / "masks" / f"{index:05d}.png", cv2.imencode(".png", picture.mask)[1].tobytes()
+            )
             frames.append(frame_truth(picture, world.labels))
             masks.append(picture.mask)
             if progress is not None:

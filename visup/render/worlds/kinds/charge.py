@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from visup.render.worlds import clutter, machines
 from visup.render.worlds.kinds.kind import cut_short, frames_until, random_view, spans
-from visup.render.worlds.motion import along, bend, clock, cruised, eased, frame_at, posed, still
+from visup.render.worlds.motion import along, bend, clock, cruised, eased, frame_at, posed
 from visup.render.worlds.scenery import (
     hall,
     meadow,
@@ -114,7 +114,13 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     surface = Surface("grain", 0.3, float(rng.uniform(0.05, 0.2)), seed_of(rng))
     posts = _post_poses(layout, drive, outcome)
     things = [
-        Thing("vehicle", solid, posed(np.column_stack([drive.at, np.zeros(len(drive.at))]), drive.heading), VEHICLE, surface),
+        Thing(
+            "vehicle",
+            solid,
+            posed(np.column_stack([drive.at, np.zeros(len(drive.at))]), drive.heading),
+            VEHICLE,
+            surface,
+        ),
         Thing("charger", post, posts, CHARGER, surface),
         *_surroundings(rng, layout, post, frames),
     ]
@@ -156,7 +162,9 @@ def _layout(
 def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
     side, high = rng.uniform(-0.6, 0.6), np.radians(rng.uniform(18, 50))
     far = float(rng.uniform(4.5, 6.2))
-    position = far * np.array([np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)])
+    position = far * np.array(
+        [np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)]
+    )
     aim = np.array([0.0, 0.0, 0.4])
     return random_view(rng, position + aim, aim, float(rng.uniform(36, 44)), frames)
 
@@ -246,7 +254,7 @@ def _post_poses(layout: ChargeLayout, drive: Drive, outcome: str) -> Poses:
     """The charger, which faces the vehicle; it gives way when it is rammed."""
     yaw = float(np.arctan2(-layout.ahead[1], -layout.ahead[0]))
     if outcome != "ram":
-        return still(*layout.charger, 0, yaw)
+        return posed([*layout.charger, 0.0], yaw)
     past = np.clip((drive.at - layout.dock) @ layout.ahead, 0, None)
     at = layout.charger + past[:, None] * layout.ahead
     tip = np.clip(past / 0.5, 0, 1) * 0.12
@@ -257,7 +265,7 @@ def _course(outcome: str, drive: Drive, begin: float, end: float, hold: int) -> 
     """What is true of it."""
     touch = (Contact("vehicle", "charger", drive.docked, min(drive.off, end)),)
     stages: tuple[StageSpan, ...] = spans(("approach", begin, drive.near))
-    moves = (Motion("vehicle", begin, drive.near),)
+    moves: tuple[Motion, ...] = (Motion("vehicle", begin, drive.near),)
     docked = ("docked", drive.near, min(drive.near + hold, end))
     if outcome in ("ok", "in_progress"):
         return Course(outcome, "succeeded", (*stages, *spans(docked)), (), touch, moves)
@@ -286,7 +294,9 @@ def _surroundings(
     indoors = rng.random() < 0.6
     found = list(hall(rng, float(rng.uniform(2.6, 5.0))) if indoors else meadow(rng))
     taken = clutter.corridor(layout.start, layout.dock, 1.6)
-    taken += clutter.corridor(layout.charger - 2 * layout.ahead, layout.charger + 3 * layout.ahead, 2.6)
+    taken += clutter.corridor(
+        layout.charger - 2 * layout.ahead, layout.charger + 3 * layout.ahead, 2.6
+    )
     found += clutter.scattered(rng, int(rng.integers(0, 5)), 0.2, (-3.5, 3.5, -2.5, 2.2), taken)
     if rng.random() < 0.2:
         y = float(rng.uniform(1.7, 2.3))

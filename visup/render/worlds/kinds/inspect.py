@@ -40,7 +40,18 @@ from visup.render.worlds.world import (
 
 OUTCOMES = ("ok", "touch", "leave", "in_progress")
 INSPECTOR, STATION = 2, 3
-STATUES = ("dog", "horse", "camel", "pig", "teapot", "chair", "lamp", "dish", "astronaut", "espresso")
+STATUES = (
+    "dog",
+    "horse",
+    "camel",
+    "pig",
+    "teapot",
+    "chair",
+    "lamp",
+    "dish",
+    "astronaut",
+    "espresso",
+)
 HOLD_S = 5
 Doubles = NDArray[np.float64]
 
@@ -106,7 +117,9 @@ def _station(rng: np.random.Generator) -> tuple[Solid, float]:
     size = float(rng.uniform(1.6, 2.4)) / float((high - low).max())
     middle = (low + high) / 2
     foot = float(rng.uniform(0.1, 0.5))
-    statue = solid.moved(by=(-middle[0], -middle[1], -low[2])).moved(scale=size).moved(by=(0, 0, foot))
+    statue = (
+        solid.moved(by=(-middle[0], -middle[1], -low[2])).moved(scale=size).moved(by=(0, 0, foot))
+    )
     if rng.random() < 0.7:
         statue = statue.painted(stone)
     r = float(np.linalg.norm(statue.vertices[:, :2], axis=1).max()) * 0.75
@@ -118,8 +131,14 @@ def _tower(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
     high, r = float(rng.uniform(1.4, 2.2)), float(rng.uniform(0.35, 0.6))
     top = pick_colour(rng)
     if rng.random() < 0.5:
-        return join(cone((0, 0, 0), (0, 0, high), r, 0.7 * r, colour), cone((0, 0, high), (0, 0, high + 0.4), 0.9 * r, 0.0, top)), high + 0.4
-    return join(box((1.6 * r, 1.6 * r, high), (0, 0, high / 2), colour), box((2 * r, 2 * r, 0.2), (0, 0, high + 0.1), top)), high + 0.2
+        return join(
+            cone((0, 0, 0), (0, 0, high), r, 0.7 * r, colour),
+            cone((0, 0, high), (0, 0, high + 0.4), 0.9 * r, 0.0, top),
+        ), high + 0.4
+    return join(
+        box((1.6 * r, 1.6 * r, high), (0, 0, high / 2), colour),
+        box((2 * r, 2 * r, 0.2), (0, 0, high + 0.1), top),
+    ), high + 0.2
 
 
 def _craft(
@@ -127,7 +146,9 @@ def _craft(
 ) -> tuple[Solid, float]:
     """The inspector and the height at which it goes."""
     if flies:
-        return machines.drone(rng, colour, float(rng.uniform(0.6, 0.9))), height * float(rng.uniform(0.35, 0.75))
+        return machines.drone(rng, colour, float(rng.uniform(0.6, 0.9))), height * float(
+            rng.uniform(0.35, 0.75)
+        )
     return machines.vehicle(rng, colour)[0].moved(scale=0.75), 0.0
 
 
@@ -146,7 +167,7 @@ def _view(rng: np.random.Generator, radius: float, height: float, frames: int) -
     way = np.array([np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)])
     aim = np.array([0.0, 0.0, 0.3 * height])
     place = far * way + aim
-    view = steady((float(place[0]), float(place[1]), float(place[2])), (0.0, 0.0, float(aim[2])), float(rng.uniform(38, 44)), frames)
+    view = steady(place, aim, float(rng.uniform(38, 44)), frames)
     return disturbed(view, rng, str(rng.choice(["fixed", "fixed", "shaking", "panning"])))
 
 
@@ -183,15 +204,23 @@ def _flight(
 
 def _first_hit(station: Solid, craft: Solid, poses: Poses) -> int:
     """The first frame in which the craft is within 4 cm of the station."""
-    # Long faces have their corners far apart: middles and edges stand for what lies between.
-    corners = station.vertices[station.faces]
-    weights = np.random.default_rng(0).dirichlet((1, 1, 1), 40)
-    tree = cKDTree(np.einsum("sk,fkd->sfd", weights, corners).reshape(-1, 3))
+    tree = cKDTree(_scattered_over(station, 20_000))
+    own = _scattered_over(craft, 500)
     for index, pose in enumerate(poses):
-        points = craft.vertices @ pose[:3, :3].T + pose[:3, 3]
+        points = own @ pose[:3, :3].T + pose[:3, 3]
         if tree.query(points)[0].min() < 0.04:
             return index
     return len(poses) - 1
+
+
+def _scattered_over(solid: Solid, count: int) -> Doubles:
+    """(count, 3) points spread evenly over the faces of a solid."""
+    rng = np.random.default_rng(0)
+    corners = solid.vertices[solid.faces]
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    chosen = corners[rng.choice(len(area), count, p=area / area.sum())]
+    return np.asarray(np.einsum("nk,nkd->nd", rng.dirichlet((1, 1, 1), count), chosen))
 
 
 def _stopped(poses: Poses, hit: int, level: float) -> tuple[Poses, float]:
@@ -204,21 +233,18 @@ def _stopped(poses: Poses, hit: int, level: float) -> tuple[Poses, float]:
     return out, hit / FPS
 
 
-def _gaps(
-    view: Viewpoint, station: Solid, standing: Poses, craft: Solid, poses: Poses
-) -> Doubles:
+def _gaps(view: Viewpoint, station: Solid, standing: Poses, craft: Solid, poses: Poses) -> Doubles:
     """(F,) pixels between the outlines of both, about, as the undisturbed camera sees them."""
-    still_points = projected(view, station.vertices @ standing[0, :3, :3].T, SIZE)
+    still_points = projected(view, _scattered_over(station, 600) @ standing[0, :3, :3].T, SIZE)
+    own = _scattered_over(craft, 200)
     found = []
     for pose in poses:
-        points = projected(view, craft.vertices @ pose[:3, :3].T + pose[:3, 3], SIZE)
-        found.append(cdist(points[::3], still_points[::3]).min())
+        points = projected(view, own @ pose[:3, :3].T + pose[:3, 3], SIZE)
+        found.append(cdist(points, still_points).min())
     return np.array(found)
 
 
-def _course(
-    times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float
-) -> tuple[Course, int]:
+def _course(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> tuple[Course, int]:
     """What is true, and the range in pixels that its user chose."""
     t = clock(len(gaps))
     round_about = (t >= times.arrive) & (t <= times.leave)
@@ -236,7 +262,9 @@ def _course(
     if outcome == "leave":
         stages = spans(approach, ("fly_around", begin, over, "failing"))
         return Course(outcome, "failed", stages, (), (), moves), limit
-    stages = spans(approach, ("fly_around", begin, times.leave), ("retreat", times.leave, times.end))
+    stages = spans(
+        approach, ("fly_around", begin, times.leave), ("retreat", times.leave, times.end)
+    )
     return Course(outcome, "succeeded", stages, (), (), moves), limit
 
 
@@ -245,4 +273,6 @@ def _surroundings(rng: np.random.Generator, radius: float) -> list[Thing]:
     found = list(hall(rng, radius * 3.5) if indoors else meadow(rng))
     side = 2.6 * radius
     free = [(0.0, 0.0, 1.8 * radius)]
-    return found + clutter.scattered(rng, int(rng.integers(0, 6)), 0.2, (-side, side, -side, side), free)
+    return found + clutter.scattered(
+        rng, int(rng.integers(0, 6)), 0.2, (-side, side, -side, side), free
+    )

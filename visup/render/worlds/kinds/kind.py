@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from visup.render.worlds.viewpoint import disturbed, steady
 from visup.render.worlds.world import FPS, Course, StageSpan, Viewpoint, World
@@ -34,16 +35,14 @@ class WorldKind:
 
 def random_view(
     rng: np.random.Generator,
-    position: Sequence[float],
-    aim: Sequence[float],
+    position: ArrayLike,
+    aim: ArrayLike,
     fov_vertical_deg: float,
     frames: int,
 ) -> Viewpoint:
     """A camera held in one of the ways of `STYLES`."""
-    here = (float(position[0]), float(position[1]), float(position[2]))
-    there = (float(aim[0]), float(aim[1]), float(aim[2]))
     style = str(rng.choice(STYLES))
-    return disturbed(steady(here, there, fov_vertical_deg, frames), rng, style)
+    return disturbed(steady(position, aim, fov_vertical_deg, frames), rng, style)
 
 
 def cut_short(course: Course, end_s: float) -> Course:
@@ -54,13 +53,15 @@ def cut_short(course: Course, end_s: float) -> Course:
         end_s: When the clip ends.
     """
     begun = [s for s in course.stages if s.from_s < end_s]
-    last = replace(begun[-1], to_s=end_s, outcome="progressing")
+    last = replace(begun[-1], to_s=end_s)
     return replace(
         course,
         verdict="in_progress",
         accept=("in_progress",),
         stages=(*begun[:-1], last),
-        contacts=tuple(replace(c, to_s=min(c.to_s, end_s)) for c in course.contacts if c.from_s < end_s),
+        contacts=tuple(
+            replace(c, to_s=min(c.to_s, end_s)) for c in course.contacts if c.from_s < end_s
+        ),
         moves=tuple(replace(m, to_s=min(m.to_s, end_s)) for m in course.moves if m.from_s < end_s),
     )
 

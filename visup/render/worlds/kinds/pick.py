@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
-from visup.render.meshes.solids import Colour, Solid, box, cone, join, lathe
+from visup.render.meshes.solids import Colour, Solid, box, join, lathe
 from visup.render.worlds import clutter
 from visup.render.worlds.kinds import pick_tasks
 from visup.render.worlds.kinds.kind import cut_short, frames_until, random_view
@@ -158,7 +158,11 @@ def tip_course(
         (t.arrive, [*aside, grip]),
     ]
     if outcome == "retry":
-        keys += [(t.slip, [*aside, grip]), (t.again, [*aside, above]), (t.close - 0.3, [*aside, grip])]
+        keys += [
+            (t.slip, [*aside, grip]),
+            (t.again, [*aside, above]),
+            (t.close - 0.3, [*aside, grip]),
+        ]
     keys += [
         (t.lift, [*aside, grip]),
         (t.carry, [*aside, above]),
@@ -170,7 +174,12 @@ def tip_course(
     ]
     at = clock(frames)
     zero = np.zeros(frames)
-    return RobotCourse(eased(at, keys), _opening(layout, times, outcome, frames), zero + rng.uniform(-0.5, 0.5), zero)
+    return RobotCourse(
+        eased(at, keys),
+        _opening(layout, times, outcome, frames),
+        zero + rng.uniform(-0.5, 0.5),
+        zero,
+    )
 
 
 def part_poses(
@@ -185,7 +194,7 @@ def part_poses(
     # The hand turns while it swings round; what it set down stands upright all the same.
     if outcome != "drop":
         return poses, times.end
-    since = times.carry + float(rng.uniform(0.15, 0.4)) * (times.place - times.carry)
+    since = times.carry + float(rng.uniform(0.12, 0.3)) * (times.place - times.carry)
     held = carried(rest, hand, frame_at(times.lift), frames)
     tumble = rng.uniform(-0.6, 0.6, 3) * [0.15, 0.15, 1]
     return dropped(held, frame_at(since), 0.0, tumble)[0], since
@@ -249,14 +258,23 @@ def _layout(
     half, tall, bottom = sizes
     for _ in range(2000):
         part, target, astray = (rng.uniform([-0.4, -0.3], [0.4, 0.2]) for _ in range(3))
-        apart = [np.linalg.norm(part - target), np.linalg.norm(part - astray), np.linalg.norm(target - astray)]
+        apart = [
+            np.linalg.norm(part - target),
+            np.linalg.norm(part - astray),
+            np.linalg.norm(target - astray),
+        ]
         reach = [np.linalg.norm(np.subtract(p, robot.foot)) for p in (part, target, astray)]
         if min(apart) < 0.2 + half or apart[0] < 0.3 or apart[2] > 0.42:
             continue
         if min(reach) < 0.26 or max(reach) > 0.62:
             continue
         view = _view(rng, frames)
-        home = np.array([*(np.asarray(robot.foot) + 0.6 * (np.array([0.0, -0.1]) - robot.foot)), float(rng.uniform(0.3, 0.4))])
+        home = np.array(
+            [
+                *(np.asarray(robot.foot) + 0.6 * (np.array([0.0, -0.1]) - robot.foot)),
+                float(rng.uniform(0.3, 0.4)),
+            ]
+        )
         points = np.array([[*p, z] for p in (part, target, astray) for z in (0, 0.15)])
         if shows(view, points, SIZE, 0.12):
             return PickLayout(robot, part, target, astray, half, tall, bottom, home), view
@@ -266,7 +284,9 @@ def _layout(
 def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
     side, high = rng.uniform(-0.9, 0.9), np.radians(rng.uniform(28, 62))
     far = float(rng.uniform(1.25, 1.6))
-    position = far * np.array([np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)])
+    position = far * np.array(
+        [np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)]
+    )
     aim = np.array([0.0, 0.0, 0.08])
     return random_view(rng, position + aim, aim, float(rng.uniform(34, 40)), frames)
 
