@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from visup.teaching.outlines import Outline
+from visup.teaching.outlines import DrawnOutline
 from visup.teaching.snapping import snapped
 
 
@@ -20,7 +20,7 @@ def scene(centre: tuple[int, int], radius: int) -> tuple[NDArray[np.uint8], NDAr
     return picture, disc > 0
 
 
-def overlap(outline: Outline, truth: NDArray[np.bool_]) -> float:
+def overlap(outline: DrawnOutline, truth: NDArray[np.bool_]) -> float:
     mask = np.zeros(truth.shape, np.uint8)
     cv2.fillPoly(mask, [np.round(outline.corners).astype(np.int32)], (1,))
     return float((truth & (mask > 0)).sum() / (truth | (mask > 0)).sum())
@@ -31,7 +31,7 @@ def test_a_rough_outline_comes_closer(centre: tuple[int, int], radius: int) -> N
     picture, truth = scene(centre, radius)
     turns = np.arange(6) * np.pi / 3
     rough = np.column_stack([np.cos(turns), np.sin(turns)]) * radius + centre
-    drawn = Outline("disc", tuple((float(x), float(y)) for x, y in rough.clip(0, 319)))
+    drawn = DrawnOutline("disc", tuple((float(x), float(y)) for x, y in rough.clip(0, 319)))
     found = snapped(picture, drawn)
     assert found.name == "disc"
     assert overlap(found, truth) > max(0.93, overlap(drawn, truth))
@@ -40,11 +40,11 @@ def test_a_rough_outline_comes_closer(centre: tuple[int, int], radius: int) -> N
 
 def test_where_there_are_no_edges_it_stays() -> None:
     flat = np.full((100, 100, 3), 128, np.uint8)
-    drawn = Outline("none", ((20.0, 20.0), (60.0, 20.0), (60.0, 60.0), (20.0, 60.0)))
+    drawn = DrawnOutline("none", ((20.0, 20.0), (60.0, 20.0), (60.0, 60.0), (20.0, 60.0)))
     assert overlap(snapped(flat, drawn), overlap_mask(drawn)) > 0.5
 
 
-def overlap_mask(outline: Outline) -> NDArray[np.bool_]:
+def overlap_mask(outline: DrawnOutline) -> NDArray[np.bool_]:
     mask = np.zeros((100, 100), np.uint8)
     cv2.fillPoly(mask, [np.round(outline.corners).astype(np.int32)], (1,))
     return mask > 0
@@ -52,5 +52,5 @@ def overlap_mask(outline: Outline) -> NDArray[np.bool_]:
 
 def test_a_sliver_is_left_as_it_is() -> None:
     picture, _ = scene((160, 120), 50)
-    drawn = Outline("line", ((10.0, 10.0), (200.0, 10.0), (200.0, 11.0)))
+    drawn = DrawnOutline("line", ((10.0, 10.0), (200.0, 10.0), (200.0, 11.0)))
     assert snapped(picture, drawn) == drawn

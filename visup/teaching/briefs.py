@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError
-from visup.teaching.outlines import Outline
+from visup.teaching.outlines import DrawnOutline
 
 VIDEOS = ("clip.mp4", "video.mp4")
 """Names of a clip's video in its folder."""
@@ -36,7 +36,7 @@ class Showing:
         frame: Number of the frame, from 0.
     """
 
-    outline: Outline
+    outline: DrawnOutline
     video: Path
     frame: int
 
@@ -87,7 +87,7 @@ def _showings(path: Path, key: str, part: Mapping[str, Any]) -> Iterator[Showing
         except (KeyError, TypeError, ValueError, AttributeError) as e:
             fault = f"no {e}" if isinstance(e, KeyError) else str(e)
             raise _unusable(path, f"\"{key}\" of '{name}': {fault}") from e
-        yield Showing(Outline(str(name), corners), _video(path, clip), frame)
+        yield Showing(DrawnOutline(str(name), corners), _video(path, clip), frame)
 
 
 def _video(path: Path, clip: str) -> Path:

@@ -17,7 +17,7 @@ from visup.percepts.taught.view import TaughtView, taught_mask, taught_view
 from visup.percepts.video.source import to_bgr
 from visup.teaching.briefs import Showing, read_showings
 from visup.teaching.clip_frames import ClipFrames
-from visup.teaching.outlines import Outline
+from visup.teaching.outlines import DrawnOutline
 
 SMALL = 16
 """A thing whose longer side shows fewer pixels may be hard to find again."""
@@ -87,7 +87,7 @@ def teach(
 
 
 def teach_outlines(
-    frames: ClipFrames, drawn: Sequence[tuple[int, Outline]], models: Path
+    frames: ClipFrames, drawn: Sequence[tuple[int, DrawnOutline]], models: Path
 ) -> Lesson:
     """Store outlines drawn in frames of a clip.
 

@@ -18,7 +18,7 @@ _LOOKS_LIKE_CORNERS = re.compile(r"[\d\s.,;()\[\]+-]+")
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class DrawnOutline:
     """A thing's outline, drawn in one picture.
 
     Attributes:
@@ -30,11 +30,11 @@ class Outline:
     corners: tuple[tuple[float, float], ...]
 
 
-def parse_outline(text: str) -> Outline:
+def parse_outline(text: str) -> DrawnOutline:
     """An outline as it was typed; corners may stand in brackets, be separated by blanks or semicolons.
 
     >>> parse_outline("part = 10,20 30,20; (30, 40)")
-    Outline(name='part', corners=((10.0, 20.0), (30.0, 20.0), (30.0, 40.0)))
+    DrawnOutline(name='part', corners=((10.0, 20.0), (30.0, 20.0), (30.0, 40.0)))
 
     Raises:
         SettingsError: It cannot be read; the message quotes the place.
@@ -49,7 +49,7 @@ def parse_outline(text: str) -> Outline:
             f"the outline of '{name}' has too few corners: {len(corners)}",
             expected=EXPECTED,
         )
-    return Outline(name, corners)
+    return DrawnOutline(name, corners)
 
 
 def _corners(name: str, text: str) -> Iterable[tuple[float, float]]:

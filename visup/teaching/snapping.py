@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.teaching.outlines import Outline
+from visup.teaching.outlines import DrawnOutline
 
 _ROUNDS = 3
 _SIDE = 320  # longer side of the part of the picture that is cut out, pixels at most
@@ -18,7 +18,7 @@ _LEAST, _MOST = 0.5, 1.6  # share of the drawn area that may be left or come to 
 _SEED = 7
 
 
-def snapped(picture: NDArray[np.uint8], outline: Outline) -> Outline:
+def snapped(picture: NDArray[np.uint8], outline: DrawnOutline) -> DrawnOutline:
     """An outline drawn anew along the edges that are near it; the same one where none are found.
 
     Args:
@@ -37,10 +37,12 @@ def snapped(picture: NDArray[np.uint8], outline: Outline) -> Outline:
     if found is None:
         return outline
     placed = found / scale + (x, y)
-    return Outline(outline.name, tuple((round(float(a), 1), round(float(b), 1)) for a, b in placed))
+    return DrawnOutline(
+        outline.name, tuple((round(float(a), 1), round(float(b), 1)) for a, b in placed)
+    )
 
 
-def _surroundings(picture: NDArray[np.uint8], outline: Outline) -> tuple[int, int, int, int]:
+def _surroundings(picture: NDArray[np.uint8], outline: DrawnOutline) -> tuple[int, int, int, int]:
     corners = np.array(outline.corners)
     margin = 0.35 * float(np.ptp(corners, axis=0).max()) + 4
     height, width = picture.shape[:2]

@@ -12,7 +12,7 @@ from visup.agent.model.errors import SettingsError
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.teaching.clip_frames import ClipFrames
 from visup.teaching.lesson import Lesson, teach_outlines
-from visup.teaching.outlines import Outline
+from visup.teaching.outlines import DrawnOutline
 from visup.teaching.snapping import snapped
 
 MOST_THINGS = 200
@@ -67,13 +67,13 @@ def _number(asked: object) -> int:
     return number
 
 
-def _outline(asked: Mapping[str, Any]) -> Outline:
+def _outline(asked: Mapping[str, Any]) -> DrawnOutline:
     name, corners = asked.get("name"), asked.get("corners")
     if not isinstance(name, str) or not name.strip():
         raise SettingsError("an outline has no name yet", hint="give it one in the list")
     if not isinstance(corners, list) or not 3 <= len(corners) <= MOST_CORNERS:
         raise SettingsError(f"the outline of '{name}' has too few corners", expected="at least 3")
-    return Outline(name.strip(), tuple(_corner(name, c) for c in corners))
+    return DrawnOutline(name.strip(), tuple(_corner(name, c) for c in corners))
 
 
 def _corner(name: str, corner: object) -> tuple[float, float]:
