@@ -215,8 +215,6 @@ class CouplingReasoner:
         self, before: CouplingEvidence, seen: PairObservation, mind: Mind
     ) -> CouplingEvidence:
         converging = seen.converging == YES and seen.touching != YES
-        far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
-        apart = seen.touching == NO and far
         track = self._follow(before.relative_track, seen, mind)
         odds, contact, found = before.rest_odds, before.contact, None
         if track is not None and track is not before.relative_track:
@@ -229,6 +227,8 @@ class CouplingReasoner:
             contact = self._contact(before, found, seen, mind)
         elif seen.touching == NO:
             contact = None
+        far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
+        apart = (seen.touching == NO and far) or self._leaves(contact, seen, mind)
         same = track is before.relative_track and odds == before.rest_odds and not converging
         same = same and contact is before.contact
         if same and apart == (before.apart_since is not None):
@@ -300,6 +300,14 @@ class CouplingReasoner:
         speed = None if found is None else float(np.hypot(*found.velocity))
         dt = mind.time - track.path_end if track is not None else 0.0
         return updated_contact(before.contact, speed, limit, (mind.time, dt), s)
+
+    def _leaves(self, contact: Contact | None, seen: PairObservation, mind: Mind) -> bool:
+        """Whether one of two whose outlines still meet moves on, while the other rests."""
+        if contact is None or not contact.passing:
+            return False
+        least = self.settings.relations.still_speed * image_diagonal(mind.frame_size)
+        now = kinematics(mind)
+        return any(now.one("speed", i) < least for i in seen.pair)
 
     def _coupling(
         self, evidence: CouplingEvidence, seen: PairObservation, mind: Mind
@@ -394,7 +402,8 @@ def _cells(
             state[2, k] = _in_front(contact, seen.pair, mind)
             since[2, k] = contact.changed_at
         if seen.pair in coupled:
-            state[:2, k], state[2, k] = 1, 0
+            doubted = kept[seen.pair].apart_since is not None
+            state[:2, k], state[2, k] = UNKNOWN_CODE if doubted else 1, 0
             since[0, k] = coupled[seen.pair].since
         elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
             state[:, k] = UNKNOWN_CODE

@@ -101,7 +101,7 @@ class Advance:
             # Where the course may also go on otherwise, an entry speaks for neither way: who touches may
             # couple, or back off. What holds does.
             if ways == 1 or all(self.observe(s).holds is Truth.TRUE for s in transition.entered):
-                return Support.BEGUN
+                return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._goes_on(transition):
             return Support.OVER
         nearer = ways == 1 and all(self._nearer(s) for s in transition.entered)
@@ -115,8 +115,8 @@ class Advance:
         if support <= dict(hypothesis.considered).get(transition.entered, Support.NONE):
             # What was weighed already counts once; but what was seen to begin may begin later on.
             late = -math.expm1(-hmm.leave * self.dt)
-            return skipped * late if support is Support.BEGUN else 0.0
-        if support is Support.BEGUN:
+            return skipped * late if support >= Support.EARLY else 0.0
+        if support >= Support.EARLY:
             return skipped * (1.0 - hmm.spurious)
         if support is Support.OVER:
             return 0.5 if ends else 1.0

@@ -186,6 +186,8 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
+    if contrary is not None and contrary.name in TRENDS and relations.goes_round(contrary.name, ids):
+        contrary = None  # who passes over or round another draws away from it a little
     known = (*meaning.helps, *meaning.contrary)
     entry = relations.first_true(meaning.begins, ids)
     return ActionObservation(
@@ -210,7 +212,9 @@ Derive = Callable[[Mind, RelationLookup, tuple[int, ...]], Relation | None]
 
 
 def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
-    """Coupled when the mind says so, whether or not a relation of that name is kept."""
+    """Coupled when the mind says so where no relation of that name is kept."""
+    if mind.relation("coupled", *ids) is not None:
+        return None  # it is in doubt
     pair = tuple(sorted(ids))
     since = next((c.since for c in mind.couplings if c.objects == pair), None)
     return None if since is None else Relation("coupled", ids, Truth.TRUE, since)
