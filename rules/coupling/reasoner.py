@@ -346,7 +346,9 @@ class CouplingReasoner:
 def common_speed(mind: Mind, pair: Pair) -> float:
     """The speed of the slower of two, pixels per second; that of the one whose speed is known; else 0."""
     now = kinematics(mind)
-    speeds = [s for s in (now.one("speed", i) for i in pair) if s == s]  # NaN is not equal to itself
+    speeds = [
+        s for s in (now.one("speed", i) for i in pair) if s == s
+    ]  # NaN is not equal to itself
     return min(speeds, default=0.0)
 
 

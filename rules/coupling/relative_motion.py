@@ -32,8 +32,8 @@ ICP_REACH = 12.0
 """How far a point may be from the outline on which it is laid, pixels."""
 
 NEAR_REACH = 1.5
-"""A body that is larger is followed by what of it is no farther from the other one than so many of the other's
-sizes: an arm that bends moves otherwise at its shoulder than at the hand with which it holds."""
+"""A body that is larger is followed by what of it is no farther from the other one than so many of the
+other's sizes: an arm that bends moves otherwise at its shoulder than at the hand with which it holds."""
 
 NEIGHBOUR_MARGIN = 6.0
 """How near the other body an outline is not trusted, pixels."""

@@ -97,11 +97,12 @@ class Advance:
             return Support.NONE
         if not finished and all(_goes_on(s, transition.left) for s in transition.entered):
             return Support.NONE
-        if transition.entered and self._opens(hypothesis, transition):
-            # Where the course may also go on otherwise, an entry speaks for neither way: who touches may
-            # couple, or back off. What holds does.
-            if ways == 1 or all(self.observe(s).holds is Truth.TRUE for s in transition.entered):
-                return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
+        opens = transition.entered and self._opens(hypothesis, transition)
+        # Where the course may also go on otherwise, an entry speaks for neither way: who touches may
+        # couple, or back off. What holds does.
+        holds = (self.observe(s).holds is Truth.TRUE for s in transition.entered)
+        if opens and (ways == 1 or all(holds)):
+            return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
         if finished and not self._goes_on(transition):
             return Support.OVER
         nearer = ways == 1 and all(self._nearer(s) for s in transition.entered)

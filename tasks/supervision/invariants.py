@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from visup.agent import AlertCondition, Event, Mind, Severity, Truth
 from visup.tasks.automaton.derivatives import leaves
-from visup.tasks.grammar.conditions import facts_of
+from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Invariant
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
@@ -48,13 +48,14 @@ def _under_way(memory: TaskMemory) -> frozenset[str]:
 
 
 def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
-    """Whether an invariant speaks of how bodies stand to each other, or to a zone: then to break it is unsafe.
+    """Whether an invariant speaks of how bodies stand to each other, or to a zone: to break it is unsafe.
 
     What must never be of one body alone (that the charger moves) is a matter of the work: it fails.
     """
     facts = facts_of(invariant.condition)
     zones = {z.name for z in model.task.zones}
-    return any(len(f.words) > 1 or zones & {str(w) for w in f.words} for f in facts)
+    words = [action_of(f).words for f in facts]
+    return any(len(named) > 1 or zones & {str(w) for w in named} for named in words)
 
 
 def violation(

@@ -19,8 +19,8 @@ NEVER: Mapping[str, float] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
 
 RADIAL_SHARE = 0.45
-"""Two draw nearer or apart where their distance changes at no less than this share of their relative speed; that of a
-body that flies round another one does at up to 0.4 of it."""
+"""Two draw nearer or apart where their distance changes at no less than this share of their relative speed;
+that of a body that flies round another one does at up to 0.4 of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +93,8 @@ class RelationLookup:
 
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
-        true = found is not None and found.truth is Truth.TRUE
-        if true and name == "touching" and self._passes_by(objects):
+        meets = name == "touching" and found is not None and found.truth is Truth.TRUE
+        if meets and found is not None and self._passes_by(objects):
             return replace(found, truth=Truth.UNKNOWN)
         if found is not None and found.truth is not Truth.UNKNOWN:
             return found
@@ -186,7 +186,11 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
-    if contrary is not None and contrary.name in TRENDS and relations.goes_round(contrary.name, ids):
+    if (
+        contrary is not None
+        and contrary.name in TRENDS
+        and relations.goes_round(contrary.name, ids)
+    ):
         contrary = None  # who passes over or round another draws away from it a little
     known = (*meaning.helps, *meaning.contrary)
     entry = relations.first_true(meaning.begins, ids)
