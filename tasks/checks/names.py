@@ -16,8 +16,9 @@ from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.conditions import Amount, Name, ParameterRef, action_of, bound_of, facts_of
+from visup.tasks.grammar.criteria import Extent
 from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
-from visup.tasks.grammar.units import MEANT, SIZE, TIME, UNITS, dimension, units_of
+from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of
 
 Asked = tuple[str, tuple[Name, ...], Span]
 """An action that a file names, its actors, and where."""
@@ -78,6 +79,8 @@ class NameCheck:
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
+        criteria = (c for a in self.task.actors for c in a.criteria)
+        yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
             yield bound_of(comparison), meaning.measures if meaning else ""

@@ -73,5 +73,7 @@ CODES = {
     "E233": "numbers of times that contradict each other",
     "E234": "too many things in any order",
     "E235": "a condition given twice",
+    "E236": "an actor that no object can be",
+    "E237": "an actor that is a part of itself",
 }
 """Every code with what it stands for; a code never changes its meaning."""

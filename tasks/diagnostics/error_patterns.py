@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.tasks.diagnostics.actor_error_patterns import actor, criteria
 from visup.tasks.diagnostics.course_error_patterns import (
     action_in_angles,
     any_order,
@@ -152,31 +153,6 @@ def _word_as_name(text: str) -> RecognisedError | None:
     return RecognisedError("E123", start, len(word), f"`{word}` is a reserved word", "another name")
 
 
-def _actor(text: str) -> RecognisedError | None:
-    m = re.match(rf"\s*(?:optional\s+)?actor\b\s*({NAME})?\s*(\S*)", text)
-    if m is None:
-        return None
-    expected = "`actor satellite is spartan or hubble`"
-    if m[1] is None or m[1] in RESERVED_WORDS:
-        start = m.end() - len(m[0].lstrip())
-        return RecognisedError("E124", start, 5, "the name of the actor is missing", expected)
-    size = re.search(r"\bsize\b(?!\s*\d+(?:\.\d+)?\s*[^\W\d])", text)
-    if size is not None:
-        what = "`size` is not followed by a number and a unit"
-        return RecognisedError("E124", size.start(), 4, what, "such as `size 1.6 m`")
-    if m[2] == "is":
-        hint = "several models are separated by `or`" if re.search(r"[,|/]|\band\b", text) else None
-        spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
-        if hint is None and spaced is not None:
-            hint = f"the name of a model has no blanks, such as `{spaced[1]}_{spaced[2]}`"
-        what = f"actor `{m[1]}` is declared with something that is not a model"
-        if not text[m.end() :].strip(" "):
-            what = f"actor `{m[1]}` is declared without a model"
-        return RecognisedError("E124", m.start(1), len(m[1]), what, expected, hint)
-    what = f"`is` is missing after actor `{m[1]}`"
-    return RecognisedError("E124", m.start(1), len(m[1]), what, expected)
-
-
 def _include(text: str) -> RecognisedError | None:
     m = re.match(r"\s*(include)\b", text)
     if m is None:
@@ -239,7 +215,8 @@ PATTERNS: tuple[ErrorPattern, ...] = (
     _definer,
     _bare_head,
     _open_head,
-    _actor,
+    criteria,
+    actor,
     _not_a_name,
     _empty_stage,
     open_angle,

@@ -26,7 +26,7 @@ OPENS = re.compile(  # a line that begins a statement, well written or not
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
-    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional))\s*$"
+    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
 LONGEST = 4000  # characters of a statement that mistakes are looked for in
@@ -168,6 +168,18 @@ SAID = {
     "STAGE": "a stage such as `<approach>`",
     "NAME": "a name",
     "MODEL": "the name of a model",
+    "COLOUR": "a colour",
+    "SHADE": "`light` or `dark`",
+    "RANK": "`largest`, `smallest`, `leftmost`, `rightmost`, `highest` or `lowest`",
+    "THE": "`the largest` and the like",
+    "THE_OTHER": "`the other`",
+    "THE_SIDE": "`the`",
+    "SIDE": "`left`, `right`, `top` or `bottom`",
+    "ANOTHER": "`another`",
+    "COMPARED": "`larger than` or `smaller than`",
+    "WHAT": "`what enters`, `what moves first` or `what rests`",
+    "PART": "`part of`",
+    "PLACE": "`at (410, 160)`",
     "NUMBER": "a number",
     "REPEAT": "`?`, `*` or `+`",
     "WHEN": "`never` or `always`",
@@ -191,7 +203,8 @@ SAID = {
 }
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
-    "ends", "progresses", "fails", "when", "and", "not",
+    "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
+    "enters", "moves", "first", "rests", "from", "part", "of",
 )  # fmt: skip
 
 

@@ -32,6 +32,7 @@ from visup.tasks.grammar.ast_courses import (
     walk,
 )
 from visup.tasks.grammar.conditions import Action, Amount, Condition, Name, ParameterRef
+from visup.tasks.grammar.criteria import Criterion, PartOf, declared_as
 
 __all__ = [
     "NOWHERE",
@@ -106,13 +107,14 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """`actor satellite is spartan201_approx or hubble size 1.6 m`.
+    """`actor satellite is spartan201_approx or hubble size 1.6 m`, `actor part is the leftmost red`.
 
     Attributes:
         name: Its name in the file.
-        models: The models that it may be; empty when only its size is said, or that it is optional.
+        models: The models that it may be; empty when nothing is said of them.
         size: Its largest extent, or None.
         optional: Whether what is asked of it may be left out.
+        criteria: By what else it is told.
     """
 
     name: str
@@ -120,11 +122,18 @@ class Actor:
     size: Amount | None = None
     optional: bool = False
     span: Span = field(default=NOWHERE, compare=False, repr=False)
+    criteria: tuple[Criterion, ...] = ()
+
+    @property
+    def machine(self) -> Name | None:
+        """The actor of which it is a part, or None."""
+        return next((c.machine for c in self.criteria if isinstance(c, PartOf)), None)
 
     def __str__(self) -> str:
-        said = [*(["optional"] if self.optional else []), "actor", self.name]
-        said += [f"is {' or '.join(self.models)}"] if self.models else []
-        return " ".join([*said, *([f"size {self.size}"] if self.size else [])])
+        said = "optional actor" if self.optional else "actor"
+        size = f"size {self.size}" if self.size else ""
+        parts = (said, self.name, declared_as(self.models, self.criteria), size)
+        return " ".join(p for p in parts if p)
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,8 +237,14 @@ class Task:
         return next((a for a in self.actors if a.name == name), Actor(name))
 
     def models(self, actor: str) -> tuple[str, ...]:
-        """Models that an actor may be: as declared, else the one of the actor's own name."""
-        return self.actor(actor).models or (actor,)
+        """Models that an actor may be: as declared, else the one of the actor's own name.
+
+        An actor that is told by its looks, its place or its conduct alone may be any model, or none:
+        it has no models.
+        """
+        declared = self.actor(actor)
+        alone = any(not isinstance(c, PartOf) for c in declared.criteria)
+        return declared.models or (() if alone else (actor,))
 
     def amount(self, amount: Amount) -> Number:
         """What an amount stands for: itself, or what its parameter is; 0 when nobody knows."""

@@ -14,6 +14,20 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span
 from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.criteria import (
+    Another,
+    Colours,
+    Conduct,
+    Criterion,
+    Extent,
+    OtherModels,
+    PartOf,
+    Place,
+    Rank,
+    Ranked,
+    Side,
+    in_order,
+)
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -144,12 +158,41 @@ class _TaskBuilder(Transformer[Token, Any]):
     def actor(self, items: list[Any]) -> Actor:
         optional = items[0].type == "OPTIONAL"
         name, *rest = items[1:] if optional else items
-        models = next((i for i in rest if isinstance(i, tuple)), ())
         size = next((i for i in rest if isinstance(i, Number | ParameterRef)), None)
-        return Actor(str(name), models, size, optional, _of(name))
+        traits = [t for i in rest if isinstance(i, list) for t in i]
+        models, criteria = _who(traits)
+        return Actor(str(name), models, size, optional, _of(name), criteria)
 
-    def models(self, items: list[Token]) -> tuple[str, ...]:
-        return tuple(map(str, items))
+    # What is said of an actor: each a list of criteria, models as `OtherModels`.
+    def models(self, items: list[Token]) -> list[Criterion]:
+        return [OtherModels(tuple(map(str, items)))]
+
+    def colours(self, items: list[str]) -> list[Criterion]:
+        return [Colours(tuple(items))]
+
+    def colour(self, items: list[Token]) -> str:
+        return " ".join(map(str, items))
+
+    def rank(self, items: list[Any]) -> list[Criterion]:
+        return [*(items[2] if len(items) > 2 else []), Ranked(cast("Rank", str(items[1])))]
+
+    def another(self, items: list[Any]) -> list[Criterion]:
+        return [*(items[1] if len(items) > 1 else []), Another()]
+
+    def place(self, items: list[Any]) -> list[Criterion]:
+        return [Place(items[1])]
+
+    def extent(self, items: list[Any]) -> list[Criterion]:
+        return [Extent(cast('Literal["larger", "smaller"]', str(items[0])), items[1])]
+
+    def conduct(self, items: list[Token]) -> list[Criterion]:
+        kind = cast('Literal["enters", "moves", "rests"]', str(items[1]))
+        side = cast("Side", str(items[3])) if len(items) > 3 else ""
+        return [Conduct(kind, side)]
+
+    def part(self, items: list[Token]) -> list[Criterion]:
+        machine = Name(str(items[1]), _of(items[1]))
+        return [PartOf(machine, _of(items[0]).to(_of(items[1])))]
 
     def size(self, items: list[Amount]) -> Amount:
         return items[0]
@@ -247,6 +290,13 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def not_(self, items: list[Any]) -> Not:
         return Not(items[1], _of(items[0]).to(items[1].span))
+
+
+def _who(traits: Several[Criterion]) -> tuple[tuple[str, ...], tuple[Criterion, ...]]:
+    """The models that are said first, and all other criteria in the order of their kinds."""
+    models = next((t for t in traits if isinstance(t, OtherModels)), None)
+    others = in_order(t for t in traits if t is not models)
+    return (models.names if models is not None else ()), others
 
 
 def _names(tokens: list[Token]) -> tuple[Name, ...]:

@@ -80,12 +80,23 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
 
 @cached_by_identity
 def task_actors(task: Task) -> tuple[str, ...]:
-    """All actors of a task, in the order in which its stages ask for them."""
+    """All actors of a task, in the order in which its stages ask for them; machines of parts last."""
     staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
     watched = [
         a for i in task.invariants for f in facts_of(i.condition) for a in fact_key(task, f)[1]
     ]
-    return tuple(dict.fromkeys((*staged, *watched)))
+    named = tuple(dict.fromkeys((*staged, *watched)))
+    return tuple(dict.fromkeys((*named, *(m for a in named for m in machines_of(task, a)))))
+
+
+def machines_of(task: Task, actor: str) -> tuple[str, ...]:
+    """The machine of which an actor is a part, the one of which that is a part, and so on."""
+    found: dict[str, None] = {}
+    machine = task.actor(actor).machine
+    while machine is not None and machine not in found and machine != actor:
+        found[str(machine)] = None
+        machine = task.actor(machine).machine
+    return tuple(found)
 
 
 def undrawn_zones(task: Task) -> tuple[str, ...]:

@@ -28,6 +28,8 @@ from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.derivatives import leaves
+from visup.tasks.casting.fitness import fits
+from visup.tasks.casting.matching import match, unexplained
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
 from visup.tasks.supervision.events import (
@@ -44,7 +46,6 @@ from visup.tasks.supervision.invariants import (
     invariant_events,
     patience,
 )
-from visup.tasks.supervision.matching import match, strength, unexplained
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
@@ -269,7 +270,8 @@ def _bind(
     since = memory.rival_since if rival == memory.rival else mind.time
     if mind.time - since >= model.settings.switch_s:
         return found, (), mind.time
-    return tuple(_refreshed(b, mind) for b in before), rival, since
+    playing = {b.actor: b.object_id for b in before if b.object_id is not None}
+    return tuple(_refreshed(model.task, b, mind, playing) for b in before), rival, since
 
 
 def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
@@ -279,12 +281,13 @@ def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
     return belief is not None and belief.presence is not Presence.LEFT
 
 
-def _refreshed(binding: Binding, mind: Mind) -> Binding:
+def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, int]) -> Binding:
     """The same binding with the strength that it has now."""
     belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
     if belief is None:
         return replace(binding, object_id=None, strength=0.0)
-    return replace(binding, strength=strength(belief, binding.models))
+    (now,) = fits(task, binding.actor, binding.models, [belief], mind, playing)
+    return replace(binding, strength=now)
 
 
 def _filtered(
@@ -310,7 +313,7 @@ def _strange(
     """Objects that are unexplained now, each with the time since when."""
     before = dict(memory.strange_since)
     optional = {a.name for a in model.task.actors if a.optional}
-    now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional)
+    now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional, model.task)
     return tuple((i, before.get(i, snapshot.mind.time)) for i in now)
 
 

@@ -31,6 +31,12 @@ WORDS = {
     "ends when": "by what it ends",
     "progresses when": "what counts as progress",
     "fails when": "what counts as failure, in place of the contrary of the action",
+    "is": "what an actor may be: `is cup`, `is red`, `is the leftmost red`, `is part of arm`",
+    "at": "the place of an actor in the image: `at (410, 160)`",
+    "another": "an actor alike, but not the same: `is another red`",
+    "what enters": "an actor by where it comes from: `is what enters from the left`",
+    "what moves first": "an actor by its conduct",
+    "what rests": "an actor by its conduct",
     "during": "for which stages an invariant is meant: `during <approach>`",
 }
 

@@ -6,7 +6,20 @@ from hypothesis import strategies as st
 
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure
+from visup.rules.traits.colours import SHADES, TERMS
+from visup.tasks.diagnostics.actor_error_patterns import RANKS
 from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.criteria import (
+    Another,
+    Colours,
+    Conduct,
+    Criterion,
+    Extent,
+    PartOf,
+    Place,
+    Ranked,
+    in_order,
+)
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -43,7 +56,7 @@ names = st.from_regex(r"[a-zA-Zä_][a-z0-9_é]{0,8}", fullmatch=True).filter(
     lambda n: n not in RESERVED_WORDS
 )
 models = st.from_regex(r"[a-z0-9][a-z0-9_.\-]{0,8}", fullmatch=True).filter(
-    lambda n: n not in RESERVED_WORDS
+    lambda n: n not in (*RESERVED_WORDS, *TERMS)
 )
 amounts = st.one_of(
     st.integers(0, 10**6).map(float), st.floats(0.0, 1e9, allow_nan=False, allow_infinity=False)
@@ -100,10 +113,23 @@ stages = st.builds(
     Stage, names, st.one_of(courses, st.builds(Actors, actors)), texts, st.booleans()
 )
 sizes = st.none() | amounts_said
+colours = st.sampled_from([*TERMS, *(f"{s} {t}" for s in SHADES for t in TERMS)])
+places = st.builds(Place, st.tuples(amounts, amounts))
+criteria: st.SearchStrategy[Criterion] = st.one_of(
+    st.builds(Colours, st.lists(colours, min_size=1, max_size=3).map(tuple)),
+    st.builds(Ranked, st.sampled_from(RANKS)),
+    st.builds(Another),
+    st.builds(Extent, st.sampled_from(["larger", "smaller"]), amounts_said),
+    places,
+    st.builds(Conduct, st.just("enters"), st.sampled_from(["", "left", "right", "top", "bottom"])),
+    st.builds(Conduct, st.sampled_from(["moves", "rests"])),
+    st.builds(PartOf, names.map(Name)),
+)
+told = st.lists(criteria, min_size=1, max_size=4).map(in_order)
+some_models = st.lists(models, min_size=1, max_size=3).map(tuple)
 declared = st.one_of(
-    st.builds(
-        Actor, names, st.lists(models, min_size=1, max_size=3).map(tuple), sizes, st.booleans()
-    ),
+    st.builds(Actor, names, some_models, sizes, st.booleans()),
+    st.builds(Actor, names, st.just(()) | some_models, sizes, st.booleans(), criteria=told),
     st.builds(Actor, names, st.just(()), amounts_said, st.booleans()),
     st.builds(Actor, names, st.just(()), sizes, st.just(True)),
 )

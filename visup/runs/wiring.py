@@ -11,6 +11,7 @@ from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer
+from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
@@ -26,6 +27,7 @@ from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
 from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
+from visup.tasks.casting.fitness import asks_for_colour, asks_for_traits
 from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
@@ -79,7 +81,11 @@ def build_agent(
     _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    behaviours = [*_behaviours(settings, database, declared_sizes(tasks, settings.actors)), *also]
+    behaviours = [
+        *_behaviours(settings, database, declared_sizes(tasks, settings.actors)),
+        *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
+        *also,
+    ]
     contracts = [b.contract for b in behaviours]
     return Agent(
         behaviours=behaviours,
@@ -153,7 +159,8 @@ def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
 def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
 ) -> Reasoners:
-    interpreting = default_reasoners(rules=_rules(settings))
+    traits = any(map(asks_for_traits, tasks))
+    interpreting = default_reasoners(rules=_rules(settings), traits=traits)
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)
     activation = (ActivationReasoner(rules),) if rules else ()
