@@ -15,10 +15,17 @@ from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
 from visup.tasks.diagnostics.recovery import ParsedFile
-from visup.tasks.grammar.conditions import Amount, Name, ParameterRef, action_of, bound_of, facts_of
+from visup.tasks.grammar.conditions import (
+    Amount,
+    Name,
+    ParameterRef,
+    action_of,
+    bounds_of,
+    facts_of,
+)
 from visup.tasks.grammar.criteria import Extent
 from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
-from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of
+from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of, value
 
 Asked = tuple[str, tuple[Name, ...], Span]
 """An action that a file names, its actors, and where."""
@@ -65,6 +72,7 @@ class NameCheck:
         """All faults of the words."""
         yield from self.amounts()
         yield from self.compared()
+        yield from self.ranges()
         yield from self.kinds()
         yield from self.declared()
         yield from self.unused()
@@ -83,7 +91,7 @@ class NameCheck:
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
-            yield bound_of(comparison), meaning.measures if meaning else ""
+            yield from ((a, meaning.measures if meaning else "") for a in bounds_of(comparison))
 
     def amounts(self) -> Iterator[Diagnostic]:
         """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
@@ -152,6 +160,16 @@ class NameCheck:
                 what = f"`{name}` is not a quantity, so it cannot be compared"
                 some = sorted(m.name for m in self.actions.values() if m.measures)
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
+
+    def ranges(self) -> Iterator[Diagnostic]:
+        """Ranges in which nothing lies."""
+        for comparison in self.comparisons:
+            ends = [self.task.amount(a) for a in bounds_of(comparison)]
+            alike = len({dimension(e) for e in ends} - {""}) == 1
+            if len(ends) == 2 and alike and value(ends[0]) >= value(ends[1]):
+                what = f"nothing lies between {ends[0]} and {ends[1]}"
+                expected = "the lesser amount first, then a greater one"
+                yield self.source.fault("E238", what, comparison.span, expected)
 
     def kinds(self) -> Iterator[Diagnostic]:
         """Zones where actors belong, and the other way round."""

@@ -75,5 +75,6 @@ CODES = {
     "E235": "a condition given twice",
     "E236": "an actor that no object can be",
     "E237": "an actor that is a part of itself",
+    "E238": "a range in which nothing lies",
 }
 """Every code with what it stands for; a code never changes its meaning."""

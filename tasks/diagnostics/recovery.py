@@ -26,7 +26,7 @@ OPENS = re.compile(  # a line that begins a statement, well written or not
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
-    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|than|from|the|of|another|at))\s*$"
+    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
 LONGEST = 4000  # characters of a statement that mistakes are looked for in
@@ -194,6 +194,7 @@ SAID = {
     "TEXT": "a text in double quotes",
     "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
     "COMPARE": "`<` or `>`",
+    "BETWEEN": "`between`",
     "_TIMES": "`times`",
     "AT": "`at least` or `at most`",
     "ANY": "`any order`",
@@ -204,7 +205,7 @@ SAID = {
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
-    "enters", "moves", "first", "rests", "from", "part", "of",
+    "between", "enters", "moves", "first", "rests", "from", "part", "of",
 )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from lark import Lark, Token, Transformer
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span
-from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.conditions import Condition, Range
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -276,8 +276,9 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def comparison(self, items: list[Any]) -> Comparison:
         quantity = Measure(items[0].name, items[0].words, items[0].span)
-        span = quantity.span.to(items[2].span)
-        return Comparison(quantity, str(items[1]), cast("Term", items[2]), span=span)
+        span = quantity.span.to(items[-1].span)
+        right = items[2] if len(items) == 3 else Range(items[2], items[3], _all(items[2:]))
+        return Comparison(quantity, str(items[1]), cast("Term", right), span=span)
 
     def reference(self, items: list[Token]) -> Reference:
         return Reference(_bare(items[0]), _of(items[0]))

@@ -8,7 +8,7 @@ from functools import wraps
 from typing import TypeVar
 
 from visup.rules.formula.nodes import Comparison
-from visup.tasks.grammar.conditions import Fact, action_of, bound_of, facts_of
+from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
@@ -133,7 +133,8 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     actors = tuple(str(a) for a in action.words if a not in zones)
     key = " ".join([action.name, *(a for a in action.words if a in zones)])
     if isinstance(fact, Comparison):
-        key = f"{key} {fact.operator} {task.amount(bound_of(fact))}"
+        amounts = " and ".join(str(task.amount(a)) for a in bounds_of(fact))
+        key = f"{key} {fact.operator} {amounts}"
     return key, actors
 
 

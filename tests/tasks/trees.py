@@ -8,7 +8,7 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure
 from visup.rules.traits.colours import SHADES, TERMS
 from visup.tasks.diagnostics.actor_error_patterns import RANKS
-from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.conditions import Condition, Range
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -69,11 +69,12 @@ holds = st.builds(Hold, amounts_said)
 clauses: st.SearchStrategy[Clause] = st.one_of(holds, st.builds(Deadline, amounts_said))
 actors = st.lists(names.map(Name), min_size=1, max_size=3).map(tuple)
 actions = st.builds(Action, names, actors)
-comparisons = st.builds(
-    Comparison,
-    st.builds(Measure, names, actors),
-    st.sampled_from(["<", "<=", ">", ">="]),
-    amounts_said,
+measures = st.builds(Measure, names, actors)
+comparisons = st.one_of(
+    st.builds(Comparison, measures, st.sampled_from(["<", "<=", ">", ">="]), amounts_said),
+    st.builds(
+        Comparison, measures, st.just("between"), st.builds(Range, amounts_said, amounts_said)
+    ),
 )
 references = st.builds(Reference, names)
 facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
