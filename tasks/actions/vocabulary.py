@@ -15,16 +15,18 @@ import numpy as np
 
 from visup.agent import Truth
 from visup.rules.formula.truth import NEGATION, TRUTH_OF, truth_if
+from visup.rules.formula.units import Number
 from visup.rules.predicates.inputs_missing import inputs_missing
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.relations.zones import contains, zone_truth
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
+from visup.tasks.actions.floor import floor_distance, floor_polygon, stands_in
 from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
 from visup.tasks.grammar.nodes import Action, Actors, Comparison, Conditioned, Task, walk
 from visup.tasks.grammar.statement import RESERVED_WORDS as RESERVED
 from visup.tasks.grammar.structure import fact_key
-from visup.tasks.grammar.units import MEASURES, value
+from visup.tasks.grammar.units import MEASURES, SIZE, dimension, value
 
 OF_TASKS = frozenset({"unexpected", "expected", "actor"})
 """Words of rules that speak of tasks themselves: a task that asked for them would ask for itself."""
@@ -34,6 +36,10 @@ DEPTHS = frozenset({"region", "hypothesis", "depth"})
 
 FactEvaluator = Callable[[Snapshot, tuple[int, ...]], Truth]
 """Whether something holds between objects, by id, in a mind as rules see it."""
+
+
+Measured = Callable[[Snapshot, tuple[int, ...]], tuple[float, float]]
+"""The interval of a quantity of objects, by their places among the facts, in the base unit."""
 
 
 def rule_actions() -> Iterator[ActionDefinition]:
@@ -98,7 +104,8 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         text = actions[name].text
         if isinstance(fact, Comparison):
             amounts = [task.amount(a) for a in bounds_of(fact)]
-            looks[key] = _comparison(name, fact.operator, *map(value, amounts))
+            measured = _measure(task, name, amounts[0])
+            looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
             said = " and ".join(map(str, amounts))
             text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
         else:
@@ -160,14 +167,34 @@ def _outside(within: FactEvaluator) -> FactEvaluator:
     return lambda facts, ids: NEGATION[within(facts, ids)]
 
 
-def _comparison(name: str, sign: str, bound: float, most: float = 0.0) -> FactEvaluator:
+def _measure(task: Task, name: str, amount: Number) -> Measured:
+    """How a quantity is measured: a gap in metres on the floor, all else as rules do."""
+    if name == "gap" and dimension(amount) == SIZE:
+        distance = floor_distance(task.ground)
+
+        def on_floor(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
+            metres = distance(facts, rows)
+            return (metres, metres) if metres == metres else (-np.inf, np.inf)
+
+        return on_floor
+
+    def plain(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
+        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        return low, high
+
+    return plain
+
+
+def _comparison(
+    name: str, measured: Measured, sign: str, bound: float, most: float = 0.0
+) -> FactEvaluator:
     """A quantity against a bound: true or false when all of its interval says so."""
 
     def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        low, high = measured(facts, rows)
         if sign == BETWEEN:
             return _within(low, high, bound, most)
         told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
@@ -185,7 +212,8 @@ def _within(low: float, high: float, least: float, most: float) -> Truth:
 
 def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
     """A zone drawn in the task is looked at as it is; one of the settings as rules judge it."""
-    corners = next(z.corners for z in task.zones if z.name == zone)
+    declared = next(z for z in task.zones if z.name == zone)
+    corners, floor = declared.corners, floor_polygon(declared, task.ground)
     polygon = np.asarray(corners, dtype=float)
     question = "reaching" if name == "outside" else name
 
@@ -193,7 +221,11 @@ def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
         rows = _rows(facts, ids)
         if rows is None:
             return Truth.UNKNOWN
-        if corners:
+        if declared.floor:
+            told = Truth.UNKNOWN
+            if floor is not None:
+                told = stands_in(facts.beliefs[rows[0]], floor, question, facts.mind.frame_size)
+        elif corners:
             region = facts.beliefs[rows[0]].region
             centre = np.array([region.centroid])
             points = centre if name == "inside" else np.asarray(region.contour, dtype=float)

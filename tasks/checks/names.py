@@ -14,6 +14,7 @@ from visup.rules.formula.units import Number, Span
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
+from visup.tasks.actions.floor import floor_map
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.conditions import (
     Amount,
@@ -73,6 +74,7 @@ class NameCheck:
         yield from self.amounts()
         yield from self.compared()
         yield from self.ranges()
+        yield from self.grounds()
         yield from self.kinds()
         yield from self.declared()
         yield from self.unused()
@@ -91,7 +93,14 @@ class NameCheck:
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
-            yield from ((a, meaning.measures if meaning else "") for a in bounds_of(comparison))
+            wanted = meaning.measures if meaning else ""
+            for amount in bounds_of(comparison):
+                on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
+                yield amount, SIZE if on_floor else wanted
+
+    def measured(self, amount: Amount) -> str:
+        """What an amount, or its parameter, measures."""
+        return dimension(self.task.amount(amount))
 
     def amounts(self) -> Iterator[Diagnostic]:
         """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
@@ -188,6 +197,21 @@ class NameCheck:
                 elif kind == "object" and said in zones:
                     what = f"`{said}` is a zone, but `{name}` takes an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
+
+    def grounds(self) -> Iterator[Diagnostic]:
+        """A ground told twice, or by points that do not tell it."""
+        floors = [*(z.floor for z in self.task.zones), *(g.floor for g in self.task.grounds)]
+        for side in (side for floor in floors for point in floor for side in point):
+            known = side.unit in UNITS  # a place may well be 0 m
+            yield from self.of_kind(side, SIZE, side) if known else self.amount(side, SIZE)
+        for ground in self.task.grounds[1:]:
+            hint = "several tasks of one file share it"
+            yield self.source.fault("E224", "`ground` is declared twice", ground.span, hint=hint)
+        for ground in self.task.grounds[:1]:
+            if floor_map(ground) is None:
+                what = "three of the points lie in a line, so they do not tell the floor"
+                expected = "four points, such as the corners of a rectangle on the floor"
+                yield self.source.fault("E136", what, ground.span, expected)
 
     def declared(self) -> Iterator[Diagnostic]:
         """Names declared twice; those of actors alone are told elsewhere."""

@@ -38,6 +38,7 @@ CODES = {
     "E133": "`when` without a condition, or a sign without `when`",
     "E134": "a number of times that is not complete",
     "E135": "`any order` without its list",
+    "E136": "a floor whose points are not right",
     "E201": "an unknown action",
     "E202": "a stage that is not defined",
     "E203": "a stage defined twice",

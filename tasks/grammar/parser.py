@@ -41,6 +41,8 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    FloorPoint,
+    Ground,
     Hold,
     Include,
     Invariant,
@@ -121,6 +123,7 @@ def collect(statements: Several[object], file: str) -> Task:
         parameters=of(Parameter),
         includes=of(Include),
         file=file,
+        grounds=of(Ground),
     )
 
 
@@ -198,7 +201,24 @@ class _TaskBuilder(Transformer[Token, Any]):
         return items[0]
 
     def zone(self, items: list[Any]) -> ZoneDeclaration:
-        return ZoneDeclaration(str(items[0]), tuple(items[1:]), _of(items[0]))
+        name, *corners = items
+        if corners and isinstance(corners[0][0], Number):
+            return ZoneDeclaration(str(name), (), _of(name), tuple(corners))
+        return ZoneDeclaration(str(name), tuple(corners), _of(name))
+
+    def ground(self, items: list[Any]) -> Ground:
+        word, *points = items
+        image, floor = zip(*points, strict=True)
+        return Ground(image, floor, _of(word))
+
+    def point(self, items: list[Any]) -> tuple[tuple[float, float], FloorPoint]:
+        return items[0], items[1]
+
+    def floor(self, items: list[Number]) -> FloorPoint:
+        return items[0], items[1]
+
+    def length(self, items: list[Token]) -> Number:
+        return Number(float(items[0]), str(items[1]), _of(items[0]).to(_of(items[1])))
 
     def corner(self, items: list[Token]) -> tuple[float, float]:
         return float(items[0]), float(items[1])

@@ -20,7 +20,17 @@ from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.statement import NAME
 from visup.tasks.grammar.units import UNITS
 
-STATEMENTS = ("actor", "optional actor", "zone", "parameter", "include", "never", "always", "task")
+STATEMENTS = (
+    "actor",
+    "optional actor",
+    "ground is",
+    "zone",
+    "parameter",
+    "include",
+    "never",
+    "always",
+    "task",
+)
 WORDS = {
     "for": "must hold so long without a break: `for 5 s`",
     "within": "must be over so long after it began: `within 60 s`",

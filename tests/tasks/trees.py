@@ -32,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Ground,
     Hold,
     Include,
     Invariant,
@@ -135,6 +136,15 @@ declared = st.one_of(
     st.builds(Actor, names, st.just(()), sizes, st.just(True)),
 )
 corners = st.lists(st.tuples(amounts, amounts), min_size=3, max_size=4).map(tuple)
+floors = st.tuples(
+    st.builds(Number, amounts, st.sampled_from(["m", "cm"])),
+    st.builds(Number, amounts, st.sampled_from(["m", "mm"])),
+)
+floor_zones = st.builds(
+    ZoneDeclaration, names, st.just(()), floor=st.lists(floors, min_size=3, max_size=4).map(tuple)
+)
+points = st.lists(st.tuples(st.tuples(amounts, amounts), floors), min_size=4, max_size=5)
+grounds = points.map(lambda ps: Ground(tuple(i for i, _ in ps), tuple(f for _, f in ps)))
 tasks = st.builds(
     Task,
     st.lists(stages, min_size=1, max_size=4).map(tuple),
@@ -149,7 +159,10 @@ tasks = st.builds(
         ),
         max_size=2,
     ).map(tuple),
-    st.lists(st.builds(ZoneDeclaration, names, st.just(()) | corners), max_size=2).map(tuple),
+    st.lists(
+        st.builds(ZoneDeclaration, names, st.just(()) | corners) | floor_zones, max_size=2
+    ).map(tuple),
     st.lists(st.builds(Parameter, names, amounts_said), max_size=2).map(tuple),
     st.lists(st.builds(Include, texts), max_size=1).map(tuple),
+    grounds=st.lists(grounds, max_size=1).map(tuple),
 )
