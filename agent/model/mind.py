@@ -37,11 +37,13 @@ class Zone:
         name: What rules call it.
         polygon: Corners (x, y), pixels of the image, at least three, in order.
         depth: (nearest, farthest) relative depth, or None when the zone is drawn in the image alone.
+        on_floor: Whether it lies on the floor: a body is in it where it stands, not where its outline is.
     """
 
     name: str
     polygon: tuple[tuple[float, float], ...]
     depth: tuple[float, float] | None = None
+    on_floor: bool = False
 
 
 @dataclass(frozen=True, eq=False)

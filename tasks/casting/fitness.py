@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import assert_never
 
 from visup.agent import Mind, ObjectBelief
@@ -27,6 +28,7 @@ from visup.tasks.grammar.criteria import (
     Ranked,
 )
 from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.structure import task_actors
 from visup.tasks.grammar.units import value
 
 COLOURED = (0.2, 0.6)
@@ -55,41 +57,59 @@ REST_S = 1.0
 """What rests has rested for so long."""
 
 
-def fits(
-    task: Task,
-    actor: str,
-    models: Sequence[str],
-    objects: Sequence[ObjectBelief],
-    mind: Mind,
-    playing: Mapping[str, int],
-) -> list[float]:
+@dataclass(frozen=True, slots=True)
+class Role:
+    """An actor that is looked for.
+
+    Attributes:
+        task: The task.
+        actor: The actor.
+        mind: What is believed.
+        playing: Actor -> the object that plays it so far: this one's own, those of machines.
+    """
+
+    task: Task
+    actor: str
+    mind: Mind
+    playing: Mapping[str, int]
+
+
+def fits(role: Role, models: Sequence[str], objects: Sequence[ObjectBelief]) -> list[float]:
     """How well each object fits what is said of an actor, 0 to 1.
 
     Args:
-        task: The task.
-        actor: Its actor.
+        role: The actor.
         models: The models that it may be; empty for one that is told by criteria alone.
         objects: The objects.
-        mind: What is believed of them.
-        playing: Actor -> the object that plays it: its own object, those of machines.
     """
-    criteria = task.actor(actor).criteria
-    looked = [_by_models(o, actor, models, mind) for o in objects]
+    criteria = role.task.actor(role.actor).criteria
+    looked = [strength(o, models) if models else 1.0 for o in objects]
     if not criteria:
-        return looked
-    known = [traits_of(mind, o.id) or NOTHING for o in objects]
+        return _answered(looked, role, objects)
+    known = [traits_of(role.mind, o.id) or NOTHING for o in objects]
     plain = [c for c in criteria if not isinstance(c, Ranked)]
     fit = [
-        min([looks, *(_meets(c, task, actor, o, t, mind, playing) for c in plain)])
+        min([looks, *(_meets(c, role, o, t) for c in plain)])
         for looks, o, t in zip(looked, objects, known, strict=True)
     ]
     for criterion in criteria:
         if isinstance(criterion, Ranked):
-            fit = _ranked(criterion, fit, objects, known, playing.get(actor))
+            fit = _ranked(criterion, fit, objects, known, role.playing.get(role.actor))
         elif isinstance(criterion, Conduct) and criterion.kind == "moves":
             fit = _first_to_move(fit, known)
+    return _answered(fit, role, objects)
+
+
+def _answered(fit: list[float], role: Role, objects: Sequence[ObjectBelief]) -> list[float]:
+    """What the operator has said goes before: an object that is an actor is that one and no other."""
+    answers = role.mind.answers
+    if not answers:
+        return fit
+    actors = task_actors(role.task)
+    said = {o.id: answers[o.id] for o in objects if answers.get(o.id) in actors}
     return [
-        1.0 if mind.answers.get(o.id) == actor else f for o, f in zip(objects, fit, strict=True)
+        float(said[o.id] == role.actor) if o.id in said else f
+        for o, f in zip(objects, fit, strict=True)
     ]
 
 
@@ -113,44 +133,35 @@ def asks_for_colour(task: Task) -> bool:
     return any(isinstance(c, Colours) for a in task.actors for c in a.criteria)
 
 
-def _by_models(belief: ObjectBelief, actor: str, models: Sequence[str], mind: Mind) -> float:
-    if models:
-        return strength(belief, models)
-    return 0.0 if mind.answers.get(belief.id, actor) != actor else 1.0
-
-
-def _meets(
-    criterion: Criterion,
-    task: Task,
-    actor: str,
-    belief: ObjectBelief,
-    traits: Traits,
-    mind: Mind,
-    playing: Mapping[str, int],
-) -> float:
+def _meets(criterion: Criterion, role: Role, belief: ObjectBelief, traits: Traits) -> float:
     """How well an object meets one criterion, 0 to 1; an order is not judged here."""
     match criterion:
         case Colours(names=names):
             shares = (colour_share(name, traits.palette) for name in names)
             return _rise(max(shares), *COLOURED)
-        case Extent(compared=compared, amount=amount):
-            bound = value(task.amount(amount))
-            larger = _rise(traits.extent, bound * (1 - SIZE_SHARE), bound * (1 + SIZE_SHARE))
-            known = traits.extent == traits.extent  # NaN is not equal to itself
-            return (larger if compared == "larger" else 1.0 - larger) if known else 0.0
+        case Extent():
+            return _sized(criterion, value(role.task.amount(criterion.amount)), traits)
         case Place(at=at):
-            return _placed(traits, at, mind)
+            return _placed(traits, at, role.mind)
         case Conduct():
             # What it did when it was chosen chose it; what it does afterwards is for the stages.
-            return float(playing.get(actor) == belief.id or _behaves(criterion, traits, mind))
+            chosen = role.playing.get(role.actor) == belief.id
+            return float(chosen or _behaves(criterion, traits, role.mind))
         case PartOf(machine=machine):
-            return _hangs_together(belief.id, playing.get(str(machine)), mind)
+            return _hangs_together(belief.id, role.playing.get(str(machine)), role.mind)
         case Another():
             return NOT_FIRST
         case Ranked() | OtherModels():
             return 1.0
         case _:
             assert_never(criterion)
+
+
+def _sized(criterion: Extent, bound: float, traits: Traits) -> float:
+    if traits.extent != traits.extent:  # NaN: it was never seen whole
+        return 0.0
+    larger = _rise(traits.extent, bound * (1 - SIZE_SHARE), bound * (1 + SIZE_SHARE))
+    return larger if criterion.compared == "larger" else 1.0 - larger
 
 
 def _behaves(criterion: Conduct, traits: Traits, mind: Mind) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from visup.agent import Binding, Mind, ObjectBelief, Presence
-from visup.tasks.casting.fitness import fits
+from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import machines_of, stage_actors, stage_names, task_actors
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
@@ -56,7 +56,7 @@ def match(
         for group in _machines_first(task, actors):
             free = [o for o in objects if o.id not in {i for i, _ in found.values()}]
             playing = {**held, **{a: i for a, (i, _) in found.items()}}
-            pure = [fits(task, a, models[a], free, mind, playing) for a in group]
+            pure = [fits(Role(task, a, mind, playing), models[a], free) for a in group]
             weight = [
                 _weights(row, free, held.get(a), a in current, settings)
                 for row, a in zip(pure, group, strict=True)
@@ -142,7 +142,7 @@ def unexplained(
         return tuple(o.id for o in strange)
     playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
     awaited = [b.actor for b in bindings if b.object_id is None and not b.models]
-    rows = [fits(task, a, (), strange, mind, playing) for a in awaited]
+    rows = [fits(Role(task, a, mind, playing), (), strange) for a in awaited]
     free = [all(row[j] < settings.bind_at for row in rows) for j in range(len(strange))]
     return tuple(o.id for o, is_free in zip(strange, free, strict=True) if is_free)
 

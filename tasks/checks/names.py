@@ -14,11 +14,19 @@ from visup.rules.formula.units import Number, Span
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
+from visup.tasks.actions.floor import floor_map
 from visup.tasks.diagnostics.recovery import ParsedFile
-from visup.tasks.grammar.conditions import Amount, Name, ParameterRef, action_of, bound_of, facts_of
+from visup.tasks.grammar.conditions import (
+    Amount,
+    Name,
+    ParameterRef,
+    action_of,
+    bounds_of,
+    facts_of,
+)
 from visup.tasks.grammar.criteria import Extent
 from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
-from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of
+from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of, value
 
 Asked = tuple[str, tuple[Name, ...], Span]
 """An action that a file names, its actors, and where."""
@@ -65,6 +73,8 @@ class NameCheck:
         """All faults of the words."""
         yield from self.amounts()
         yield from self.compared()
+        yield from self.ranges()
+        yield from self.grounds()
         yield from self.kinds()
         yield from self.declared()
         yield from self.unused()
@@ -83,7 +93,14 @@ class NameCheck:
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
-            yield bound_of(comparison), meaning.measures if meaning else ""
+            wanted = meaning.measures if meaning else ""
+            for amount in bounds_of(comparison):
+                on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
+                yield amount, SIZE if on_floor else wanted
+
+    def measured(self, amount: Amount) -> str:
+        """What an amount, or its parameter, measures."""
+        return dimension(self.task.amount(amount))
 
     def amounts(self) -> Iterator[Diagnostic]:
         """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
@@ -153,6 +170,16 @@ class NameCheck:
                 some = sorted(m.name for m in self.actions.values() if m.measures)
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
+    def ranges(self) -> Iterator[Diagnostic]:
+        """Ranges in which nothing lies."""
+        for comparison in self.comparisons:
+            ends = [self.task.amount(a) for a in bounds_of(comparison)]
+            alike = len({dimension(e) for e in ends} - {""}) == 1
+            if len(ends) == 2 and alike and value(ends[0]) >= value(ends[1]):
+                what = f"nothing lies between {ends[0]} and {ends[1]}"
+                expected = "the lesser amount first, then a greater one"
+                yield self.source.fault("E238", what, comparison.span, expected)
+
     def kinds(self) -> Iterator[Diagnostic]:
         """Zones where actors belong, and the other way round."""
         zones = {z.name for z in self.task.zones}
@@ -170,6 +197,21 @@ class NameCheck:
                 elif kind == "object" and said in zones:
                     what = f"`{said}` is a zone, but `{name}` takes an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
+
+    def grounds(self) -> Iterator[Diagnostic]:
+        """A ground told twice, or by points that do not tell it."""
+        floors = [*(z.floor for z in self.task.zones), *(g.floor for g in self.task.grounds)]
+        for side in (side for floor in floors for point in floor for side in point):
+            known = side.unit in UNITS  # a place may well be 0 m
+            yield from self.of_kind(side, SIZE, side) if known else self.amount(side, SIZE)
+        for ground in self.task.grounds[1:]:
+            hint = "several tasks of one file share it"
+            yield self.source.fault("E224", "`ground` is declared twice", ground.span, hint=hint)
+        for ground in self.task.grounds[:1]:
+            if floor_map(ground) is None:
+                what = "three of the points lie in a line, so they do not tell the floor"
+                expected = "four points, such as the corners of a rectangle on the floor"
+                yield self.source.fault("E136", what, ground.span, expected)
 
     def declared(self) -> Iterator[Diagnostic]:
         """Names declared twice; those of actors alone are told elsewhere."""

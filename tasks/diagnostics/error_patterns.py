@@ -167,13 +167,31 @@ def _zone(text: str) -> RecognisedError | None:
         return None
     what = "the name of the zone is missing"
     if m[2]:
-        corners = len(re.findall(r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)", text))
+        corner = r"\(\s*[\d.]+\s*(?:[^\W\d]+\s*)?,\s*[\d.]+\s*(?:[^\W\d]+\s*)?\)"
+        corners = len(re.findall(corner, text))
         what = f"zone `{m[2]}` is drawn with something that is not a corner"
         what = f"zone `{m[2]}` has fewer than three corners" if corners < 3 else what
         what = what if m[3] else f"`is` is missing after zone `{m[2]}`"
     start = m.start(2) if m[2] else m.start(1)
     expected = f"`zone {m[2] or 'berth'} is (100, 50) (300, 50) (300, 200)`, in pixels"
     return RecognisedError("E131", start, len(m[2] or m[1]), what, expected)
+
+
+def _ground(text: str) -> RecognisedError | None:
+    m = re.match(r"\s*(ground)\b\s*(is\b)?", text)
+    if m is None:
+        return None
+    pair = (
+        r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)\s*=\s*\(\s*[\d.]+\s*[^\W\d]+\s*,\s*[\d.]+\s*[^\W\d]+\s*\)"
+    )
+    points = len(re.findall(pair, text))
+    what = (
+        "`ground` is told by something that is not a point of the image and its place on the floor"
+    )
+    what = "`ground` is told by fewer than four points" if points < 4 and m[2] else what
+    what = what if m[2] else "`is` is missing after `ground`"
+    expected = "`ground is (80, 400) = (0 m, 0 m), ...`, four points or more"
+    return RecognisedError("E136", m.start(1), 6, what, expected)
 
 
 def _parameter(text: str) -> RecognisedError | None:
@@ -209,6 +227,7 @@ PATTERNS: tuple[ErrorPattern, ...] = (
     _heading,
     _include,
     _zone,
+    _ground,
     _parameter,
     signs,
     _not_in_language,

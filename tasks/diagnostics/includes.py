@@ -86,6 +86,7 @@ def _joined(one: ParsedFile, other: ParsedFile) -> ParsedFile:
         invariants=(*a.invariants, *b.invariants),
         zones=(*a.zones, *b.zones),
         parameters=(*a.parameters, *b.parameters),
+        grounds=(*a.grounds, *b.grounds),
     )
     return ParsedFile(
         task, (*one.faults, *other.faults), one.defined | other.defined, one.used | other.used

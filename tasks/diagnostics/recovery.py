@@ -21,12 +21,13 @@ NAME = r"[^\W\d]\w*"
 HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
 OPENS = re.compile(  # a line that begins a statement, well written or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
-    r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage)\b(?![ ]*\())"
+    r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage"
+    r"|ground(?=[ ]+is\b))\b(?![ ]*\())"
 )
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
-    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|than|from|the|of|another|at))\s*$"
+    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
 LONGEST = 4000  # characters of a statement that mistakes are looked for in
@@ -194,6 +195,8 @@ SAID = {
     "TEXT": "a text in double quotes",
     "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
     "COMPARE": "`<` or `>`",
+    "GROUND": "`ground`",
+    "BETWEEN": "`between`",
     "_TIMES": "`times`",
     "AT": "`at least` or `at most`",
     "ANY": "`any order`",
@@ -204,7 +207,7 @@ SAID = {
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
-    "enters", "moves", "first", "rests", "from", "part", "of",
+    "ground", "between", "enters", "moves", "first", "rests", "from", "part", "of",
 )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ Read before: `conditions.py` and `ast_courses.py`. Read next: `parser.py` (text 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from visup.rules.formula.nodes import Comparison
 from visup.rules.formula.units import NOWHERE, Number, Span, number_text
@@ -49,6 +49,8 @@ __all__ = [
     "Counted",
     "Course",
     "Deadline",
+    "FloorPoint",
+    "Ground",
     "Hold",
     "Include",
     "Invariant",
@@ -69,6 +71,10 @@ __all__ = [
     "children",
     "walk",
 ]
+
+
+FloorPoint: TypeAlias = tuple[Number, Number]
+"""A place on the floor: two lengths, in metres or parts of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,15 +144,45 @@ class Actor:
 
 @dataclass(frozen=True, slots=True)
 class ZoneDeclaration:
-    """`zone berth is (100, 50) (300, 50) (300, 200)`: corners in pixels; none for one drawn elsewhere."""
+    """`zone berth is (100, 50) (300, 50) (300, 200)`, `zone yard is (0 m, 0 m) (2 m, 0 m) (2 m, 1 m)`.
+
+    Attributes:
+        name: Its name.
+        corners: In the image, pixels; none for a zone drawn elsewhere, or on the floor.
+        floor: Corners on the floor, of a zone in which a body is where it stands.
+    """
 
     name: str
     corners: tuple[tuple[float, float], ...] = ()
     span: Span = field(default=NOWHERE, compare=False, repr=False)
+    floor: tuple[FloorPoint, ...] = ()
 
     def __str__(self) -> str:
-        corners = " ".join(f"({number_text(x)}, {number_text(y)})" for x, y in self.corners)
+        corners = " ".join([*map(_pair, self.corners), *map(_pair, self.floor)])
         return f"zone {self.name}{' is ' + corners if corners else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """`ground is (80, 400) = (0 m, 0 m), ...`: points of the image, and where they are on the floor.
+
+    Attributes:
+        image: (x, y) of each, pixels.
+        floor: Its place on the floor.
+    """
+
+    image: tuple[tuple[float, float], ...]
+    floor: tuple[FloorPoint, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        points = zip(self.image, self.floor, strict=True)
+        return f"ground is {', '.join(f'{_pair(i)} = {_pair(f)}' for i, f in points)}"
+
+
+def _pair(point: FloorPoint | tuple[float, float]) -> str:
+    x, y = (p if isinstance(p, Number) else number_text(p) for p in point)
+    return f"({x}, {y})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +235,7 @@ class Task:
         zones: Parts of the image that it names.
         parameters: Amounts that it names.
         includes: Files that it includes; their statements stand among the others.
+        grounds: Where points of the image are on the floor; more than one is a mistake.
         file: Name of the file, for messages.
         root: The rule that is the task when the file has several; empty for its first one.
     """
@@ -211,6 +248,12 @@ class Task:
     includes: tuple[Include, ...] = ()
     file: str = field(default="<text>", compare=False)
     root: str = ""
+    grounds: tuple[Ground, ...] = ()
+
+    @property
+    def ground(self) -> Ground | None:
+        """Where points of the image are on the floor, or None while nobody says so."""
+        return next(iter(self.grounds), None)
 
     @property
     def declared(self) -> tuple[Actor | ZoneDeclaration | Parameter, ...]:
@@ -254,5 +297,5 @@ class Task:
         return found if isinstance(found, Number) else Number(0.0)
 
     def __str__(self) -> str:
-        said = (*self.includes, *self.parameters, *self.actors, *self.zones)
+        said = (*self.includes, *self.parameters, *self.actors, *self.grounds, *self.zones)
         return "\n".join(map(str, (*said, *self.stages, *self.invariants)))

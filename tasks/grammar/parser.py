@@ -13,7 +13,7 @@ from lark import Lark, Token, Transformer
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span
-from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.conditions import Condition, Range
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -41,6 +41,8 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    FloorPoint,
+    Ground,
     Hold,
     Include,
     Invariant,
@@ -121,6 +123,7 @@ def collect(statements: Several[object], file: str) -> Task:
         parameters=of(Parameter),
         includes=of(Include),
         file=file,
+        grounds=of(Ground),
     )
 
 
@@ -198,7 +201,24 @@ class _TaskBuilder(Transformer[Token, Any]):
         return items[0]
 
     def zone(self, items: list[Any]) -> ZoneDeclaration:
-        return ZoneDeclaration(str(items[0]), tuple(items[1:]), _of(items[0]))
+        name, *corners = items
+        if corners and isinstance(corners[0][0], Number):
+            return ZoneDeclaration(str(name), (), _of(name), tuple(corners))
+        return ZoneDeclaration(str(name), tuple(corners), _of(name))
+
+    def ground(self, items: list[Any]) -> Ground:
+        word, *points = items
+        image, floor = zip(*points, strict=True)
+        return Ground(image, floor, _of(word))
+
+    def point(self, items: list[Any]) -> tuple[tuple[float, float], FloorPoint]:
+        return items[0], items[1]
+
+    def floor(self, items: list[Number]) -> FloorPoint:
+        return items[0], items[1]
+
+    def length(self, items: list[Token]) -> Number:
+        return Number(float(items[0]), str(items[1]), _of(items[0]).to(_of(items[1])))
 
     def corner(self, items: list[Token]) -> tuple[float, float]:
         return float(items[0]), float(items[1])
@@ -276,8 +296,9 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def comparison(self, items: list[Any]) -> Comparison:
         quantity = Measure(items[0].name, items[0].words, items[0].span)
-        span = quantity.span.to(items[2].span)
-        return Comparison(quantity, str(items[1]), cast("Term", items[2]), span=span)
+        span = quantity.span.to(items[-1].span)
+        right = items[2] if len(items) == 3 else Range(items[2], items[3], _all(items[2:]))
+        return Comparison(quantity, str(items[1]), cast("Term", right), span=span)
 
     def reference(self, items: list[Token]) -> Reference:
         return Reference(_bare(items[0]), _of(items[0]))

@@ -28,7 +28,7 @@ from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.derivatives import leaves
-from visup.tasks.casting.fitness import fits
+from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.casting.matching import match, unexplained
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
@@ -286,7 +286,7 @@ def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, i
     belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
     if belief is None:
         return replace(binding, object_id=None, strength=0.0)
-    (now,) = fits(task, binding.actor, binding.models, [belief], mind, playing)
+    (now,) = fits(Role(task, binding.actor, mind, playing), binding.models, [belief])
     return replace(binding, strength=now)
 
 

@@ -20,10 +20,21 @@ from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.statement import NAME
 from visup.tasks.grammar.units import UNITS
 
-STATEMENTS = ("actor", "optional actor", "zone", "parameter", "include", "never", "always", "task")
+STATEMENTS = (
+    "actor",
+    "optional actor",
+    "ground is",
+    "zone",
+    "parameter",
+    "include",
+    "never",
+    "always",
+    "task",
+)
 WORDS = {
     "for": "must hold so long without a break: `for 5 s`",
     "within": "must be over so long after it began: `within 60 s`",
+    "between": "a quantity stays within a range: `gap(arm, satellite) between 20 px and 100 px`",
     "at least": "how often at least: `at least 2 times`",
     "at most": "how often at most: `at most 5 times`",
     "any order": "each once, one after the other: `any order (<a>, <b>)`",

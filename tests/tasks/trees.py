@@ -8,7 +8,7 @@ from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure
 from visup.rules.traits.colours import SHADES, TERMS
 from visup.tasks.diagnostics.actor_error_patterns import RANKS
-from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.conditions import Condition, Range
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -32,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Ground,
     Hold,
     Include,
     Invariant,
@@ -69,11 +70,12 @@ holds = st.builds(Hold, amounts_said)
 clauses: st.SearchStrategy[Clause] = st.one_of(holds, st.builds(Deadline, amounts_said))
 actors = st.lists(names.map(Name), min_size=1, max_size=3).map(tuple)
 actions = st.builds(Action, names, actors)
-comparisons = st.builds(
-    Comparison,
-    st.builds(Measure, names, actors),
-    st.sampled_from(["<", "<=", ">", ">="]),
-    amounts_said,
+measures = st.builds(Measure, names, actors)
+comparisons = st.one_of(
+    st.builds(Comparison, measures, st.sampled_from(["<", "<=", ">", ">="]), amounts_said),
+    st.builds(
+        Comparison, measures, st.just("between"), st.builds(Range, amounts_said, amounts_said)
+    ),
 )
 references = st.builds(Reference, names)
 facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
@@ -134,6 +136,15 @@ declared = st.one_of(
     st.builds(Actor, names, st.just(()), sizes, st.just(True)),
 )
 corners = st.lists(st.tuples(amounts, amounts), min_size=3, max_size=4).map(tuple)
+floors = st.tuples(
+    st.builds(Number, amounts, st.sampled_from(["m", "cm"])),
+    st.builds(Number, amounts, st.sampled_from(["m", "mm"])),
+)
+floor_zones = st.builds(
+    ZoneDeclaration, names, st.just(()), floor=st.lists(floors, min_size=3, max_size=4).map(tuple)
+)
+points = st.lists(st.tuples(st.tuples(amounts, amounts), floors), min_size=4, max_size=5)
+grounds = points.map(lambda ps: Ground(tuple(i for i, _ in ps), tuple(f for _, f in ps)))
 tasks = st.builds(
     Task,
     st.lists(stages, min_size=1, max_size=4).map(tuple),
@@ -148,7 +159,10 @@ tasks = st.builds(
         ),
         max_size=2,
     ).map(tuple),
-    st.lists(st.builds(ZoneDeclaration, names, st.just(()) | corners), max_size=2).map(tuple),
+    st.lists(
+        st.builds(ZoneDeclaration, names, st.just(()) | corners) | floor_zones, max_size=2
+    ).map(tuple),
     st.lists(st.builds(Parameter, names, amounts_said), max_size=2).map(tuple),
     st.lists(st.builds(Include, texts), max_size=1).map(tuple),
+    grounds=st.lists(grounds, max_size=1).map(tuple),
 )

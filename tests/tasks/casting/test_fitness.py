@@ -9,9 +9,13 @@ from functools import cache
 import pytest
 
 from tests.rules.scenes import SIZE, Rect, box_region, seen
-from visup.agent import Mind, Percept, Report, ReportState
+from tests.tasks.scripted import belief
+from visup.agent import Binding, Mind, Percept, Report, ReportState, TaskBelief, Verdict
+from visup.agent.cycle.answers import resolve_model
+from visup.rules.identity.votes import answered_model
 from visup.rules.reasoners import default_reasoners
 from visup.tasks import parse_task
+from visup.tasks.casting.matching import match
 from visup.tasks.supervision.supervise import task_reasoner
 
 LAB = {"red": (52.0, 70.0, 50.0), "blue": (36.0, 20.0, -60.0), "grey": (52.0, 0.0, 0.0)}
@@ -158,3 +162,26 @@ def test_a_part_hangs_together_with_its_machine() -> None:
     declared = "actor a is part of arm and red\nactor arm is arm"
     assert bound(declared, paths, {2: "red", 3: "red"}, 3.0, names, "a arm") == [3, 1]
     assert bound("actor claw is part of arm", paths, None, 3.0, names, "claw arm") == [3, 1]
+
+
+def test_the_operators_word_makes_an_object_an_actor_and_no_other() -> None:
+    task = parse_task("actor a is red\nactor b is another red\n<t> ::= seen(a) seen(b)")
+    said = Mind(objects={i: belief(i, {}) for i in (1, 2)}, answers={2: "a"})
+    assert [b.object_id for b in match(task, said)] == [2, None]
+
+
+CAST = {"left": ("leg",), "right": ("leg",), "part": (), "arm": ("rms",)}
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"), [("left", "left"), ("Part", "part"), ("arm", "rms"), ("rms", "rms")]
+)
+def test_an_actor_is_an_answer_by_its_model_where_that_tells_it(name: str, meant: str) -> None:
+    assert resolve_model(Mind(), name, ("rms", "leg"), cast=CAST) == meant
+
+
+def test_an_object_answered_as_an_actor_is_believed_to_be_its_model() -> None:
+    belief_of = TaskBelief("t", Verdict.UNKNOWN, bindings=(Binding("left", ("leg",)),))
+    mind = Mind(tasks=(belief_of,))
+    assert answered_model(mind, "left") == "leg"
+    assert answered_model(mind, "rms") == "rms"
