@@ -29,7 +29,7 @@ from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.casting.fitness import Role, fits
-from visup.tasks.casting.matching import match, unexplained
+from visup.tasks.casting.matching import bystanders, machines, match, unexplained
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
 from visup.tasks.supervision.events import (
@@ -201,13 +201,15 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     broken = broken_since(model, snapshot, memory)
     strange = _strange(model, snapshot, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
-    if {b.object_id for b in bindings} & set(strangers):
+    let_be = bystanders(model.task, mind, bindings, settings)
+    if ({b.object_id for b in bindings} | set(let_be)) & set(strangers):
         interrupted, strangers = "", ()
     if not interrupted:
-        interrupted, strangers = _interrupted(model, snapshot, memory, broken)
+        interrupted, strangers = _interrupted(model, snapshot, memory, broken, let_be)
     belief = task_belief(model, snapshot, posterior, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
-    belief = replace(belief, unexplained=lasting)
+    one = machines(model.task, bindings)
+    belief = replace(belief, unexplained=lasting, bystanders=let_be, machines=one)
     return TaskMemory(
         now,
         posterior,
@@ -322,14 +324,17 @@ def _interrupted(
     snapshot: TaskSnapshot,
     memory: TaskMemory,
     broken: tuple[float | None, ...],
+    let_be: tuple[int, ...],
 ) -> tuple[str, tuple[int, ...]]:
     """Why the task is interrupted by something unsafe, or empty; and by which unexpected objects.
 
-    A task that is over is not interrupted.
+    A task that is over is not interrupted, nor is any by bystanders.
     """
     if memory.belief.verdict in OVER:
         return "", ()
     for alert in snapshot.mind.alerts:
+        if set(alert.objects) & set(let_be):
+            continue
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
