@@ -39,7 +39,6 @@ from visup.tasks.supervision.events import (
     stage_concerns,
     stage_events,
 )
-from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.invariants import (
     broken_since,
     invariant_concerns,
@@ -48,6 +47,7 @@ from visup.tasks.supervision.invariants import (
 )
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.supervision.replay import followed, newly_found, remembered, replayed
 from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
@@ -56,7 +56,6 @@ from visup.tasks.verification.step_monitor import BAD
 MEMORY: MemoryKey[tuple[TaskMemory, ...]] = MemoryKey("tasks", ())
 OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
-LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
 UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often than this
 
 
@@ -188,6 +187,7 @@ def _with_activity(
         posterior = None  # a rival has ended; what follows is another matter
     if posterior and any(x.payload.status in BAD for x in leaves(posterior.likeliest.state)):
         posterior = None  # if it begins yet, it begins from its beginning
+    memory = memory if posterior is memory.posterior else replace(memory, looks=())
     belief = suppressed(belief, activity)
     return replace(memory, activity=activity, belief=belief, posterior=posterior, inferred=now)
 
@@ -196,8 +196,14 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     """One step of one task: bind its actors, follow its hypotheses, judge."""
     settings, now = model.settings, mind.time
     bindings, rival, rival_since = _bind(model, memory, mind)
-    snapshot = TaskSnapshot(mind, bindings, model, dict(memory.lasting))
-    posterior, gain = _filtered(model, memory, snapshot)
+    start, since = memory.posterior, memory.lasting
+    if memory.looks and newly_found(memory.belief.bindings, bindings, mind):
+        start, since = replayed(model, memory.looks, bindings)
+    snapshot = TaskSnapshot(mind, bindings, model, dict(since))
+    posterior = followed(model, start, snapshot)
+    gain = 0.0
+    if start is not None and posterior is not None:
+        gain = model.gain(posterior.likeliest, snapshot.observe)
     broken = broken_since(model, snapshot, memory)
     strange = _strange(model, snapshot, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
@@ -224,7 +230,14 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         memory.activity,
         gain,
         memory.inferred,
+        remembered(memory.looks, mind, start, since) if _awaited(model, bindings) else (),
     )
+
+
+def _awaited(model: MonitoredPhases, bindings: Sequence[Binding]) -> bool:
+    """Whether an actor without whom the task cannot be judged is still looked for."""
+    unbound = (b.actor for b in bindings if b.object_id is None)
+    return any(not model.task.actor(a).optional for a in unbound)
 
 
 def _events(
@@ -290,23 +303,6 @@ def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, i
         return replace(binding, object_id=None, strength=0.0)
     (now,) = fits(Role(task, binding.actor, mind, playing), binding.models, [belief])
     return replace(binding, strength=now)
-
-
-def _filtered(
-    model: MonitoredPhases, memory: TaskMemory, snapshot: TaskSnapshot
-) -> tuple[TaskHypotheses | None, float]:
-    """The hypotheses with what is seen now, and the evidence of a second that the task is going on.
-
-    The task begins once all actors of one of its first steps are found.
-    """
-    now = snapshot.mind.time
-    if memory.posterior is None:
-        found = any(snapshot.found(step.actors) for step in model.first_steps)
-        begun = model.filter.start(now)
-        return (model.filter.step(begun, snapshot.observe, 0.0) if found else None), 0.0
-    dt = min(max(0.0, now - memory.time), LONGEST_STEP_S)
-    posterior = model.filter.step(memory.posterior, snapshot.observe, dt, now)
-    return posterior, model.gain(posterior.likeliest, snapshot.observe)
 
 
 def _strange(
