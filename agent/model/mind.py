@@ -121,6 +121,10 @@ class Mind:
         """Whether two objects are believed to be rigidly connected."""
         return any(c.objects == (min(a, b), max(a, b)) for c in self.couplings)
 
+    def one_machine(self, a: int, b: int) -> bool:
+        """Whether two objects are parts of one machine, as a task tells its parts."""
+        return any(a in parts and b in parts for task in self.tasks for parts in task.machines)
+
     def relation(self, name: str, *objects: int) -> Relation | None:
         """The relation of that name between exactly these objects, or None when it is not judged.
 

@@ -28,7 +28,7 @@ from visup.tasks.grammar.statement import RESERVED_WORDS as RESERVED
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import MEASURES, SIZE, dimension, value
 
-OF_TASKS = frozenset({"unexpected", "expected", "actor"})
+OF_TASKS = frozenset({"unexpected", "expected", "actor", "bystander", "one_machine"})
 """Words of rules that speak of tasks themselves: a task that asked for them would ask for itself."""
 
 BETWEEN = "between"

@@ -124,13 +124,14 @@ def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
 
 def asks_for_traits(task: Task) -> bool:
     """Whether a task tells some actor by more than its models and its machine."""
-    criteria = (c for a in task.actors for c in a.criteria)
+    criteria = (c for a in (*task.actors, *task.bystanders) for c in a.criteria)
     return any(not isinstance(c, PartOf | Another | OtherModels) for c in criteria)
 
 
 def asks_for_colour(task: Task) -> bool:
     """Whether a task tells some actor by its colour."""
-    return any(isinstance(c, Colours) for a in task.actors for c in a.criteria)
+    declared = (*task.actors, *task.bystanders)
+    return any(isinstance(c, Colours) for a in declared for c in a.criteria)
 
 
 def _meets(criterion: Criterion, role: Role, belief: ObjectBelief, traits: Traits) -> float:

@@ -113,6 +113,37 @@ def _held_weight(weight: float, belief: ObjectBelief, settings: TaskSettings) ->
     return weight + settings.keep_bonus
 
 
+def bystanders(
+    task: Task,
+    mind: Mind,
+    bindings: Sequence[Binding],
+    settings: TaskSettings = DEFAULT_SETTINGS,
+) -> tuple[int, ...]:
+    """Objects that the task lets be, by id: they play no actor, and are what it calls bystanders."""
+    if not task.bystanders:
+        return ()
+    playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
+    others = [o for o in mind.present() if o.id not in playing.values()]
+    if any(not b.name for b in task.bystanders):
+        return tuple(o.id for o in others)
+    rows = [
+        fits(Role(task, b.name, mind, {}), task.models(b.name), others) for b in task.bystanders
+    ]
+    best = [max(row[j] for row in rows) for j in range(len(others))]
+    return tuple(o.id for o, fit in zip(others, best, strict=True) if fit >= settings.familiar)
+
+
+def machines(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[int, ...], ...]:
+    """The objects that are one machine with its parts, for each machine of which parts are found."""
+    playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
+    groups: dict[str, set[int]] = {}
+    for actor, object_id in playing.items():
+        whole = (*machines_of(task, actor), actor)
+        outermost = next((m for m in reversed(whole[:-1])), actor)
+        groups.setdefault(outermost, set()).add(object_id)
+    return tuple(tuple(sorted(g)) for g in groups.values() if len(g) > 1)
+
+
 def unexplained(
     mind: Mind,
     bindings: Sequence[Binding],
@@ -127,7 +158,12 @@ def unexplained(
     rests on a few seconds only; only one that is clearly something else is unexplained.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
+    if task is not None:
+        bound.update(bystanders(task, mind, bindings, settings))
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
+    if task is not None and task.bystanders:
+        # Who it is shows after a while only, and till then it may be one of them.
+        others = [o for o in others if mind.time - o.first_seen >= settings.acquainted_s]
     if all(b.object_id is not None for b in bindings if b.actor not in optional):
         return tuple(o.id for o in others)
     known = {m for b in bindings for m in b.models}

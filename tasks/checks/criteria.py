@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from visup.rules.language.diagnostics import Diagnostic, Source
-from visup.tasks.grammar.criteria import Conduct, Extent, OtherModels, Place, Ranked
+from visup.tasks.grammar.criteria import Conduct, Extent, OtherModels, PartOf, Place, Ranked
 from visup.tasks.grammar.nodes import Actor, Task
 from visup.tasks.grammar.structure import machines_of
 from visup.tasks.grammar.units import value
@@ -15,7 +15,7 @@ OPPOSITES = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest", "lo
 
 def criteria_faults(task: Task, source: Source) -> Iterator[Diagnostic]:
     """One fault for each actor whose criteria no object can meet, or whose machine is its own part."""
-    for actor in task.actors:
+    for actor in (*task.actors, *task.bystanders):
         why = _impossible(task, actor)
         if why:
             what = f"no object can be actor `{actor.name}`: {why}"
@@ -33,7 +33,7 @@ def _impossible(task: Task, actor: Actor) -> str:
     others = [c for c in criteria if isinstance(c, OtherModels)]
     if others:
         return f"`{' or '.join(actor.models)}` and `{others[0]}` are different models"
-    for kind, what in ((Place, "places"), (Conduct, "things to do")):
+    for kind, what in ((Place, "places"), (Conduct, "things to do"), (PartOf, "machines")):
         several = [c for c in criteria if isinstance(c, kind)]
         if len(several) > 1:
             return f"`{several[0]}` and `{several[1]}` are two {what}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,9 +25,21 @@ from visup.tasks.grammar.conditions import (
     facts_of,
 )
 from visup.tasks.grammar.criteria import Extent
-from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
+from visup.tasks.grammar.nodes import (
+    Actor,
+    Actors,
+    Conditioned,
+    Course,
+    Parameter,
+    Task,
+    Timed,
+    ZoneDeclaration,
+    walk,
+)
+from visup.tasks.grammar.structure import task_actors
 from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of, value
 
+Declared = Actor | ZoneDeclaration | Parameter
 Asked = tuple[str, tuple[Name, ...], Span]
 """An action that a file names, its actors, and where."""
 
@@ -89,7 +101,7 @@ class NameCheck:
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
-        criteria = (c for a in self.task.actors for c in a.criteria)
+        criteria = (c for a in (*self.task.actors, *self.task.bystanders) for c in a.criteria)
         yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
@@ -216,7 +228,17 @@ class NameCheck:
     def declared(self) -> Iterator[Diagnostic]:
         """Names declared twice; those of actors alone are told elsewhere."""
         first: dict[str, str] = {a.name: "an actor" for a in self.task.actors}
-        for kind, declared in (("a zone", self.task.zones), ("a parameter", self.task.parameters)):
+        bystanders = [b for b in self.task.bystanders if b.name]
+        for b in bystanders:
+            if b.name in task_actors(self.task):
+                what = f"`{b.name}` is declared as a bystander, but it takes part"
+                yield self.source.fault("E224", what, b.span, "another name")
+        kinds: tuple[tuple[str, Sequence[Declared]], ...] = (
+            ("a bystander", bystanders),
+            ("a zone", self.task.zones),
+            ("a parameter", self.task.parameters),
+        )
+        for kind, declared in kinds:
             for one in declared:
                 if one.name in first:
                     what = f"`{one.name}` is declared as {kind} and is {first[one.name]} already"

@@ -14,7 +14,7 @@ _RANKS_MEANT = {
     "topmost": "highest", "uppermost": "highest", "top": "highest", "bottom": "lowest",
     "bottommost": "lowest", "tiniest": "smallest",
 }  # fmt: skip
-_ACTOR = re.compile(rf"\s*(?:optional\s+)?actor\b\s*({NAME})?\s*(\S*)")
+_ACTOR = re.compile(rf"\s*(?:(?:optional\s+)?actor|bystander)\b\s*({NAME})?\s*(\S*)")
 _BLANK = re.compile(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|and\b|size\b)([\w.\-]+)")
 
 
@@ -23,6 +23,16 @@ def criteria(text: str) -> RecognisedError | None:
     if _ACTOR.match(text) is None:
         return None
     return _order(text) or _conduct(text) or _extent(text) or _place(text) or _part(text)
+
+
+def bystanders(text: str) -> RecognisedError | None:
+    """What is wrong with the statement that lets all be."""
+    m = re.match(r"\s*(bystanders)\b(?!\s+ignored\b)", text)
+    if m is None:
+        return None
+    what = "`bystanders` is not followed by `ignored`"
+    expected = "`bystanders ignored`, or `bystander person` for some of them"
+    return RecognisedError("E124", m.start(1), len(m[1]), what, expected)
 
 
 def actor(text: str) -> RecognisedError | None:

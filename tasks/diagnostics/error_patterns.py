@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from visup.rules.language.diagnostics import Diagnostic, Source
-from visup.tasks.diagnostics.actor_error_patterns import actor, criteria
+from visup.tasks.diagnostics.actor_error_patterns import actor, bystanders, criteria
 from visup.tasks.diagnostics.course_error_patterns import (
     action_in_angles,
     any_order,
@@ -235,6 +235,7 @@ PATTERNS: tuple[ErrorPattern, ...] = (
     _bare_head,
     _open_head,
     criteria,
+    bystanders,
     actor,
     _not_a_name,
     _empty_stage,

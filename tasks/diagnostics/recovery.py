@@ -22,7 +22,7 @@ HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
 OPENS = re.compile(  # a line that begins a statement, well written or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
     r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage"
-    r"|ground(?=[ ]+is\b))\b(?![ ]*\())"
+    r"|bystanders?|ground(?=[ ]+is\b))\b(?![ ]*\())"
 )
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
@@ -195,6 +195,8 @@ SAID = {
     "TEXT": "a text in double quotes",
     "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
     "COMPARE": "`<` or `>`",
+    "BYSTANDER": "`bystander`",
+    "BYSTANDERS": "`bystanders ignored`",
     "GROUND": "`ground`",
     "BETWEEN": "`between`",
     "_TIMES": "`times`",
@@ -207,7 +209,8 @@ SAID = {
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
-    "ground", "between", "enters", "moves", "first", "rests", "from", "part", "of",
+    "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
+    "first", "rests", "from", "part", "of",
 )  # fmt: skip
 
 

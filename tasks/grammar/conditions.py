@@ -38,6 +38,24 @@ class Name(str):
         return name
 
 
+class PartName(Name):
+    """`gripper of arm` where an actor stands: the actor `gripper`, and its machine.
+
+    Args:
+        text: The name of the part.
+        machine: The actor of which it is a part.
+        span: Where both stand.
+    """
+
+    machine: Name
+
+    def __new__(cls, text: str, machine: Name, span: Span = NOWHERE) -> PartName:
+        """A part at a place."""
+        name = cast("PartName", super().__new__(cls, text, span))
+        name.machine = machine
+        return name
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterRef:
     """`patience`: the name of a parameter where a number may stand; see `Task.amount`."""

@@ -121,6 +121,8 @@ class Actor:
         size: Its largest extent, or None.
         optional: Whether what is asked of it may be left out.
         criteria: By what else it is told.
+        bystander: Whether it has no part in the task and is let be; without a name, all that plays no
+            actor is.
     """
 
     name: str
@@ -129,6 +131,7 @@ class Actor:
     optional: bool = False
     span: Span = field(default=NOWHERE, compare=False, repr=False)
     criteria: tuple[Criterion, ...] = ()
+    bystander: bool = False
 
     @property
     def machine(self) -> Name | None:
@@ -136,7 +139,9 @@ class Actor:
         return next((c.machine for c in self.criteria if isinstance(c, PartOf)), None)
 
     def __str__(self) -> str:
-        said = "optional actor" if self.optional else "actor"
+        if self.bystander and not self.name:
+            return "bystanders ignored"
+        said = "optional actor" if self.optional else "bystander" if self.bystander else "actor"
         size = f"size {self.size}" if self.size else ""
         parts = (said, self.name, declared_as(self.models, self.criteria), size)
         return " ".join(p for p in parts if p)
@@ -235,6 +240,7 @@ class Task:
         zones: Parts of the image that it names.
         parameters: Amounts that it names.
         includes: Files that it includes; their statements stand among the others.
+        bystanders: Who has no part in it and is let be.
         grounds: Where points of the image are on the floor; more than one is a mistake.
         file: Name of the file, for messages.
         root: The rule that is the task when the file has several; empty for its first one.
@@ -249,6 +255,7 @@ class Task:
     file: str = field(default="<text>", compare=False)
     root: str = ""
     grounds: tuple[Ground, ...] = ()
+    bystanders: tuple[Actor, ...] = ()
 
     @property
     def ground(self) -> Ground | None:
@@ -257,8 +264,9 @@ class Task:
 
     @property
     def declared(self) -> tuple[Actor | ZoneDeclaration | Parameter, ...]:
-        """Declarations of actors, zones and parameters."""
-        return (*self.actors, *self.zones, *self.parameters)
+        """Declarations of actors, bystanders, zones and parameters."""
+        bystanders = (b for b in self.bystanders if b.name)
+        return (*self.actors, *bystanders, *self.zones, *self.parameters)
 
     @property
     def roots(self) -> tuple[str, ...]:
@@ -276,8 +284,9 @@ class Task:
         return next((s for s in self.stages if s.name == name), None)
 
     def actor(self, name: str) -> Actor:
-        """What is declared of an actor."""
-        return next((a for a in self.actors if a.name == name), Actor(name))
+        """What is declared of an actor, or of a bystander."""
+        declared = (*self.actors, *self.bystanders)
+        return next((a for a in declared if a.name == name), Actor(name))
 
     def models(self, actor: str) -> tuple[str, ...]:
         """Models that an actor may be: as declared, else the one of the actor's own name.
@@ -297,5 +306,12 @@ class Task:
         return found if isinstance(found, Number) else Number(0.0)
 
     def __str__(self) -> str:
-        said = (*self.includes, *self.parameters, *self.actors, *self.grounds, *self.zones)
+        said = (
+            *self.includes,
+            *self.parameters,
+            *self.actors,
+            *self.bystanders,
+            *self.grounds,
+            *self.zones,
+        )
         return "\n".join(map(str, (*said, *self.stages, *self.invariants)))

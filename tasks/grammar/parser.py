@@ -13,7 +13,7 @@ from lark import Lark, Token, Transformer
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span
-from visup.tasks.grammar.conditions import Condition, Range
+from visup.tasks.grammar.conditions import Condition, PartName, Range
 from visup.tasks.grammar.criteria import (
     Another,
     Colours,
@@ -60,6 +60,7 @@ from visup.tasks.grammar.nodes import (
     Together,
     ZoneDeclaration,
 )
+from visup.tasks.grammar.parts import with_parts
 
 N = TypeVar("N")
 
@@ -115,15 +116,17 @@ def collect(statements: Several[object], file: str) -> Task:
     def of(kind: type[N]) -> tuple[N, ...]:
         return tuple(s for s in statements if isinstance(s, kind))
 
+    stages, invariants = of(Stage), of(Invariant)
     return Task(
-        stages=of(Stage),
-        actors=of(Actor),
-        invariants=of(Invariant),
+        stages=stages,
+        actors=with_parts([a for a in of(Actor) if not a.bystander], stages, invariants),
+        invariants=invariants,
         zones=of(ZoneDeclaration),
         parameters=of(Parameter),
         includes=of(Include),
         file=file,
         grounds=of(Ground),
+        bystanders=tuple(a for a in of(Actor) if a.bystander),
     )
 
 
@@ -205,6 +208,14 @@ class _TaskBuilder(Transformer[Token, Any]):
         if corners and isinstance(corners[0][0], Number):
             return ZoneDeclaration(str(name), (), _of(name), tuple(corners))
         return ZoneDeclaration(str(name), tuple(corners), _of(name))
+
+    def bystander(self, items: list[Any]) -> Actor:
+        _, name, *rest = items
+        models, criteria = _who([t for i in rest for t in i])
+        return Actor(str(name), models, span=_of(name), criteria=criteria, bystander=True)
+
+    def ignored(self, items: list[Token]) -> Actor:
+        return Actor("", span=_of(items[0]), bystander=True)
 
     def ground(self, items: list[Any]) -> Ground:
         word, *points = items
@@ -292,7 +303,12 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def action(self, items: list[Token]) -> Action:
         name, *actors, last = items
-        return Action(str(name), _names(actors), _of(name).to(_of(last)))
+        words = tuple(a if isinstance(a, Name) else Name(str(a), _of(a)) for a in actors)
+        return Action(str(name), words, _of(name).to(_of(last)))
+
+    def part_of(self, items: list[Token]) -> Name:
+        part, machine = items
+        return PartName(str(part), Name(str(machine), _of(machine)), _of(part).to(_of(machine)))
 
     def comparison(self, items: list[Any]) -> Comparison:
         quantity = Measure(items[0].name, items[0].words, items[0].span)

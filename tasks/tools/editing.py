@@ -23,6 +23,8 @@ from visup.tasks.grammar.units import UNITS
 STATEMENTS = (
     "actor",
     "optional actor",
+    "bystander",
+    "bystanders ignored",
     "ground is",
     "zone",
     "parameter",

@@ -19,7 +19,18 @@ from visup.tasks.grammar.parser import tokens
 WIDTH = 100
 LONGEST_HEAD = 24  # `::=` stand below each other when no head is longer than this
 STARTERS = frozenset(
-    {"TASK", "WHEN", "ACTOR", "OPTIONAL", "ZONE", "PARAMETER", "INCLUDE", "GROUND"}
+    {
+        "TASK",
+        "WHEN",
+        "ACTOR",
+        "OPTIONAL",
+        "ZONE",
+        "PARAMETER",
+        "INCLUDE",
+        "GROUND",
+        "BYSTANDER",
+        "BYSTANDERS",
+    }
 )
 TIGHT_BEFORE = frozenset({"RPAR", "COMMA", "REPEAT"})
 

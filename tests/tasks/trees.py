@@ -145,6 +145,12 @@ floor_zones = st.builds(
 )
 points = st.lists(st.tuples(st.tuples(amounts, amounts), floors), min_size=4, max_size=5)
 grounds = points.map(lambda ps: Ground(tuple(i for i, _ in ps), tuple(f for _, f in ps)))
+let_be = st.just(True)
+bystanders = st.one_of(
+    st.builds(Actor, names, some_models, criteria=st.just(()) | told, bystander=let_be),
+    st.builds(Actor, names, criteria=st.just(()) | told, bystander=let_be),
+    st.just(Actor("", bystander=True)),
+)
 tasks = st.builds(
     Task,
     st.lists(stages, min_size=1, max_size=4).map(tuple),
@@ -165,4 +171,5 @@ tasks = st.builds(
     st.lists(st.builds(Parameter, names, amounts_said), max_size=2).map(tuple),
     st.lists(st.builds(Include, texts), max_size=1).map(tuple),
     grounds=st.lists(grounds, max_size=1).map(tuple),
+    bystanders=st.lists(bystanders, max_size=2).map(tuple),
 )
