@@ -45,8 +45,10 @@ TABLES = (
     "CREATE TABLE taught (number INTEGER PRIMARY KEY, name TEXT NOT NULL, x INTEGER NOT NULL, "
     "y INTEGER NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL, image BLOB NOT NULL, "
     "mask BLOB NOT NULL, scene BLOB NOT NULL, crc INTEGER NOT NULL)",
+    "CREATE TABLE meshes (number INTEGER PRIMARY KEY, name TEXT NOT NULL, radius REAL NOT NULL, "
+    "vertices BLOB NOT NULL, faces BLOB NOT NULL, crc INTEGER NOT NULL)",
 )
-TABLES_OF = {OLDEST: TABLES[:-1], VERSION: TABLES}
+TABLES_OF = {OLDEST: TABLES[:-2], VERSION: TABLES}
 """Version -> its tables."""
 
 MOST_BYTES = 1 << 25
@@ -89,6 +91,28 @@ class TaughtRow:
         return checksum(number, text, self.image, self.mask, self.scene)
 
 
+@dataclass(frozen=True, slots=True)
+class MeshRow:
+    """A mesh as it stands in the file; see `refinement/mesh_model.py`.
+
+    Attributes:
+        name: Of the model.
+        radius: Of the mesh, its own units.
+        vertices: (V, 3) little-endian float32.
+        faces: (F, 3) little-endian int32.
+    """
+
+    name: str
+    radius: float
+    vertices: bytes
+    faces: bytes
+
+    def checksum(self, number: int) -> int:
+        """Of the row with this number."""
+        text = f"{self.name}\n{self.radius!r}".encode()
+        return checksum(number, text, self.vertices, self.faces)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FileContents:
     """All that stands in a file but the shapes.
@@ -98,12 +122,14 @@ class FileContents:
         views: (V,) records of `VIEW`.
         also: (A,) records of `ALSO`, rising by view (from 0).
         taught: What was taught, in the order of teaching.
+        meshes: What poses are fitted with.
     """
 
     names: tuple[str, ...]
     views: Records
     also: Records
     taught: tuple[TaughtRow, ...] = ()
+    meshes: tuple[MeshRow, ...] = ()
 
 
 def damaged(path: Path, found: str, expected: str) -> DatabaseError:

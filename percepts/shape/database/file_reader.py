@@ -28,6 +28,7 @@ from visup.percepts.shape.database.file_format import (
     damaged,
     unreadable,
 )
+from visup.percepts.shape.database.mesh_records import read_meshes
 from visup.percepts.shape.database.taught_records import read_taught
 from visup.percepts.shape.index.view_records import (
     ALSO,
@@ -148,12 +149,14 @@ def read_contents(path: Path) -> FileContents:
             (last,) = file.execute("SELECT max(view) FROM shapes").fetchone()
             if (-1 if last is None else last) != len(views) - 1:
                 raise InvalidRecordError("other views than shapes")
-            taught = read_taught(file) if version_of(file) > OLDEST else ()
+            recent = version_of(file) > OLDEST
+            taught = read_taught(file) if recent else ()
+            meshes = read_meshes(file) if recent else ()
         except InvalidRecordError as e:
             raise damaged(path, str(e), "what 'visup models' writes") from e
         except UNREADABLE as e:
             raise unreadable(path, e) from e
-    return FileContents(names, views, also, taught)
+    return FileContents(names, views, also, taught, meshes)
 
 
 def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from visup.percepts.shape.database.file_format import (
     checksum,
 )
 from visup.percepts.shape.database.file_reader import read_contents, version_of
+from visup.percepts.shape.database.mesh_records import encoded_mesh, insert_meshes
 from visup.percepts.shape.database.taught_records import encoded, insert_taught
 from visup.percepts.shape.index.outline_sketch import sketch
 from visup.percepts.shape.index.view_records import (
@@ -39,11 +40,17 @@ from visup.percepts.shape.index.view_records import (
     encode,
     node_records,
 )
+from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.height_functions import outline_heights
 from visup.percepts.taught.view import TaughtView
 
 
-def write_new(path: Path, views: Iterable[NewView] = (), taught: Iterable[TaughtView] = ()) -> None:
+def write_new(
+    path: Path,
+    views: Iterable[NewView] = (),
+    taught: Iterable[TaughtView] = (),
+    meshes: Iterable[MeshModel] = (),
+) -> None:
     """Write a database with these views, in place of whatever stands at the path.
 
     Raises:
@@ -58,6 +65,7 @@ def write_new(path: Path, views: Iterable[NewView] = (), taught: Iterable[Taught
         file.executemany("INSERT INTO layout VALUES (?, ?)", LAYOUT.items())
         _insert(file, FileContents((), np.empty(0, VIEW), np.empty(0, ALSO)), views)
         insert_taught(file, 0, map(encoded, taught))
+        insert_meshes(file, map(encoded_mesh, meshes))
 
 
 def write_more(

@@ -6,7 +6,7 @@ into it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -15,15 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.database.catalogue import Shapes, Views
-from visup.percepts.shape.database.file_format import TaughtRow
+from visup.percepts.shape.database.file_format import MeshRow, TaughtRow
 from visup.percepts.shape.database.file_reader import read_contents
 from visup.percepts.shape.database.file_writer import write_more, write_new
+from visup.percepts.shape.database.mesh_records import decoded_mesh
 from visup.percepts.shape.database.search import Ranking, SearchLimits, ViewMatch, ViewSearch
 from visup.percepts.shape.database.taught_records import decoded, encoded
 from visup.percepts.shape.database.time_budget import share_within
 from visup.percepts.shape.database.view_directions import neighbours
 from visup.percepts.shape.index.view_records import ModelView, NewView
 from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
+from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.silhouette import Silhouette, looks_cut, normalise
 from visup.percepts.taught.view import TaughtView
 
@@ -61,12 +63,20 @@ class ModelDatabase:
         path: The file.
         views: The views of meshes and silhouettes that stand in it.
         taught: What was taught, as it stands in it.
+        meshes: Meshes, as they stand in it.
     """
 
-    def __init__(self, path: Path, views: Views, taught: Sequence[TaughtRow] = ()) -> None:
+    def __init__(
+        self,
+        path: Path,
+        views: Views,
+        taught: Sequence[TaughtRow] = (),
+        meshes: Sequence[MeshRow] = (),
+    ) -> None:
         self.path = path
         self.views = views
         self._taught = tuple(taught)
+        self._meshes = tuple(meshes)
         self._neighbours: dict[str, list[tuple[int, ...]]] = {}
 
     @classmethod
@@ -77,7 +87,7 @@ class ModelDatabase:
             DatabaseError: Missing, truncated, foreign or of another version.
         """
         contents = read_contents(Path(path))
-        return cls(Path(path), Views(contents), contents.taught)
+        return cls(Path(path), Views(contents), contents.taught, contents.meshes)
 
     @classmethod
     def open_or_new(cls, path: Path | str) -> ModelDatabase:
@@ -89,13 +99,23 @@ class ModelDatabase:
         return cls.open(path) if Path(path).exists() else cls.create(path)
 
     @classmethod
-    def create(cls, path: Path | str, views: Iterable[NewView] = ()) -> ModelDatabase:
+    def create(
+        cls,
+        path: Path | str,
+        views: Iterable[NewView] = (),
+        meshes: Iterable[MeshModel] = (),
+    ) -> ModelDatabase:
         """Write a database with these views, in place of whatever stands at the path, and open it.
+
+        Args:
+            path: Where.
+            views: In the order in which they are numbered.
+            meshes: What the poses of models are fitted with, each model's once.
 
         Raises:
             DatabaseError: The file cannot be written.
         """
-        write_new(Path(path), views)
+        write_new(Path(path), views, meshes=meshes)
         return cls.open(path)
 
     def names(self) -> tuple[str, ...]:
@@ -110,6 +130,15 @@ class ModelDatabase:
             DatabaseError: The file is damaged there.
         """
         return tuple(decoded(self.path, k, row) for k, row in enumerate(self._taught))
+
+    @cached_property
+    def meshes(self) -> Mapping[str, MeshModel]:
+        """Meshes by the names of their models; models of silhouettes have none.
+
+        Raises:
+            DatabaseError: The file is damaged there.
+        """
+        return {row.name: decoded_mesh(self.path, row) for row in self._meshes}
 
     @cached_property
     def shapes(self) -> Shapes:

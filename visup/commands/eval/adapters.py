@@ -69,6 +69,19 @@ def views_closing(figures: Figures) -> Iterator[RenderableType]:
     yield hardest_views(figures["items"])
 
 
+def machines_closing(figures: Figures) -> Iterator[RenderableType]:
+    """The baseline's figures, where it watched, and how many verdicts are right."""
+    from visup.commands.eval.tables import figures_table
+
+    if "baseline" in figures:
+        rows = {n: i["baseline"] for n, i in figures["items"].items()}
+        keys = ("verdict", "verdicts_right", "stage_f1", "actors", "contact_f1", "move_f1", "ms")
+        told = {"items": rows, "total": figures["baseline"]}
+        yield figures_table("baseline: CSRT on the taught boxes", told, keys)
+    total = figures["total"]
+    yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
+
+
 def reasoning(
     folder: Path, *, merge: bool, long: int, progress: Progress, **settings: int
 ) -> Figures:

@@ -72,6 +72,26 @@ EVALUATIONS = (
         _FOLDER,
     ),
     EvaluationCommand(
+        "machines",
+        """Machines at work, rendered and real: taught from a brief, watched, scored against the truth.
+
+        Beside it, in the same run: OpenCV's CSRT on the taught boxes, with the same tasks and rules.
+        """,
+        "visup.evaluation.machines.runner:evaluate_machines",
+        "watching",
+        (
+            *("verdict", "verdicts_right", "stage_f1", "actors"),
+            *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
+        ),
+        (
+            _flag("eyes", "Regions are made from the masks of worlds: reasoning by itself."),
+            Setting("baseline", bool, True, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            _LIMIT,
+        ),
+        _FOLDER,
+        adapters.machines_closing,
+    ),
+    EvaluationCommand(
         "health",
         "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
         "visup.evaluation.health.runner:evaluate_health",

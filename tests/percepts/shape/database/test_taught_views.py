@@ -88,6 +88,7 @@ def test_an_older_file_is_read_and_renewed(tmp_path: Path) -> None:
     path = tmp_path / "old.models"
     ModelDatabase.create(path, silhouette_views("star", [ZOO["star"]], 1))
     run_sql("DROP TABLE taught")(path)
+    run_sql("DROP TABLE meshes")(path)
     run_sql(f"PRAGMA user_version = {OLDEST}")(path)
     database = ModelDatabase.open(path)
     assert (database.names(), database.taught) == (("star",), ())
