@@ -11,13 +11,14 @@ from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
 from visup.percepts.appearance.tracking.detection import search
-from visup.percepts.appearance.tracking.track import Blob
+from visup.percepts.appearance.tracking.track import Blob, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
 SURE = 0.6  # score that no other thing is seen to reach
 FAIR, APART = 0.42, 1.5  # score that will do where no other place has a share of it
 NOISE = 0.15  # score that any place may have
 AT_HOME = 0.1  # how much the place where a thing was taught speaks for it
+RECENT_SIZES = (0.85, 1.0, 1.18)
 SIZES = (0.75, 0.87, 1.0, 1.15, 1.32)
 TURNS = (-0.4, 0.4)
 TAKEN = 0.5  # share of a place that is another thing's
@@ -30,12 +31,14 @@ class ThingPlace:
     Attributes:
         name: Of the thing.
         number: Of the view that it looks like.
+        looks: What it looks like there.
         match: How it agrees.
         score: With what speaks for the place.
     """
 
     name: str
     number: int
+    looks: Appearance
     match: Match
     score: float
 
@@ -54,26 +57,46 @@ def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
     home = PatchPose(view.pose.x * by, view.pose.y * by, unit)
     poses = [PatchPose(0, 0, unit * s) for s in SIZES] + [PatchPose(0, 0, unit, a) for a in TURNS]
     matches = [verify(scene, it, home), *search(scene, it, poses)]
-    top = max(matches, key=lambda m: m.score).pose
-    away = [m.score for m in matches if m.pose.apart(top, 0) > it.radius * unit]
-    rival = max([*away, NOISE])
     near = 6 * unit
     return [
-        ThingPlace(view.name, number, m, m.score + AT_HOME * (m.pose.apart(home, 10) < near))
-        for m in matches
-        if m.score > SURE or (m.score > FAIR and m.score > APART * rival)
+        ThingPlace(view.name, number, it, m, m.score + AT_HOME * (m.pose.apart(home, 10) < near))
+        for m in _outstanding(matches, it)
     ]
 
 
+def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
+    """Places that look like a thing did when it was last seen.
+
+    Args:
+        scene: The frame.
+        track: A thing that is hidden.
+    """
+    it, last = track.looks, track.pose
+    if it is None or last is None:
+        return []
+    poses = [PatchPose(0, 0, last.scale * s, last.angle) for s in RECENT_SIZES]
+    found = _outstanding(search(scene, it, poses), it)
+    return [ThingPlace(track.name, track.number, it, m, m.score) for m in found]
+
+
+def _outstanding(matches: Sequence[Match], it: Appearance) -> list[Match]:
+    """Those that look like a thing, and not only a little more so than other places do."""
+    if not matches:
+        return []
+    top = max(matches, key=lambda m: m.score).pose
+    away = [m.score for m in matches if m.pose.apart(top, 0) > it.radius * top.scale]
+    rival = max([*away, NOISE])
+    return [m for m in matches if m.score > SURE or (m.score > FAIR and m.score > APART * rival)]
+
+
 def assigned(
-    scene: Scene, found: Sequence[ThingPlace], views: Sequence[ViewModel], taken: Sequence[Blob]
+    scene: Scene, found: Sequence[ThingPlace], taken: Sequence[Blob]
 ) -> dict[str, ThingPlace]:
     """The best place for each thing, no two things in one.
 
     Args:
         scene: The frame.
         found: Candidates for all things that are looked for.
-        views: All that were taught.
         taken: Where things are already.
     """
     out: dict[str, ThingPlace] = {}
@@ -81,7 +104,7 @@ def assigned(
     for it in sorted(found, key=lambda c: -c.score):
         if it.name in out:
             continue
-        blob = footprint(scene, it.match.pose, views[it.number].appearance)
+        blob = footprint(scene, it.match.pose, it.looks)
         if blob is None or any(overlap(blob, b) > TAKEN for b in full):
             continue
         out[it.name] = it

@@ -15,6 +15,7 @@ from visup.percepts.appearance.tracking.points import STILL, PointMotion, simila
 from visup.percepts.appearance.tracking.segmentation import unchanged
 from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.appearance.tracking.verification import (
+    colour_agreement,
     explained_pixels,
     respond,
     template_of,
@@ -26,11 +27,15 @@ Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 AS_IT_WAS = 0.97  # share of a window unchanged where nothing happened
 LOSE_S = 0.5  # how long a thing is followed without being seen
 LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # of what is still the thing
+UNSURE_PEAK = 0.45  # of the filter, below which colours are asked where the thing is
+OWN_COLOURS = 0.35  # how much more of its colours a thing shows than what is around it
 MOVED_PX = 1.0  # working pixels
 BETTER = 0.04  # share of its pixels that a move must explain beyond rest
 COVERED = 0.2  # share unchanged below which a thing at rest cannot be seen
 UNCOVERED = 0.5
 FOUND_AGAIN = 0.6
+PLAIN = 0.8  # share of the last answer at which points that agree need no closer look
+LOOK_CLOSER = 4  # frames, after which it is taken all the same
 _GROWTH, _TURN = 1.035, 0.07  # of a thing from frame to frame, and radians, that are tried
 _SURER = 1.03  # how much more the filter must answer for these
 _FIRM = 5  # points that tell a turn and a growth
@@ -91,13 +96,15 @@ def _at_rest(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTra
     kept = float(np.mean(same[rest.blob.mask]))
     if np.mean(same) > AS_IT_WAS:
         return noted(replace(track, explained=kept, peak=1.0), scene.time, pose)
-    best, peak = _located(track, pose, points, scene)
+    best, peak = _located(track, pose, points, motion)
     template = template_of(it.lab, it.mask)
     _, there = explained_pixels(template, scene.patch(best, it.shape))
     _, here = explained_pixels(template, scene.patch(pose, it.shape))
     here = max(here, kept)
     goes = best.apart(pose, it.radius) >= MOVED_PX and peak >= 0.3 and there >= here + BETTER
     if goes:
+        return _seen_moving(track, best, peak, there, scene)
+    if kept < COVERED and colour_agreement(scene, best, it)[0] > OWN_COLOURS:
         return _seen_moving(track, best, peak, there, scene)
     track = replace(track, explained=here, peak=peak)
     if kept >= COVERED or here >= 0.3:
@@ -112,14 +119,18 @@ def _moving(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTrac
     assert it is not None
     assert track.pose is not None
     base = track.pose.moved(motion.camera)
-    best, peak = _located(track, base, points, scene)
+    best, peak = _located(track, base, points, motion)
     template = template_of(it.lab, it.mask)
     _, share = explained_pixels(template, scene.patch(best, it.shape))
-    if peak > LEAST_PEAK and share > LEAST_SHARE:
-        return _seen_moving(track, best, peak, share, scene)
+    colours, middle = colour_agreement(scene, best, it)
+    if peak < UNSURE_PEAK and colours > OWN_COLOURS:
+        # It bends, or turns another side to the camera: its colours tell where it is.
+        best = _between(best, middle, 0.5)
+    if (peak > LEAST_PEAK and share > LEAST_SHARE) or colours > OWN_COLOURS:
+        return replace(_seen_moving(track, best, peak, share, scene), colours=colours)
     if scene.time - track.seen > LOSE_S:
         return replace(track, state=State.HIDDEN, visible=None, rest=None, pose=best)
-    guess = _by_points(track.pose, points) or base
+    guess = _by_points(track.pose, points)[0] or base
     return replace(track, state=State.MOVING, pose=guess, peak=peak, explained=share, rest=None)
 
 
@@ -149,20 +160,23 @@ def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
 
 
 def _located(
-    track: ThingTrack, base: PatchPose, points: Points, scene: Scene
+    track: ThingTrack, base: PatchPose, points: Points, motion: FrameMotion
 ) -> tuple[PatchPose, float]:
     """Where a thing's filter answers most, near where its points and its past expect it."""
-    it = track.looks
+    it, scene = track.looks, motion.scene
     assert it is not None
     assert track.pose is not None
-    best, peak = _answer(scene, base, it)
-    guess = _by_points(track.pose, points)
+    guess, firm = _by_points(track.pose, points)
+    best, peak = base, 0.0
     if guess is not None:
-        at, height = _answer(scene, guess, it)
-        if height > peak:
-            near = at.apart(guess, 0) < 1.6 * guess.scale
-            # Points are precise, the filter is sure of the place: it pulls them back slowly.
-            best, peak = (_between(guess, at, 0.25) if near else at), height
+        at, peak = _answer(scene, guess, it)
+        # Points are precise, the filter is sure of the place: it pulls them back slowly.
+        best = _between(guess, at, 0.25) if at.apart(guess, 0) < 1.6 * guess.scale else at
+        if firm and peak > PLAIN * track.peak and motion.number % LOOK_CLOSER:
+            return best, peak
+    at, height = _answer(scene, base, it)
+    if height > peak:
+        best, peak = at, height
     return _resized(best, peak, it, scene)
 
 
@@ -184,15 +198,15 @@ def _between(a: PatchPose, b: PatchPose, share: float) -> PatchPose:
     return replace(a, x=a.x + share * (b.x - a.x), y=a.y + share * (b.y - a.y))
 
 
-def _by_points(pose: PatchPose, points: Points) -> PatchPose | None:
-    """Where most of a thing's points went; None when too few were followed."""
+def _by_points(pose: PatchPose, points: Points) -> tuple[PatchPose | None, bool]:
+    """Where most of a thing's points went, None when too few were followed; and if it is sure."""
     before, after = points
     found = similarity_of(before, after, 1.5) if len(before) >= _FIRM else None
     if found is not None and found[1] > 0.5:
         by = float(np.hypot(found[0][0, 0], found[0][1, 0]))
         if 0.8 < by < 1.25:
-            return pose.moved(found[0])
+            return pose.moved(found[0]), len(before) >= 2 * _FIRM
     if len(before) < 2:
-        return None
+        return None, False
     dx, dy = np.median(after - before, axis=0).tolist()
-    return replace(pose, x=pose.x + dx, y=pose.y + dy)
+    return replace(pose, x=pose.x + dx, y=pose.y + dy), False

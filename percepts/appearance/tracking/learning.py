@@ -16,7 +16,9 @@ from visup.percepts.appearance.tracking.track import Blob, RestMemory, State, Th
 Floats = NDArray[np.float32]
 
 SURE_PEAK, SURE_SHARE = 0.4, 0.5  # below these one does not learn: it may be something else
-SHAPE_RATE, PIXEL_RATE, FILTER_RATE = 0.06, 0.12, 0.04
+SURE_COLOURS = 0.45
+GROW_RATE, SHRINK_RATE = 0.06, 0.03
+PIXEL_RATE, FILTER_RATE = 0.12, 0.04
 COLOUR_RATE, AROUND_RATE = 0.02, 0.1
 PATH_S = 0.4
 REST_SHARE = 0.7  # of `PATH_S` that a thing must have been followed to be seen to rest
@@ -35,13 +37,14 @@ def learned(
         blob: The pixels that it won.
     """
     it, pose = track.looks, track.pose
-    if it is None or pose is None or track.peak < SURE_PEAK or track.explained < SURE_SHARE:
+    sure = track.peak >= SURE_PEAK and track.explained >= SURE_SHARE
+    if it is None or pose is None or not (sure or track.colours >= SURE_COLOURS):
         return track
     lab = scene.patch(pose, it.shape)
     seen = _in_patch(blob.window, blob.mask, track, scene)
     # What another thing has won tells nothing of the shape.
     taken = _in_patch(claim[0], claim[1] > 0, track, scene) - seen
-    rate = np.float32(SHAPE_RATE) * np.clip(1 - taken, 0, 1)
+    rate = np.where(seen > it.mask, GROW_RATE, SHRINK_RATE) * np.clip(1 - taken, 0, 1)
     mask = (it.mask + rate * (seen - it.mask)).astype(np.float32)
     share = (np.float32(PIXEL_RATE) * seen)[..., None]
     pixels = np.round(it.lab + share * (lab.astype(np.float32) - it.lab)).astype(np.uint8)

@@ -73,6 +73,7 @@ class ThingTrack:
         path: (time, pose) of the last half second, oldest first.
         peak: How strongly its filter answered last.
         explained: Share of its pixels that looked as they should.
+        colours: How much more of its colours it showed than what is around it.
         seen: When it was last seen, seconds.
         since: When it was first seen, seconds.
         asked: When the whole picture was last searched for it, seconds.
@@ -89,6 +90,7 @@ class ThingTrack:
     path: tuple[tuple[float, PatchPose], ...] = ()
     peak: float = 0.0
     explained: float = 0.0
+    colours: float = 0.0
     seen: float = -np.inf
     since: float = 0.0
     asked: float = -np.inf

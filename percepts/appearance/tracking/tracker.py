@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
-from visup.percepts.appearance.tracking.finding import assigned, candidates
+from visup.percepts.appearance.tracking.finding import (
+    SURE,
+    ThingPlace,
+    assigned,
+    candidates,
+    lost_places,
+)
 from visup.percepts.appearance.tracking.following import (
     AS_IT_WAS,
     FrameMotion,
@@ -34,10 +40,12 @@ from visup.percepts.appearance.tracking.segmentation import (
     unchanged,
 )
 from visup.percepts.appearance.tracking.track import IN_VIEW, Blob, State, ThingTrack
+from visup.percepts.appearance.tracking.verification import verify
 
 POINTS = 24  # that are followed on each thing
 HOLD_S = 0.12  # how long a thing that is lost is still reported where it should be
 LEAST_SEEN = 0.04  # share of a thing below which nothing of it is seen
+RECALL = 8  # frames between two comparisons with what was taught
 EVERY = 3  # frames between two searches of the whole picture
 
 
@@ -107,7 +115,22 @@ class ThingTracker:
         camera = camera_motion(moved)
         self._static = camera is STILL
         motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count)
-        self.tracks = tuple(followed(t, k, motion) for k, t in enumerate(self.tracks))
+        moved_on = (followed(t, k, motion) for k, t in enumerate(self.tracks))
+        self.tracks = tuple(self._recalled(t, scene) for t in moved_on)
+
+    def _recalled(self, track: ThingTrack, scene: Scene) -> ThingTrack:
+        """A moving thing that looks as it was taught is again believed to look just so."""
+        it, pose = track.looks, track.pose
+        if track.state is not State.MOVING or it is None or pose is None:
+            return track
+        if track.seen < scene.time or (self._count + track.number) % RECALL:
+            return track
+        taught = self.views[track.number].appearance
+        match = verify(scene, taught, pose)
+        score = (max(track.peak, 0.0) * track.explained) ** 0.5
+        if match.score <= max(SURE, score) or match.pose.apart(pose, it.radius) > it.radius:
+            return track
+        return replace(track, looks=replace(taught, colours=it.colours))
 
     def _may_move(self, track: ThingTrack, scene: Scene) -> bool:
         """Whether anything happens where a thing is."""
@@ -127,28 +150,11 @@ class ThingTracker:
             if view.name in names
             for c in candidates(scene, view, number)
         ]
+        found += [c for t in due for c in lost_places(scene, t)]
         taken = [t.visible for t in self.tracks if t.state in IN_VIEW and t.visible is not None]
-        placed = assigned(scene, found, self.views, taken)
-        tracks = []
-        for t in self.tracks:
-            if t.name in names:
-                t = replace(t, asked=scene.time)
-            it = placed.get(t.name)
-            if it is not None:
-                looks = self.views[it.number].appearance
-                t = replace(
-                    t,
-                    number=it.number,
-                    state=State.MOVING,
-                    looks=looks,
-                    rest=None,
-                    path=(),
-                    peak=it.match.peak,
-                    explained=it.match.explained,
-                )
-                t = noted(t, scene.time, it.match.pose)
-            tracks.append(t)
-        self.tracks = tuple(tracks)
+        placed = assigned(scene, found, taken)
+        asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
+        self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
 
     def _share_pixels(self, scene: Scene) -> None:
         claims = [_claim(t, scene) for t in self.tracks]
@@ -172,6 +178,22 @@ class ThingTracker:
         if self._count % 2:
             track = learned(track, scene, claim, blob)
         return rested(track, scene, self._count == 1) if self._static else track
+
+
+def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTrack:
+    if place is None:
+        return track
+    new = replace(
+        track,
+        number=place.number,
+        state=State.MOVING,
+        looks=place.looks,
+        rest=None,
+        path=(),
+        peak=place.match.peak,
+        explained=place.match.explained,
+    )
+    return noted(new, scene.time, place.match.pose)
 
 
 def _forgotten(track: ThingTrack) -> ThingTrack:

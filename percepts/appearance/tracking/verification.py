@@ -20,6 +20,7 @@ Bytes = NDArray[np.uint8]
 
 _NEAR = np.array([16, 9, 9], dtype=np.int16)  # steps of Lab by which a like pixel may differ
 _LIGHTER = 30.0  # most that the whole may be lighter or darker, steps
+OWN = 0.7  # log odds from which a colour is the thing's own
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
@@ -93,6 +94,42 @@ def explained_pixels(template: Template, lab: Bytes) -> tuple[NDArray[np.bool_],
     )
     weight = float(template.weight.sum())
     return like, float((template.weight * like).sum()) / max(weight, 1e-6)
+
+
+def colour_agreement(scene: Scene, pose: PatchPose, it: Appearance) -> tuple[float, PatchPose]:
+    """How much more a thing's colours are found where it should be than around it, and their middle.
+
+    Args:
+        scene: The frame.
+        pose: Where it should be.
+        it: How it looks.
+
+    Returns:
+        The share of the thing's pixels with its colours less that of those around, -1 to 1, and the
+        pose shifted to where these colours lie.
+    """
+    odds = it.colours.odds(colour_bins(scene.patch(pose, it.shape)))
+    own = (odds > OWN).astype(np.float32)
+    inside = float((own * it.mask).sum()) / max(it.area, 1e-6)
+    ring = _ring(it.mask)
+    around = float((own * ring).sum()) / max(float(ring.sum()), 1e-6)
+    reach = cv2.GaussianBlur(cv2.dilate(it.mask, np.ones((9, 9), np.uint8)), (0, 0), 5.0)
+    weight = own * reach
+    total = float(weight.sum())
+    if total < 0.1 * it.area:
+        return inside - around, pose
+    rows, cols = np.indices(own.shape, dtype=np.float32)
+    x, y = (float((weight * at).sum()) / total for at in (cols, rows))
+    middle = it.area
+    u, v = (float((it.mask * at).sum()) / middle for at in (cols, rows))
+    return inside - around, pose.shifted(x - u, y - v)
+
+
+def _ring(mask: Floats) -> Floats:
+    """(h, w) float32: what lies close around a thing, but not on its rim."""
+    near = cv2.dilate(mask, np.ones((5, 5), np.uint8))
+    far = cv2.dilate(mask, np.ones((21, 21), np.uint8))
+    return np.asarray(np.clip(far - near, 0, 1), dtype=np.float32)
 
 
 def verify(scene: Scene, it: Appearance, pose: PatchPose) -> Match:
