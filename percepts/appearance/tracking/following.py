@@ -27,7 +27,7 @@ Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 AS_IT_WAS = 0.97  # share of a window unchanged where nothing happened
 LOSE_S = 0.5  # how long a thing is followed without being seen
 LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # of what is still the thing
-UNSURE_PEAK = 0.45  # of the filter, below which colours are asked where the thing is
+UNSURE_PEAK = 0.4  # of the filter, below which colours are asked where the thing is
 OWN_COLOURS = 0.25  # how much more of its colours a thing shows than what is around it
 MOVED_PX = 1.0  # working pixels
 BETTER = 0.04  # share of its pixels that a move must explain beyond rest
@@ -99,7 +99,7 @@ def _at_rest(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTra
     kept = float(np.mean(same[rest.blob.mask]))
     if np.mean(same) > AS_IT_WAS:
         return noted(replace(track, explained=kept, peak=1.0), scene.time, pose)
-    best, peak = _located(track, pose, points, motion)
+    best, peak, _ = _located(track, pose, points, motion)
     template = template_of(it.lab, it.mask)
     _, there = explained_pixels(template, scene.patch(best, it.shape))
     _, here = explained_pixels(template, scene.patch(pose, it.shape))
@@ -122,13 +122,13 @@ def _moving(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTrac
     assert it is not None
     assert track.pose is not None
     base = track.pose.moved(motion.camera)
-    best, peak = _located(track, base, points, motion)
+    best, peak, firm = _located(track, base, points, motion)
     template = template_of(it.lab, it.mask)
     _, share = explained_pixels(template, scene.patch(best, it.shape))
     colours, middle = colour_agreement(scene, best, it)
-    if peak < UNSURE_PEAK and colours > OWN_COLOURS:
+    if peak < UNSURE_PEAK and colours > OWN_COLOURS and not firm:
         # It bends, or turns another side to the camera: its colours tell where it is.
-        best = _between(best, middle, 0.5)
+        best = _between(best, middle, 0.4)
     if (peak > LEAST_PEAK and share > LEAST_SHARE) or colours > OWN_COLOURS:
         return replace(_seen_moving(track, best, peak, share, scene), colours=colours)
     if scene.time - track.seen > LOSE_S:
@@ -164,8 +164,12 @@ def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
 
 def _located(
     track: ThingTrack, base: PatchPose, points: Points, motion: FrameMotion
-) -> tuple[PatchPose, float]:
-    """Where a thing's filter answers most, near where its points and its past expect it."""
+) -> tuple[PatchPose, float, bool]:
+    """Where a thing's filter answers most, near where its points and its past expect it.
+
+    Returns:
+        The pose, how strongly it answers, and whether many points agree on where it went.
+    """
     it, scene = track.looks, motion.scene
     assert it is not None
     assert track.pose is not None
@@ -176,11 +180,11 @@ def _located(
         # Points are precise, the filter is sure of the place: it pulls them back slowly.
         best = _between(guess, at, 0.25) if at.apart(guess, 0) < 1.6 * guess.scale else at
         if firm and peak > PLAIN * track.peak and motion.number % LOOK_CLOSER:
-            return best, peak
+            return best, peak, True
     at, height = _answer(scene, base, it)
     if height > peak:
         best, peak = at, height
-    return _resized(best, peak, it, scene)
+    return (*_resized(best, peak, it, scene), firm)
 
 
 def _resized(best: PatchPose, peak: float, it: Appearance, scene: Scene) -> tuple[PatchPose, float]:

@@ -79,12 +79,12 @@ class ThingTracker:
         """Take on what a tracker of the same views remembered."""
         vars(self).update(state)
 
-    def step(self, scene: Scene, new_id: Callable[[], int]) -> tuple[ThingTrack, ...]:
+    def step(self, scene: Scene, new_id: Callable[[Blob], int]) -> tuple[ThingTrack, ...]:
         """The things in the next frame.
 
         Args:
             scene: The frame.
-            new_id: Gives an id that no region has had.
+            new_id: Gives the id of what is seen for the first time.
 
         Returns:
             One track for each name, in the order of teaching.
@@ -201,10 +201,10 @@ def _forgotten(track: ThingTrack) -> ThingTrack:
     return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
 
 
-def _numbered(track: ThingTrack, scene: Scene, new_id: Callable[[], int]) -> ThingTrack:
+def _numbered(track: ThingTrack, scene: Scene, new_id: Callable[[Blob], int]) -> ThingTrack:
     if track.id or track.visible is None:
         return track
-    return replace(track, id=new_id(), since=scene.time)
+    return replace(track, id=new_id(track.visible), since=scene.time)
 
 
 def _claim(track: ThingTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim | None:
