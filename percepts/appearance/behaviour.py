@@ -6,14 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
-from visup.percepts.appearance.looks.scene import prepare_scene
+from visup.percepts.appearance.looks.scene import Scene, prepare_scene
 from visup.percepts.appearance.looks.thing_model import view_models
-from visup.percepts.appearance.output.explaining import unexplained
+from visup.percepts.appearance.output.explaining import shares, unexplained
 from visup.percepts.appearance.output.thing_region import confidence, thing_region
-from visup.percepts.appearance.tracking.track import ThingTrack
+from visup.percepts.appearance.tracking.track import Blob, ThingTrack
 from visup.percepts.appearance.tracking.tracker import ThingTracker
 from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
 from visup.percepts.taught.view import TaughtView
+
+SAME = 0.4  # overlap (IoU) at which what moves is a thing that is now known by name
 
 
 class AppearanceBehaviour:
@@ -67,18 +69,26 @@ class AppearanceBehaviour:
             return []
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
-        tracks = self._tracker.step(scene, self._motion.new_id)
+        tracks = self._tracker.step(scene, lambda blob: self._id_of(blob, moving, scene))
         if not image_is_trusted(observation):
             return []
         before = None if last is None else last.time
         seen = [(t, thing_region(t, scene, before)) for t in tracks]
         things = [(t, r) for t, r in seen if r is not None]
+        known = {t.id for t in tracks}
+        moving = [r for r in moving if r.id not in known]
         others = unexplained(moving, [r for _, r in things], frame.size)
         regions = sorted([*others, *(r for _, r in things)], key=lambda r: r.id)
         return [
             *(self._percept(frame, "region", r, r.confidence) for r in regions),
             *(self._named(frame, t, r) for t, r in things),
         ]
+
+    def _id_of(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:
+        """The id of a thing seen for the first time: that of the region that was seen to move there."""
+        known = {t.id for t in self._tracker.tracks}
+        same = [r for r in moving if r.id not in known and shares(r, blob, scene) > SAME]
+        return min((r.id for r in same), default=None) or self._motion.new_id()
 
     def _percept(self, frame: Frame, kind: str, value: Any, sure: float) -> Percept:
         return Percept(kind, value, frame.time, self.contract.name, sure)

@@ -21,13 +21,14 @@ class Scene:
 
     Attributes:
         time: Seconds.
-        lab: Pictures in CIE Lab, (h, w, 3) uint8, each half as large as the one before.
+        lab: Pictures in CIE Lab, (h, w, 3) uint8, each half as large as the one before, as far as
+            somebody has asked for them.
         grey: (h, w) uint8.
         frame_size: (width, height) of the frame, pixels.
     """
 
     time: float
-    lab: tuple[Bytes, ...]
+    lab: list[Bytes]
     grey: Bytes
     frame_size: tuple[int, int]
 
@@ -43,7 +44,10 @@ class Scene:
 
     def patch(self, pose: PatchPose, shape: tuple[int, ...]) -> Bytes:
         """(height, width, 3) uint8, Lab: what a pose shows, from the picture of fitting fineness."""
-        level = int(np.clip(np.round(np.log2(max(pose.scale, 1e-3))), 0, len(self.lab) - 1))
+        level = int(np.clip(np.round(np.log2(max(pose.scale, 1e-3))), 0, _LEVELS - 1))
+        while level >= len(self.lab) and min(self.lab[-1].shape[:2]) >= 16:
+            self.lab.append(np.asarray(cv2.pyrDown(self.lab[-1]), dtype=np.uint8))
+        level = min(level, len(self.lab) - 1)
         by = 2.0**-level
         at = PatchPose(
             (pose.x + 0.5) * by - 0.5, (pose.y + 0.5) * by - 0.5, pose.scale * by, pose.angle
@@ -66,11 +70,8 @@ def prepare_scene(image: Bytes, time: float) -> Scene:
         size = max(1, round(width * small)), max(1, round(height * small))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     lab = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), dtype=np.uint8)
-    pictures = [lab]
-    while len(pictures) < _LEVELS and min(pictures[-1].shape[:2]) >= 16:
-        pictures.append(np.asarray(cv2.pyrDown(pictures[-1]), dtype=np.uint8))
     grey = np.ascontiguousarray(lab[..., 0])
-    return Scene(time, tuple(pictures), grey, (width, height))
+    return Scene(time, [lab], grey, (width, height))
 
 
 def work_scale(size: tuple[int, int]) -> float:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Region
 from visup.agent.model.fast_replace import replace
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.tracking.track import Blob
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 
 SMALL = 384  # longer side of the picture in which regions are compared, pixels
@@ -40,6 +42,22 @@ def unexplained(
         if left is not None:
             out.append(left)
     return tuple(out)
+
+
+def shares(region: Region, blob: Blob, scene: Scene) -> float:
+    """How much a region and a blob have in common (IoU).
+
+    Args:
+        region: In frame pixels.
+        blob: In working pixels of the scene.
+        scene: Gives the scale.
+    """
+    here = np.zeros(scene.size[::-1], dtype=bool)
+    left, top, right, bottom = blob.window
+    here[top:bottom, left:right] = blob.mask
+    there = _small(region, (here.shape[0], here.shape[1]), scene.scale)
+    both, either = int(np.sum(here & there)), int(np.sum(here | there))
+    return both / max(either, 1)
 
 
 def _near(things: Sequence[Region], size: tuple[int, int]) -> tuple[Mask, float]:

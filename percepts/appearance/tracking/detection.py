@@ -8,10 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.looks.colours import colour_bins
 from visup.percepts.appearance.looks.pose import PatchPose
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
-from visup.percepts.appearance.tracking.verification import Match, verify
+from visup.percepts.appearance.tracking.verification import OWN, Match, verify
 
 Floats = NDArray[np.float32]
 
@@ -42,6 +43,49 @@ def search(
             places.append(pose)
     matches = [verify(scene, it, p) for p in places]
     return sorted(matches, key=lambda m: -m.score)
+
+
+def colour_peaks(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[float, PatchPose]]:
+    """Where a thing's colours are gathered, whatever its shape: for what has bent or turned.
+
+    Args:
+        scene: The frame.
+        it: What the thing looked like.
+        pose: Its size and turn; where it is does not matter.
+
+    Returns:
+        The two best places: how much more of its colours they have than what is around, and the pose.
+    """
+    small = min(1.0, COARSE / (2 * it.radius * pose.scale))
+    width, height = scene.size
+    size = max(8, round(width * small)), max(8, round(height * small))
+    picture = np.asarray(cv2.resize(scene.lab[0], size, interpolation=cv2.INTER_AREA), np.uint8)
+    own = (it.colours.odds(colour_bins(picture)) > OWN).astype(np.float32)
+    at, inside, around = _gathering(it, pose, small)
+    off = own.mean()
+    more = cv2.filter2D(own - off, -1, inside - around, borderType=cv2.BORDER_CONSTANT)
+    reach = max(2, round(0.6 * COARSE))
+    out = []
+    for _ in range(2):
+        y, x = divmod(int(more.argmax()), more.shape[1])
+        place = (x + at[0] + 0.5) / small - 0.5, (y + at[1] + 0.5) / small - 0.5
+        out.append((float(more[y, x]), PatchPose(place[0], place[1], pose.scale, pose.angle)))
+        more[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = -1
+    return out
+
+
+def _gathering(
+    it: Appearance, pose: PatchPose, small: float
+) -> tuple[tuple[float, float], Floats, Floats]:
+    """Weights within a thing and around it, each adding up to 1, and the patch's middle in them."""
+    _, mask, middle = _small_template(it, pose, small)
+    wide = np.pad(mask, 5)
+    soft = cv2.GaussianBlur(wide, (0, 0), 1.5)
+    ring = cv2.dilate(wide, np.ones((9, 9), np.uint8)) - cv2.dilate(wide, np.ones((3, 3), np.uint8))
+    inside = np.asarray(soft / max(float(soft.sum()), 1e-6), dtype=np.float32)
+    around = np.asarray(ring / max(float(ring.sum()), 1e-6), dtype=np.float32)
+    h, w = wide.shape
+    return (middle[0] + 5 - w // 2, middle[1] + 5 - h // 2), inside, around
 
 
 def _alike(a: PatchPose, b: PatchPose, radius: float) -> bool:

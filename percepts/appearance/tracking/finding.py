@@ -10,12 +10,13 @@ import numpy as np
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance, ViewModel
-from visup.percepts.appearance.tracking.detection import search
+from visup.percepts.appearance.tracking.detection import colour_peaks, search
 from visup.percepts.appearance.tracking.track import Blob, ThingTrack
 from visup.percepts.appearance.tracking.verification import Match, verify
 
 SURE = 0.6  # score that no other thing is seen to reach
 FAIR, APART = 0.42, 1.5  # score that will do where no other place has a share of it
+GATHERED = 0.45  # how much more of its colours a place must have than what is around
 NOISE = 0.15  # score that any place may have
 AT_HOME = 0.1  # how much the place where a thing was taught speaks for it
 RECENT_SIZES = (0.85, 1.0, 1.18)
@@ -76,7 +77,18 @@ def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
         return []
     poses = [PatchPose(0, 0, last.scale * s, last.angle) for s in RECENT_SIZES]
     found = _outstanding(search(scene, it, poses), it)
+    if not found:
+        found = _gathered(scene, it, last)
     return [ThingPlace(track.name, track.number, it, m, m.score) for m in found]
+
+
+def _gathered(scene: Scene, it: Appearance, last: PatchPose) -> list[Match]:
+    """The one place where a thing's colours are gathered, if there is just one."""
+    (most, pose), (second, _) = colour_peaks(scene, it, last)
+    if most < GATHERED or second > most / APART:
+        return []
+    share = min(1.0, most)
+    return [Match(pose, share, share)]
 
 
 def _outstanding(matches: Sequence[Match], it: Appearance) -> list[Match]:

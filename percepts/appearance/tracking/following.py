@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,6 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
 from visup.percepts.appearance.tracking.learning import PATH_S
 from visup.percepts.appearance.tracking.points import STILL, PointMotion, similarity_of
-from visup.percepts.appearance.tracking.segmentation import unchanged
 from visup.percepts.appearance.tracking.track import State, ThingTrack
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,
@@ -27,8 +27,8 @@ Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 AS_IT_WAS = 0.97  # share of a window unchanged where nothing happened
 LOSE_S = 0.5  # how long a thing is followed without being seen
 LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # of what is still the thing
-UNSURE_PEAK = 0.45  # of the filter, below which colours are asked where the thing is
-OWN_COLOURS = 0.35  # how much more of its colours a thing shows than what is around it
+UNSURE_PEAK = 0.4  # of the filter, below which colours are asked where the thing is
+OWN_COLOURS = 0.25  # how much more of its colours a thing shows than what is around it
 MOVED_PX = 1.0  # working pixels
 BETTER = 0.04  # share of its pixels that a move must explain beyond rest
 COVERED = 0.2  # share unchanged below which a thing at rest cannot be seen
@@ -50,12 +50,15 @@ class FrameMotion:
         camera: (2, 3) similarity of the picture; `STILL` itself when the camera rests.
         points: On things, by the number of their track.
         number: Of the frame.
+        same: For each thing whose rest is remembered, by its name, (h, w) bool: pixels of its window
+            that look as they did.
     """
 
     scene: Scene
     camera: Doubles
     points: PointMotion
     number: int
+    same: Mapping[str, NDArray[np.bool_]]
 
     @property
     def static(self) -> bool:
@@ -92,11 +95,11 @@ def _at_rest(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTra
     assert pose is not None
     assert it is not None
     assert rest is not None
-    same = unchanged(scene, rest)
+    same = motion.same[track.name]
     kept = float(np.mean(same[rest.blob.mask]))
     if np.mean(same) > AS_IT_WAS:
         return noted(replace(track, explained=kept, peak=1.0), scene.time, pose)
-    best, peak = _located(track, pose, points, motion)
+    best, peak, _ = _located(track, pose, points, motion)
     template = template_of(it.lab, it.mask)
     _, there = explained_pixels(template, scene.patch(best, it.shape))
     _, here = explained_pixels(template, scene.patch(pose, it.shape))
@@ -119,13 +122,13 @@ def _moving(track: ThingTrack, points: Points, motion: FrameMotion) -> ThingTrac
     assert it is not None
     assert track.pose is not None
     base = track.pose.moved(motion.camera)
-    best, peak = _located(track, base, points, motion)
+    best, peak, firm = _located(track, base, points, motion)
     template = template_of(it.lab, it.mask)
     _, share = explained_pixels(template, scene.patch(best, it.shape))
     colours, middle = colour_agreement(scene, best, it)
-    if peak < UNSURE_PEAK and colours > OWN_COLOURS:
+    if peak < UNSURE_PEAK and colours > OWN_COLOURS and not firm:
         # It bends, or turns another side to the camera: its colours tell where it is.
-        best = _between(best, middle, 0.5)
+        best = _between(best, middle, 0.4)
     if (peak > LEAST_PEAK and share > LEAST_SHARE) or colours > OWN_COLOURS:
         return replace(_seen_moving(track, best, peak, share, scene), colours=colours)
     if scene.time - track.seen > LOSE_S:
@@ -146,7 +149,7 @@ def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
     assert track.pose is not None
     scene, it, pose = motion.scene, track.looks, track.pose.moved(motion.camera)
     if track.rest is not None and motion.static:
-        same = unchanged(scene, track.rest)
+        same = motion.same[track.name]
         if np.mean(same[track.rest.blob.mask]) > UNCOVERED:
             return noted(replace(track, state=State.RESTING), scene.time, pose)
     elif track.rest is not None:
@@ -161,8 +164,12 @@ def _looked_again(track: ThingTrack, motion: FrameMotion) -> ThingTrack:
 
 def _located(
     track: ThingTrack, base: PatchPose, points: Points, motion: FrameMotion
-) -> tuple[PatchPose, float]:
-    """Where a thing's filter answers most, near where its points and its past expect it."""
+) -> tuple[PatchPose, float, bool]:
+    """Where a thing's filter answers most, near where its points and its past expect it.
+
+    Returns:
+        The pose, how strongly it answers, and whether many points agree on where it went.
+    """
     it, scene = track.looks, motion.scene
     assert it is not None
     assert track.pose is not None
@@ -173,11 +180,11 @@ def _located(
         # Points are precise, the filter is sure of the place: it pulls them back slowly.
         best = _between(guess, at, 0.25) if at.apart(guess, 0) < 1.6 * guess.scale else at
         if firm and peak > PLAIN * track.peak and motion.number % LOOK_CLOSER:
-            return best, peak
+            return best, peak, True
     at, height = _answer(scene, base, it)
     if height > peak:
         best, peak = at, height
-    return _resized(best, peak, it, scene)
+    return (*_resized(best, peak, it, scene), firm)
 
 
 def _resized(best: PatchPose, peak: float, it: Appearance, scene: Scene) -> tuple[PatchPose, float]:

@@ -16,8 +16,8 @@ from visup.percepts.appearance.tracking.track import Blob, RestMemory, State, Th
 Floats = NDArray[np.float32]
 
 SURE_PEAK, SURE_SHARE = 0.4, 0.5  # below these one does not learn: it may be something else
-SURE_COLOURS = 0.45
-GROW_RATE, SHRINK_RATE = 0.06, 0.03
+SURE_COLOURS = 0.35
+GROW_RATE, SHRINK_RATE = 0.08, 0.05
 PIXEL_RATE, FILTER_RATE = 0.12, 0.04
 COLOUR_RATE, AROUND_RATE = 0.02, 0.1
 PATH_S = 0.4

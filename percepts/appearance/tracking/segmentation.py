@@ -12,10 +12,12 @@ from visup.percepts.appearance.looks.colours import colour_bins
 from visup.percepts.appearance.looks.pose import PatchPose, Window, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import Appearance
+from visup.percepts.appearance.tracking._rest_check_jit import like_before
 from visup.percepts.appearance.tracking.track import Blob, RestMemory
 from visup.percepts.appearance.tracking.verification import explained_pixels, template_of
 
 Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 
 Claim = tuple[Window, Floats]
 """A window (left, top, right, bottom) and (h, w) float32 log odds that its pixels are a thing's."""
@@ -24,8 +26,9 @@ _SHAPE = np.float32(3.0)  # log odds of a pixel well within a thing, or well out
 _COLOUR = np.float32(2.0)  # most that a colour says
 _LIKE, _UNLIKE = np.float32(1.0), np.float32(-1.5)  # of a pixel that looks as the template wants
 _SOFT = 2.5  # how far a thing's outline may be off, pixels of its patch
-_CHANGED = np.array([14, 7, 7], dtype=np.int16)  # steps of Lab by which a pixel at rest may differ
-_KEPT, _LOST = np.float32(3.0), np.float32(-2.0)
+_CHANGED = 14, 7  # steps of lightness and of colour by which a pixel at rest may differ
+# What looks as it did, to the pixel, is nothing that has come in front.
+_KEPT, _LOST = np.float32(5.0), np.float32(-2.0)
 NOWHERE = np.float32(-9.0)
 
 
@@ -52,32 +55,25 @@ def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | No
     return window, np.asarray(paint(score, pose, window, float(NOWHERE)), dtype=np.float32)
 
 
-def rest_scores(scene: Scene, rest: RestMemory) -> Claim:
+def rest_scores(rest: RestMemory, same: Mask) -> Claim:
     """How much each pixel still speaks for a thing at rest.
 
     Args:
-        scene: The frame.
         rest: As it was.
+        same: As of `unchanged`.
     """
-    score = np.where(unchanged(scene, rest), _KEPT, _LOST)
+    score = np.where(same, _KEPT, _LOST)
     score[~rest.blob.mask] = NOWHERE
     return rest.blob.window, score
 
 
-def unchanged(scene: Scene, rest: RestMemory) -> NDArray[np.bool_]:
+def unchanged(scene: Scene, rest: RestMemory) -> Mask:
     """(h, w) bool: pixels of a window that look as they did, whatever the light."""
     left, top, right, bottom = rest.blob.window
-    now = scene.lab[0][top:bottom, left:right].astype(np.int16)
-    off = np.abs(now - rest.lab)
-    same: NDArray[np.bool_] = np.asarray(np.all(off <= _CHANGED, axis=2))
+    now = np.ascontiguousarray(scene.lab[0][top:bottom, left:right])
+    same = like_before(now, rest.lab, *_CHANGED)
     if same.all():
         return same
-    # A shadow darkens, and moves the colours towards grey; it leaves their kind.
-    was = rest.lab.astype(np.float32)
-    ratio = (now[..., 0] + 1) / (was[..., 0] + 1)
-    grey = np.abs((now[..., 1:] - 128) - (was[..., 1:] - 128) * ratio[..., None]).max(axis=2)
-    shade = (ratio > 0.62) & (ratio < 1.25) & (grey <= 7) & (was[..., 0] > 50)
-    same |= shade
     # Single pixels that flicker are noise.
     changed = cv2.morphologyEx((~same).view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     return np.asarray(changed == 0)

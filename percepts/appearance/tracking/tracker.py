@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
 from visup.percepts.appearance.tracking.finding import (
-    SURE,
     ThingPlace,
     assigned,
     candidates,
@@ -28,10 +27,12 @@ from visup.percepts.appearance.tracking.following import (
 from visup.percepts.appearance.tracking.learning import learned, rested
 from visup.percepts.appearance.tracking.points import (
     STILL,
+    PointMotion,
     camera_motion,
     follow_points,
     grid_points,
 )
+from visup.percepts.appearance.tracking.recalling import recalled
 from visup.percepts.appearance.tracking.segmentation import (
     Claim,
     compete,
@@ -40,12 +41,13 @@ from visup.percepts.appearance.tracking.segmentation import (
     unchanged,
 )
 from visup.percepts.appearance.tracking.track import IN_VIEW, Blob, State, ThingTrack
-from visup.percepts.appearance.tracking.verification import verify
 
+Mask = NDArray[np.bool_]
+
+NO_POINTS = np.zeros((0, 2), dtype=np.float32)
 POINTS = 24  # that are followed on each thing
 HOLD_S = 0.12  # how long a thing that is lost is still reported where it should be
 LEAST_SEEN = 0.04  # share of a thing below which nothing of it is seen
-RECALL = 8  # frames between two comparisons with what was taught
 EVERY = 3  # frames between two searches of the whole picture
 
 
@@ -77,24 +79,26 @@ class ThingTracker:
         """Take on what a tracker of the same views remembered."""
         vars(self).update(state)
 
-    def step(self, scene: Scene, new_id: Callable[[], int]) -> tuple[ThingTrack, ...]:
+    def step(self, scene: Scene, new_id: Callable[[Blob], int]) -> tuple[ThingTrack, ...]:
         """The things in the next frame.
 
         Args:
             scene: The frame.
-            new_id: Gives an id that no region has had.
+            new_id: Gives the id of what is seen for the first time.
 
         Returns:
             One track for each name, in the order of teaching.
         """
         old, self.scene = self.scene, scene
         self._count += 1
+        same: dict[str, Mask] = {}
         if old is not None and old.size == scene.size:
-            self._follow(old, scene)
+            same = {t.name: unchanged(scene, t.rest) for t in self.tracks if t.rest is not None}
+            self._follow(old, scene, same)
         else:
             self.tracks = tuple(_forgotten(t) for t in self.tracks)
         self._find(scene)
-        self._share_pixels(scene)
+        self._share_pixels(scene, same)
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
         return self.tracks
 
@@ -105,38 +109,34 @@ class ThingTracker:
     def _numbers(self, name: str) -> list[int]:
         return [k for k, v in enumerate(self.views) if v.name == name]
 
-    def _follow(self, old: Scene, scene: Scene) -> None:
-        points = [(-1, grid_points(old, _taken(self.tracks, old)))]
-        for k, t in enumerate(self.tracks):
-            if t.visible is not None and self._may_move(t, scene):
-                points.append((k, _points_on(old, t.visible)))
-        owner = np.concatenate([np.full(len(p), k) for k, p in points]).astype(np.int64)
-        moved = follow_points(old, scene, np.concatenate([p for _, p in points]), owner)
+    def _follow(self, old: Scene, scene: Scene, same: Mapping[str, Mask]) -> None:
+        calm = {n for n, mask in same.items() if np.mean(mask) > AS_IT_WAS}
+        resting = [t for t in self.tracks if t.state is State.RESTING and t.name in calm]
+        seen = [t for t in self.tracks if t.state in IN_VIEW]
+        if self._static and seen and len(resting) == len(seen):
+            # The camera rests, too: what it shows has not moved by a pixel.
+            moved = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64))
+        else:
+            moved = self._followed_points(old, scene, calm if self._static else set())
         camera = camera_motion(moved)
         self._static = camera is STILL
-        motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count)
-        moved_on = (followed(t, k, motion) for k, t in enumerate(self.tracks))
-        self.tracks = tuple(self._recalled(t, scene) for t in moved_on)
+        motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count, same)
+        tracks = [followed(t, k, motion) for k, t in enumerate(self.tracks)]
+        for k, t in enumerate(tracks):
+            if t.state in IN_VIEW and t.seen == scene.time:
+                others = [o.visible for o in tracks if o is not t and o.visible is not None]
+                tracks[k] = recalled(t, self.views, scene, others)
+        self.tracks = tuple(tracks)
 
-    def _recalled(self, track: ThingTrack, scene: Scene) -> ThingTrack:
-        """A moving thing that looks as it was taught is again believed to look just so."""
-        it, pose = track.looks, track.pose
-        if track.state is not State.MOVING or it is None or pose is None:
-            return track
-        if track.seen < scene.time or (self._count + track.number) % RECALL:
-            return track
-        taught = self.views[track.number].appearance
-        match = verify(scene, taught, pose)
-        score = (max(track.peak, 0.0) * track.explained) ** 0.5
-        if match.score <= max(SURE, score) or match.pose.apart(pose, it.radius) > it.radius:
-            return track
-        return replace(track, looks=replace(taught, colours=it.colours))
-
-    def _may_move(self, track: ThingTrack, scene: Scene) -> bool:
-        """Whether anything happens where a thing is."""
-        if track.state is not State.RESTING or track.rest is None or not self._static:
-            return True
-        return bool(np.mean(unchanged(scene, track.rest)) < AS_IT_WAS)
+    def _followed_points(self, old: Scene, scene: Scene, calm: Collection[str]) -> PointMotion:
+        """Points of the whole picture and of things that may move, and where they went."""
+        points = [(-1, grid_points(old, _taken(self.tracks, old)))]
+        for k, t in enumerate(self.tracks):
+            rests = t.state is State.RESTING and t.name in calm
+            if t.visible is not None and not rests:
+                points.append((k, _points_on(old, t.visible)))
+        owner = np.concatenate([np.full(len(p), k) for k, p in points]).astype(np.int64)
+        return follow_points(old, scene, np.concatenate([p for _, p in points]), owner)
 
     def _find(self, scene: Scene) -> None:
         """Look for things that are not in view: all of them at first, then one after another."""
@@ -156,8 +156,8 @@ class ThingTracker:
         asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
         self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
 
-    def _share_pixels(self, scene: Scene) -> None:
-        claims = [_claim(t, scene) for t in self.tracks]
+    def _share_pixels(self, scene: Scene, same: Mapping[str, Mask]) -> None:
+        claims = [_claim(t, scene, same) for t in self.tracks]
         blobs = compete(claims, scene.size)
         shown = zip(self.tracks, claims, blobs, strict=True)
         self.tracks = tuple(self._shown(t, c, b, scene) for t, c, b in shown)
@@ -201,24 +201,24 @@ def _forgotten(track: ThingTrack) -> ThingTrack:
     return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
 
 
-def _numbered(track: ThingTrack, scene: Scene, new_id: Callable[[], int]) -> ThingTrack:
+def _numbered(track: ThingTrack, scene: Scene, new_id: Callable[[Blob], int]) -> ThingTrack:
     if track.id or track.visible is None:
         return track
-    return replace(track, id=new_id(), since=scene.time)
+    return replace(track, id=new_id(track.visible), since=scene.time)
 
 
-def _claim(track: ThingTrack, scene: Scene) -> Claim | None:
+def _claim(track: ThingTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim | None:
     """What a thing that is in view claims of the picture."""
     if track.state not in IN_VIEW or scene.time - track.seen > HOLD_S:
         return None
     if track.state is State.RESTING and track.rest is not None:
-        return rest_scores(scene, track.rest)
+        return rest_scores(track.rest, same[track.name])
     assert track.pose is not None
     assert track.looks is not None
     return thing_scores(scene, track.pose, track.looks)
 
 
-def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> NDArray[np.bool_]:
+def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> Mask:
     """(h, w) bool: where things are seen."""
     out = np.zeros(scene.size[::-1], dtype=bool)
     for t in tracks:
