@@ -47,13 +47,19 @@ LookSignature = tuple[tuple[str, int, float, float | None], ...]
 """What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
 
 
+FITTED = SpinSettings(swing_deg=2.5, roll_deg=2.5, view_deg=0.5, view_share=0.02, view_most_deg=1.0)
+"""How spin is measured from orientations that are exact to some two degrees."""
+
+
 @dataclass(frozen=True, slots=True)
 class PoseSettings:
     """How poses are believed.
 
     Attributes:
         tree: Costs and bounds of the interpretation trees.
-        spin: How spin is measured.
+        spin: How spin is measured from stored views.
+        fitted_spin: The same from orientations that were fitted to the picture, which are exact to two
+            degrees and follow the object without steps.
         every_s: Looks at one object are at least so far apart.
         most_looks: Objects whose trees grow in one step at most; those that have waited longest come
             first. The budget of the most expensive part of reasoning: it counts work, not time, so that what
@@ -76,6 +82,7 @@ class PoseSettings:
 
     tree: TreeSettings = field(default_factory=TreeSettings)
     spin: SpinSettings = field(default_factory=SpinSettings)
+    fitted_spin: SpinSettings = field(default_factory=lambda: FITTED)
     every_s: float = 0.2
     most_looks: int = 4
     refit_s: float = 1.0
@@ -267,10 +274,11 @@ class PoseReasoner:
         if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
             return track
         turns = _orientation_series(track, name, self.settings.tree.lag)
+        level = track.levels[-1].get(name)
+        fitted = level is not None and bool(level.fitted.any())
+        how = self.settings.fitted_spin if fitted else self.settings.spin
         return replace(
-            track,
-            rate=estimate_angular_velocity(turns, now, track.rate, self.settings.spin),
-            rated=now,
+            track, rate=estimate_angular_velocity(turns, now, track.rate, how), rated=now
         )
 
     def _led(self, track: PoseTrack, name: str, waited: float) -> PoseTrack:
