@@ -161,7 +161,7 @@ def match_picture(
     if out is not None:
         from visup.percepts.shape.drawing.pictures import match_picture
 
-        _write_picture(out, match_picture(database, silhouette, ranking, image.name), as_json)
+        write_picture(out, match_picture(database, silhouette, ranking, image.name), as_json)
 
 
 @app.command("show")
@@ -176,10 +176,15 @@ def show(
     from visup.percepts.shape.drawing.pictures import contact_sheet
 
     sheet = contact_sheet(ModelDatabase.open(db))
-    _write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)
+    write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)
 
 
-def _write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -> None:
+def write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -> None:
+    """Write a picture as PNG and, unless quiet, say so.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
     import cv2
 
     from visup.agent.model.errors import OutputError

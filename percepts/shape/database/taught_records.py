@@ -31,18 +31,28 @@ _COLUMNS = "name, x, y, width, height, image, mask, scene, crc"
 _PNG_HEADER = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 
+def checked_name(name: str) -> str:
+    """A thing's name as it is stored, without blanks around it.
+
+    Raises:
+        DatabaseError: It is none.
+    """
+    bare = name.strip()
+    if not 0 < len(bare) <= MOST_NAME or not bare.isprintable():
+        raise DatabaseError(
+            f"a taught thing cannot be called {bare[:40]!r}",
+            expected=f"1 to {MOST_NAME} printable characters",
+        )
+    return bare
+
+
 def encoded(view: TaughtView) -> TaughtRow:
     """The row of a view.
 
     Raises:
         DatabaseError: Its name or its picture is too large to be stored.
     """
-    name = view.name.strip()
-    if not 0 < len(name) <= MOST_NAME or not name.isprintable():
-        raise DatabaseError(
-            f"a taught thing cannot be called {name[:40]!r}",
-            expected=f"1 to {MOST_NAME} printable characters",
-        )
+    name = checked_name(view.name)
     mask = view.mask.astype(np.uint8) * np.uint8(255)
     row = TaughtRow(
         name,
