@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from visup.runs.settings import WatchSettings as Settings
     from visup.stepping import Stepper
     from visup.tasks import Task, load_task
+    from visup.teaching import teach
     from visup.version import __version__
 
 __all__ = [
@@ -73,6 +74,7 @@ __all__ = [
     "__version__",
     "load_task",
     "open_run",
+    "teach",
     "watch",
 ]
 
@@ -89,6 +91,7 @@ _HOMES = {
     "visup.runs.settings": ("WatchSettings as Settings",),
     "visup.stepping": ("Stepper",),
     "visup.tasks": ("Task", "load_task"),
+    "visup.teaching": ("teach",),
     "visup.version": ("__version__",),
 }
 _HOME_OF = {

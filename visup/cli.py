@@ -19,6 +19,7 @@ from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
+from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
 from visup.version import __version__
 
@@ -38,6 +39,7 @@ app = typer.Typer(
 )
 app.command("watch")(watch)
 app.command("demo")(demo)
+app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)
 app.command("render")(render)

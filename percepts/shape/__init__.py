@@ -7,6 +7,7 @@ Read the rooms in this order:
 - `matching/`: how alike two shapes are: graphs, outlines, areas; shapes that a border cuts.
 - `index/`: what is stored of a view, and which views are worth a full comparison.
 - `database/`: the file, its views, and the search for the views that a silhouette looks like.
+- `refinement/`: orientations made exact with a model's own mesh.
 - `building/`: views rendered from meshes, exemplars of silhouettes, the database built from both.
 - `drawing/`: pictures for people: contact sheets, and why a silhouette matches a view.
 

@@ -19,7 +19,8 @@ from visup.agent.contract.behaviour import Contract
 from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Hypothesis, Observation, Percept, Region
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
-from visup.percepts.shape.silhouette.silhouette import normalise
+from visup.percepts.shape.refinement.pose_refiner import PoseRefiner, SizedHypothesis
+from visup.percepts.shape.silhouette.silhouette import Silhouette, normalise
 
 _THUMB = 48
 
@@ -85,14 +86,16 @@ class ShapeBehaviour:
         self.database = database
         self.settings = settings or ShapeSettings()
         self._remembered: dict[int, _MatchedRegion] = {}
+        self._refiner = PoseRefiner(database.meshes if database is not None else {})
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return {"remembered": self._remembered}
+        return {"remembered": self._remembered, "fits": self._refiner.memory}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a behaviour of the same settings remembered."""
         self._remembered = dict(state["remembered"])
+        self._refiner.memory = dict(state["fits"])
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
@@ -115,9 +118,11 @@ class ShapeBehaviour:
         due = self._due(
             regions, frame.time, restrict, _rest_intervals(directives, self.contract.name)
         )
+        self._refiner.forget(here)
         found = self._match(self.database, due, frame, restrict, first)
-        for region, matches in zip(due, found, strict=True):
-            self._remembered[region.id] = _remembered(region, frame.time, restrict, matches)
+        for region, silhouette, matches in zip(due, *found, strict=True):
+            said = self._refined(self.database, frame, region, silhouette, matches)
+            self._remembered[region.id] = _remembered(region, frame.time, restrict, said)
         return [
             Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
             for r in regions
@@ -167,8 +172,8 @@ class ShapeBehaviour:
         frame: Frame,
         restrict: frozenset[str] | None,
         first: Collection[str],
-    ) -> list[tuple[ViewMatch, ...]]:
-        """What each of the regions looks like; nothing for one that has no shape."""
+    ) -> tuple[list[Silhouette | None], list[tuple[ViewMatch, ...]]]:
+        """Silhouettes of the regions and what each looks like; nothing for one that has no shape."""
         silhouettes = [normalise(r.mask, cut=r.cut, sides=_border_sides(r, frame)) for r in regions]
         rankings = iter(
             database.query_all(
@@ -182,11 +187,34 @@ class ShapeBehaviour:
                 budget=self.settings.budget,
             )
         )
-        return [() if s is None else next(rankings).matches for s in silhouettes]
+        return silhouettes, [() if s is None else next(rankings).matches for s in silhouettes]
+
+    def _refined(
+        self,
+        database: ModelDatabase,
+        frame: Frame,
+        region: Region,
+        silhouette: Silhouette | None,
+        matches: tuple[ViewMatch, ...],
+    ) -> tuple[SizedHypothesis, ...]:
+        """Hypotheses of a region, with fitted orientations where the model's mesh is known."""
+        said = [(_hypothesis(region, m), m.view.area) for m in matches]
+        if silhouette is None or not self._refiner.meshes:
+            return tuple(said)
+
+        def more(name: str) -> list[SizedHypothesis]:
+            wanted = self._refiner.settings.starts
+            found = database.query(silhouette, top=wanted, restrict={name})
+            return [(_hypothesis(region, m), m.view.area) for m in found.matches]
+
+        return self._refiner.refined(frame, region, said, more)
 
 
 def _remembered(
-    region: Region, time: float, restrict: frozenset[str] | None, found: tuple[ViewMatch, ...]
+    region: Region,
+    time: float,
+    restrict: frozenset[str] | None,
+    said: tuple[SizedHypothesis, ...],
 ) -> _MatchedRegion:
     return _MatchedRegion(
         time=time,
@@ -194,8 +222,8 @@ def _remembered(
         aspect=_aspect(region),
         cut=region.cut,
         restrict=restrict,
-        hypotheses=tuple(_hypothesis(region, m) for m in found),
-        areas=tuple(m.view.area for m in found),
+        hypotheses=tuple(h for h, _ in said),
+        areas=tuple(area for _, area in said),
     )
 
 

@@ -33,6 +33,11 @@ def watching() -> visup.Verdict | None:
     return run.verdict
 
 
+def teaching(picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> visup.ModelDatabase:
+    models = visup.teach("clip.mp4", {"part": [(1, 2), (3, 4), (5, 0)]}, models="a.models", frame=9)
+    return visup.teach(picture, {"tray": mask}, models=models)
+
+
 def settings() -> visup.Run:
     return visup.watch(visup.Settings("clip.mp4", tasks=("dock",)), out=Path("run"))
 

@@ -73,7 +73,8 @@ def add(
 ) -> None:
     """Add exemplars of silhouettes, or of an object's masks in a video.
 
-    Silhouettes may be cut by the pictures' borders, and are then stored as such.
+    Silhouettes may be cut by the pictures' borders, and are then stored as such. A database that does
+    not exist yet is begun.
     """
     from visup.agent.model.errors import SettingsError
     from visup.percepts.shape.building.database_builder import (
@@ -90,33 +91,37 @@ def add(
         )
     if label is not None and masks is None:
         raise SettingsError("--label needs --masks, which is not given")
-    database = ModelDatabase.open(db)
     if silhouettes is not None and masks is None:
-        seen = read_silhouettes(silhouettes)
+        new = silhouette_views(name, read_silhouettes(silhouettes), clusters)
     elif masks is not None and silhouettes is None:
-        seen = read_masks(masks, label)
+        new = silhouette_views(name, read_masks(masks, label), clusters)
     else:
         raise SettingsError(
             "either --silhouettes or --masks is needed, not both",
             expected="--silhouettes DIR or --masks DIR",
         )
-    _tell_size(database.add(silhouette_views(name, seen, clusters)))
+    _tell_size(ModelDatabase.open_or_new(db).add(new))
 
 
 @app.command("list")
 def list_models(db: Db) -> None:
     """List the models of a database with their views."""
+    from collections import Counter
+
     from rich.console import Console
     from rich.table import Table
 
     from visup.percepts.shape.database.model_database import ModelDatabase
 
     database = ModelDatabase.open(db)
-    table = Table("object", "views", "directions", "cut by a border", title=str(db))
+    columns = ("object", "views", "directions", "cut by a border", "taught")
+    table = Table(*columns, title=str(db))
+    taught = Counter(view.name for view in database.taught)
     for name in database.names():
         own = [database.views[k] for k in database.views.named({name})]
         directions = sum(len(v.seen_from) for v in own)
-        table.add_row(name, str(len(own)), str(directions), str(sum(v.cut for v in own)))
+        counts = (len(own), directions, sum(v.cut for v in own), taught[name])
+        table.add_row(name, *map(str, counts))
     Console().print(table)
     _tell_size(database)
 
@@ -156,7 +161,7 @@ def match_picture(
     if out is not None:
         from visup.percepts.shape.drawing.pictures import match_picture
 
-        _write_picture(out, match_picture(database, silhouette, ranking, image.name), as_json)
+        write_picture(out, match_picture(database, silhouette, ranking, image.name), as_json)
 
 
 @app.command("show")
@@ -171,10 +176,15 @@ def show(
     from visup.percepts.shape.drawing.pictures import contact_sheet
 
     sheet = contact_sheet(ModelDatabase.open(db))
-    _write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)
+    write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)
 
 
-def _write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -> None:
+def write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -> None:
+    """Write a picture as PNG and, unless quiet, say so.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
     import cv2
 
     from visup.agent.model.errors import OutputError
@@ -189,7 +199,10 @@ def _write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) -
 
 
 def _tell_size(database: ModelDatabase) -> None:
-    typer.echo(f"{database.path}: {len(database.names())} models, {len(database.views)} views")
+    parts = [f"{len(database.names())} models, {len(database.views)} views"]
+    if database.taught:
+        parts.append(f"{len(database.taught)} taught outlines")
+    typer.echo(f"{database.path}: {', '.join(parts)}")
 
 
 def _print_json(ranking: Ranking) -> None:

@@ -92,8 +92,17 @@ def build_agent(
     )
 
 
-def reasoning_agent(settings: WatchSettings) -> Agent:
+def reasoning_agent(
+    settings: WatchSettings,
+    observers: Sequence[Observer] = (),
+    behaviours: Sequence[Behaviour] = (),
+) -> Agent:
     """An agent that reasons as the settings say about what was perceived before; it sees nothing.
+
+    Args:
+        settings: What to supervise against.
+        observers: Told of each step.
+        behaviours: What sees in place of eyes.
 
     Raises:
         VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
@@ -103,7 +112,13 @@ def reasoning_agent(settings: WatchSettings) -> Agent:
     zones = load_zones(settings.zones) if settings.zones else ()
     _check_zones(tasks, {z.name for z in zones})
     _check_actors(settings, tasks, None)
-    return Agent(reasoners=_reasoners(settings, tasks), actors=settings.actors, zones=zones)
+    return Agent(
+        behaviours=behaviours,
+        reasoners=_reasoners(settings, tasks, [b.contract for b in behaviours]),
+        actors=settings.actors,
+        zones=zones,
+        observers=observers,
+    )
 
 
 def final_verdict(mind: Mind) -> Verdict:

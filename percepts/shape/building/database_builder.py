@@ -25,6 +25,7 @@ from visup.percepts.shape.database.view_directions import merge_symmetric
 from visup.percepts.shape.index.view_records import NewView
 from visup.percepts.shape.matching.exemplars import medoids, similarity_matrix
 from visup.percepts.shape.matching.shape_similarity import shape_of
+from visup.percepts.shape.refinement.mesh_model import MeshModel, mesh_model
 from visup.percepts.shape.silhouette.silhouette import binary_picture, looks_cut, normalise
 
 VIEWS = 32
@@ -235,9 +236,16 @@ def build_database(
         for name, masks in silhouettes.items():
             yield from silhouette_views(name, masks, options.get("clusters", CLUSTERS))
 
-    built = ModelDatabase.create(target, stored())
+    kept = (_kept_mesh(mesh) for mesh in meshes)
+    built = ModelDatabase.create(target, stored(), kept)
     shutil.rmtree(folder, ignore_errors=True)
     return built
+
+
+def _kept_mesh(path: Path) -> MeshModel:
+    """What is kept of a mesh file beside its views."""
+    mesh = load_mesh(path)
+    return mesh_model(path.stem, mesh.vertices, mesh.faces)
 
 
 def building_folder(target: Path) -> Path:

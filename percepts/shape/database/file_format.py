@@ -4,6 +4,9 @@ One SQLite file. What is needed of every view (its model, direction, root and sk
 blocks, so that opening a hundred thousand views reads some megabytes; each shape stands in a row of its
 own and is read when it is asked for. All bytes have a check sum: what is read is what was written.
 
+Version 3 has taught views (`taught_records.py`) besides; a file of version 2 is read, and becomes one of
+version 3 when something is added to it.
+
 Read next: `file_writer.py`, `file_reader.py`.
 """
 
@@ -20,8 +23,11 @@ from visup.percepts.shape.index.view_records import Records
 APPLICATION_ID = 0x76697375
 """'visu' in ASCII, in the header of every database file."""
 
-VERSION = 2
+VERSION = 3
 """Version of the tables; a newer file is refused, since its meaning is not known."""
+
+OLDEST = 2
+"""Version of the oldest tables that are read."""
 
 BLOCK = 1024
 """Views of a block at most."""
@@ -36,11 +42,75 @@ TABLES = (
     "crc INTEGER NOT NULL)",
     "CREATE TABLE shapes (view INTEGER PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
     "contour BLOB NOT NULL, crc INTEGER NOT NULL)",
+    "CREATE TABLE taught (number INTEGER PRIMARY KEY, name TEXT NOT NULL, x INTEGER NOT NULL, "
+    "y INTEGER NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL, image BLOB NOT NULL, "
+    "mask BLOB NOT NULL, scene BLOB NOT NULL, crc INTEGER NOT NULL)",
+    "CREATE TABLE meshes (number INTEGER PRIMARY KEY, name TEXT NOT NULL, radius REAL NOT NULL, "
+    "vertices BLOB NOT NULL, faces BLOB NOT NULL, crc INTEGER NOT NULL)",
 )
-MOST_BYTES = 1 << 24
+TABLES_OF = {OLDEST: TABLES[:-2], VERSION: TABLES}
+"""Version -> its tables."""
+
+MOST_BYTES = 1 << 25
+"""Of a row: the picture of a large thing in a large frame has to fit."""
+
 # Messages about damaged tables quote them, and are no text when what they quote is none.
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
 BUILD_HINT = "build it anew with 'visup models build'"
+
+
+def checksum(number: int, *parts: bytes) -> int:
+    """Check sum of a row; its number is in it, so that rows cannot change places."""
+    total = number
+    for part in parts:
+        total = zlib.crc32(part, total)
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class TaughtRow:
+    """A taught view as it stands in the file.
+
+    Attributes:
+        name: Of the thing.
+        place: x, y of the image in the picture, and the picture's width and height, pixels.
+        image: PNG, three channels.
+        mask: PNG, one channel, 0 and 255.
+        scene: PNG, three channels.
+    """
+
+    name: str
+    place: tuple[int, int, int, int]
+    image: bytes
+    mask: bytes
+    scene: bytes
+
+    def checksum(self, number: int) -> int:
+        """Of the row with this number."""
+        text = "\n".join((self.name, *map(str, self.place))).encode()
+        return checksum(number, text, self.image, self.mask, self.scene)
+
+
+@dataclass(frozen=True, slots=True)
+class MeshRow:
+    """A mesh as it stands in the file; see `refinement/mesh_model.py`.
+
+    Attributes:
+        name: Of the model.
+        radius: Of the mesh, its own units.
+        vertices: (V, 3) little-endian float32.
+        faces: (F, 3) little-endian int32.
+    """
+
+    name: str
+    radius: float
+    vertices: bytes
+    faces: bytes
+
+    def checksum(self, number: int) -> int:
+        """Of the row with this number."""
+        text = f"{self.name}\n{self.radius!r}".encode()
+        return checksum(number, text, self.vertices, self.faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,19 +121,15 @@ class FileContents:
         names: Names of the models, in the order of the file.
         views: (V,) records of `VIEW`.
         also: (A,) records of `ALSO`, rising by view (from 0).
+        taught: What was taught, in the order of teaching.
+        meshes: What poses are fitted with.
     """
 
     names: tuple[str, ...]
     views: Records
     also: Records
-
-
-def checksum(number: int, *parts: bytes) -> int:
-    """Check sum of a row; its number is in it, so that rows cannot change places."""
-    total = number
-    for part in parts:
-        total = zlib.crc32(part, total)
-    return total
+    taught: tuple[TaughtRow, ...] = ()
+    meshes: tuple[MeshRow, ...] = ()
 
 
 def damaged(path: Path, found: str, expected: str) -> DatabaseError:

@@ -19,7 +19,8 @@ from visup.percepts.shape.database.file_format import (
     BUILD_HINT,
     MOST_BYTES,
     MOST_NAME,
-    TABLES,
+    OLDEST,
+    TABLES_OF,
     UNREADABLE,
     VERSION,
     FileContents,
@@ -27,6 +28,8 @@ from visup.percepts.shape.database.file_format import (
     damaged,
     unreadable,
 )
+from visup.percepts.shape.database.mesh_records import read_meshes
+from visup.percepts.shape.database.taught_records import read_taught
 from visup.percepts.shape.index.view_records import (
     ALSO,
     LAYOUT,
@@ -88,11 +91,11 @@ def _check_header(path: Path) -> None:
             expected=f"application id {APPLICATION_ID:#x}",
             hint=BUILD_HINT,
         )
-    if version != VERSION:
+    if version not in TABLES_OF:
         raise DatabaseError(
             f"this model database is of version {version}",
             where=str(path),
-            expected=f"version {VERSION}",
+            expected=f"version {OLDEST} to {VERSION}",
             hint="use a newer visup for it" if version > VERSION else BUILD_HINT,
         )
     # A page size of 65536 does not fit its field and is written as 1.
@@ -113,8 +116,9 @@ def _check_tables(path: Path, file: sqlite3.Connection) -> None:
     file.execute("PRAGMA cell_size_check = ON")
     query = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 50"
     found = sorted(str(sql) for (sql,) in file.execute(query))
-    if found != sorted(TABLES):
-        raise damaged(path, "its tables are not those of a model database", "; ".join(TABLES))
+    tables = TABLES_OF[version_of(file)]
+    if found != sorted(tables):
+        raise damaged(path, "its tables are not those of a model database", "; ".join(tables))
     layout = dict(file.execute("SELECT part, meaning FROM layout LIMIT 50").fetchall())
     if layout != LAYOUT:
         raise DatabaseError(
@@ -123,6 +127,12 @@ def _check_tables(path: Path, file: sqlite3.Connection) -> None:
             expected=str(LAYOUT),
             hint=BUILD_HINT,
         )
+
+
+def version_of(file: sqlite3.Connection) -> int:
+    """The version of a database's tables."""
+    (version,) = file.execute("PRAGMA user_version").fetchone()
+    return int(version)
 
 
 def read_contents(path: Path) -> FileContents:
@@ -139,11 +149,14 @@ def read_contents(path: Path) -> FileContents:
             (last,) = file.execute("SELECT max(view) FROM shapes").fetchone()
             if (-1 if last is None else last) != len(views) - 1:
                 raise InvalidRecordError("other views than shapes")
+            recent = version_of(file) > OLDEST
+            taught = read_taught(file) if recent else ()
+            meshes = read_meshes(file) if recent else ()
         except InvalidRecordError as e:
             raise damaged(path, str(e), "what 'visup models' writes") from e
         except UNREADABLE as e:
             raise unreadable(path, e) from e
-    return FileContents(names, views, also)
+    return FileContents(names, views, also, taught, meshes)
 
 
 def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:

@@ -21,11 +21,14 @@ from visup.percepts.shape.database.file_format import (
     APPLICATION_ID,
     BLOCK,
     TABLES,
+    TABLES_OF,
     VERSION,
     FileContents,
     checksum,
 )
-from visup.percepts.shape.database.file_reader import read_contents
+from visup.percepts.shape.database.file_reader import read_contents, version_of
+from visup.percepts.shape.database.mesh_records import encoded_mesh, insert_meshes
+from visup.percepts.shape.database.taught_records import encoded, insert_taught
 from visup.percepts.shape.index.outline_sketch import sketch
 from visup.percepts.shape.index.view_records import (
     ALSO,
@@ -37,10 +40,17 @@ from visup.percepts.shape.index.view_records import (
     encode,
     node_records,
 )
+from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.height_functions import outline_heights
+from visup.percepts.taught.view import TaughtView
 
 
-def write_new(path: Path, views: Iterable[NewView]) -> None:
+def write_new(
+    path: Path,
+    views: Iterable[NewView] = (),
+    taught: Iterable[TaughtView] = (),
+    meshes: Iterable[MeshModel] = (),
+) -> None:
     """Write a database with these views, in place of whatever stands at the path.
 
     Raises:
@@ -54,19 +64,34 @@ def write_new(path: Path, views: Iterable[NewView]) -> None:
             file.execute(table)
         file.executemany("INSERT INTO layout VALUES (?, ?)", LAYOUT.items())
         _insert(file, FileContents((), np.empty(0, VIEW), np.empty(0, ALSO)), views)
+        insert_taught(file, 0, map(encoded, taught))
+        insert_meshes(file, map(encoded_mesh, meshes))
 
 
-def write_more(path: Path, views: Iterable[NewView]) -> None:
+def write_more(
+    path: Path, views: Iterable[NewView] = (), taught: Iterable[TaughtView] = ()
+) -> None:
     """Add views to a database; the file is replaced whole, or left as it was.
 
+    A file of an older version becomes one of this version.
+
     Raises:
-        DatabaseError: The file is no database of this version, or cannot be written.
+        DatabaseError: The file is no database that can be read, or cannot be written.
     """
     before = read_contents(path)
     with _replacing(path) as temporary:
         shutil.copyfile(path, temporary)
         with closing(sqlite3.connect(temporary)) as file:
+            _renew(file)
             _insert(file, before, views)
+            insert_taught(file, len(before.taught), map(encoded, taught))
+
+
+def _renew(file: sqlite3.Connection) -> None:
+    """Give an older file the tables that it lacks."""
+    for table in TABLES[len(TABLES_OF[version_of(file)]) :]:
+        file.execute(table)
+    file.execute(f"PRAGMA user_version = {VERSION}")
 
 
 @contextmanager

@@ -6,7 +6,7 @@ into it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -15,13 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.database.catalogue import Shapes, Views
+from visup.percepts.shape.database.file_format import MeshRow, TaughtRow
+from visup.percepts.shape.database.file_reader import read_contents
 from visup.percepts.shape.database.file_writer import write_more, write_new
+from visup.percepts.shape.database.mesh_records import decoded_mesh
 from visup.percepts.shape.database.search import Ranking, SearchLimits, ViewMatch, ViewSearch
+from visup.percepts.shape.database.taught_records import decoded, encoded
 from visup.percepts.shape.database.time_budget import share_within
 from visup.percepts.shape.database.view_directions import neighbours
 from visup.percepts.shape.index.view_records import ModelView, NewView
 from visup.percepts.shape.matching.shape_similarity import Shape, shape_of
-from visup.percepts.shape.silhouette.silhouette import Silhouette, normalise
+from visup.percepts.shape.refinement.mesh_model import MeshModel
+from visup.percepts.shape.silhouette.silhouette import Silhouette, looks_cut, normalise
+from visup.percepts.taught.view import TaughtView
 
 __all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
 
@@ -55,12 +61,22 @@ class ModelDatabase:
 
     Args:
         path: The file.
-        views: What stands in it.
+        views: The views of meshes and silhouettes that stand in it.
+        taught: What was taught, as it stands in it.
+        meshes: Meshes, as they stand in it.
     """
 
-    def __init__(self, path: Path, views: Views) -> None:
+    def __init__(
+        self,
+        path: Path,
+        views: Views,
+        taught: Sequence[TaughtRow] = (),
+        meshes: Sequence[MeshRow] = (),
+    ) -> None:
         self.path = path
         self.views = views
+        self._taught = tuple(taught)
+        self._meshes = tuple(meshes)
         self._neighbours: dict[str, list[tuple[int, ...]]] = {}
 
     @classmethod
@@ -70,21 +86,59 @@ class ModelDatabase:
         Raises:
             DatabaseError: Missing, truncated, foreign or of another version.
         """
-        return cls(Path(path), Views.read(Path(path)))
+        contents = read_contents(Path(path))
+        return cls(Path(path), Views(contents), contents.taught, contents.meshes)
 
     @classmethod
-    def create(cls, path: Path | str, views: Iterable[NewView] = ()) -> ModelDatabase:
+    def open_or_new(cls, path: Path | str) -> ModelDatabase:
+        """Open a database file; where none is, one without views is written.
+
+        Raises:
+            DatabaseError: What is there is no sound database, or none can be written there.
+        """
+        return cls.open(path) if Path(path).exists() else cls.create(path)
+
+    @classmethod
+    def create(
+        cls,
+        path: Path | str,
+        views: Iterable[NewView] = (),
+        meshes: Iterable[MeshModel] = (),
+    ) -> ModelDatabase:
         """Write a database with these views, in place of whatever stands at the path, and open it.
+
+        Args:
+            path: Where.
+            views: In the order in which they are numbered.
+            meshes: What the poses of models are fitted with, each model's once.
 
         Raises:
             DatabaseError: The file cannot be written.
         """
-        write_new(Path(path), views)
+        write_new(Path(path), views, meshes=meshes)
         return cls.open(path)
 
     def names(self) -> tuple[str, ...]:
-        """Names of the models, in the order of the file."""
-        return self.views.names
+        """Names of the models, in the order of the file; those that were only taught come last."""
+        return tuple(dict.fromkeys((*self.views.names, *(row.name for row in self._taught))))
+
+    @cached_property
+    def taught(self) -> tuple[TaughtView, ...]:
+        """What was taught, in the order of teaching.
+
+        Raises:
+            DatabaseError: The file is damaged there.
+        """
+        return tuple(decoded(self.path, k, row) for k, row in enumerate(self._taught))
+
+    @cached_property
+    def meshes(self) -> Mapping[str, MeshModel]:
+        """Meshes by the names of their models; models of silhouettes have none.
+
+        Raises:
+            DatabaseError: The file is damaged there.
+        """
+        return {row.name: decoded_mesh(self.path, row) for row in self._meshes}
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -144,6 +198,28 @@ class ModelDatabase:
         write_more(self.path, views)
         return ModelDatabase.open(self.path)
 
+    def teach(self, views: Iterable[TaughtView], *, silhouettes: bool = True) -> ModelDatabase:
+        """Add what was taught, all of it or nothing; the database as it is then.
+
+        A view that is there already is not added once more.
+
+        Args:
+            views: Of things new or known.
+            silhouettes: Whether each outline is kept as a view of a silhouette besides, with its shock
+                graph.
+
+        Raises:
+            DatabaseError: The file cannot be written, or a view is too large; it stays as it was.
+        """
+        known = {row.checksum(0) for row in self._taught}
+        new = {encoded(v).checksum(0): v for v in views}
+        fresh = [view for key, view in new.items() if key not in known]
+        if not fresh:
+            return self
+        seen = [taught_silhouette(v) for v in fresh] if silhouettes else []
+        write_more(self.path, [s for s in seen if s is not None], fresh)
+        return ModelDatabase.open(self.path)
+
     def query(
         self,
         shape: NDArray[np.bool_] | Silhouette | Shape,
@@ -195,6 +271,12 @@ def candidates_wanted(views: int, budget: float = 0.1) -> int:
     if budget >= 1:
         return views
     return int(min(CANDIDATES, max(16 if budget >= 0.1 else 4, budget * views)))
+
+
+def taught_silhouette(view: TaughtView) -> NewView | None:
+    """The silhouette of a taught outline as a view; None when it has no shape."""
+    shape = as_shape(view.mask, looks_cut(view.mask))
+    return None if shape is None else NewView(view.name.strip(), None, None, shape)
 
 
 def as_shape(shape: NDArray[np.bool_] | Silhouette | Shape, cut: bool = False) -> Shape | None:

@@ -14,9 +14,11 @@ from visup.agent import Binding, Candidate, Mind, ObjectBelief, Presence, TaskBe
 from visup.rules.presence.objects import ObjectReasoner, ObjectSettings
 
 S = ObjectSettings()
+THERE = box_region(7, (20, 20, 60, 40))
+assert THERE is not None
 HIDDEN = ObjectBelief(
     7,
-    box_region(7, (20, 20, 60, 40)),
+    THERE,
     Presence.HIDDEN,
     first_seen=0.0,
     last_seen=0.0,

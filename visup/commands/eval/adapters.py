@@ -69,6 +69,38 @@ def views_closing(figures: Figures) -> Iterator[RenderableType]:
     yield hardest_views(figures["items"])
 
 
+def machines_closing(figures: Figures) -> Iterator[RenderableType]:
+    """The baseline's figures, where it watched, and how many verdicts are right."""
+    from visup.commands.eval.tables import figures_table
+
+    if "baseline" in figures:
+        rows = {n: i["baseline"] for n, i in figures["items"].items()}
+        keys = ("verdict", "verdicts_right", "stage_f1", "actors", "contact_f1", "move_f1", "ms")
+        told = {"items": rows, "total": figures["baseline"]}
+        yield figures_table("baseline: CSRT on the taught boxes", told, keys)
+    total = figures["total"]
+    yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
+
+
+def random_worlds(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
+    """Random worlds."""
+    from visup.commands.render import needs_renderer
+    from visup.evaluation.machines.random_worlds import evaluate_random
+
+    needs_renderer()
+    return evaluate_random(kinds=kind or (), progress=progress, **settings)
+
+
+def random_closing(figures: Figures) -> Iterator[str]:
+    """The worlds whose verdict is wrong, and how many are right."""
+    for name, world in figures["worlds"].items():
+        if not world["verdicts_right"]:
+            yield f"{name}: {world['verdict']}, not {' or '.join(world['accept'])}"
+    for who, total in (("visup", figures["total"]), ("CSRT", figures.get("baseline"))):
+        if total:
+            yield f"{who}: {total['verdicts_right']} of {total['verdicts']} verdicts are right"
+
+
 def reasoning(
     folder: Path, *, merge: bool, long: int, progress: Progress, **settings: int
 ) -> Figures:

@@ -72,6 +72,49 @@ EVALUATIONS = (
         _FOLDER,
     ),
     EvaluationCommand(
+        "machines",
+        """Machines at work, rendered and real: taught from a brief, watched, scored against the truth.
+
+        Beside it, in the same run: OpenCV's CSRT on the taught boxes, with the same tasks and rules.
+        """,
+        "visup.evaluation.machines.runner:evaluate_machines",
+        "watching",
+        (
+            *("verdict", "verdicts_right", "stage_f1", "actors"),
+            *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
+        ),
+        (
+            _flag("eyes", "Regions are made from the masks of worlds: reasoning by itself."),
+            Setting("baseline", bool, True, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            _LIMIT,
+        ),
+        _FOLDER,
+        adapters.machines_closing,
+    ),
+    EvaluationCommand(
+        "random",
+        """Worlds drawn from a seed: rendered, taught, watched, scored like machines, thrown away.
+
+        Kinds are spread evenly over the count; rows are kinds.
+        """,
+        f"{_ADAPTERS}:random_worlds",
+        "rendering and watching",
+        (
+            *("verdicts_right", "verdicts", "stage_f1", "actors"),
+            *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
+        ),
+        (
+            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
+            _count("count", 60, "How many worlds."),
+            _SEED,
+            _flag("eyes", "Regions are made from the masks: reasoning by itself."),
+            Setting("baseline", bool, False, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            _LIMIT,
+            _count("workers", None, "Processes that share the work; as many as there are cores."),
+        ),
+        closing=adapters.random_closing,
+    ),
+    EvaluationCommand(
         "health",
         "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
         "visup.evaluation.health.runner:evaluate_health",

@@ -45,7 +45,7 @@ def test_another_texture_of_the_same_colour_is_none(dim: float, seed: int) -> No
 @pytest.mark.parametrize("colour", [(30, 60, 200), (200, 80, 20), (10, 10, 10), (250, 250, 250)])
 def test_another_colour_is_none(colour: tuple[int, int, int]) -> None:
     bare = ground(3)
-    now = np.where(WHERE[..., None], np.float32(colour), bare)
+    now = np.where(WHERE[..., None], np.array(colour, np.float32), bare)
     assert shadow_evidence(noisy(now, 1), noisy(bare, 2), WHERE) < 0
 
 

@@ -1,0 +1,247 @@
+"""Compiled loops of `pose_fit.py`: a mesh drawn with a depth buffer, and how well the drawing fits.
+
+A drawing is moved and scaled to the centroid and the area of what is seen, so that only the orientation
+is searched for. Within both outlines, grey values are explained by the normals of the surface that is
+drawn there, through the nine spherical harmonics of second order: what any distant light on a matt
+surface gives, whatever the light (Basri and Jacobs, Lambertian Reflectance and Linear Subspaces, 2003).
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+HARMONICS = 8
+"""The constant is taken off as the mean."""
+
+_RIDGE = 2e-3
+_FEWEST = 30
+
+
+@nb.njit(cache=True)
+def _project(
+    vertices: NDArray[np.float32],
+    turn: NDArray[np.float64],
+    distance: float,
+    place: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    """Vertices (V, 3) in the square, (V, 3): x, y, depth; `place` is x, y and scale."""
+    for i in range(len(vertices)):
+        p = vertices[i]
+        x = turn[0, 0] * p[0] + turn[0, 1] * p[1] + turn[0, 2] * p[2]
+        y = turn[1, 0] * p[0] + turn[1, 1] * p[1] + turn[1, 2] * p[2]
+        z = turn[2, 0] * p[0] + turn[2, 1] * p[1] + turn[2, 2] * p[2]
+        nearer = place[2] * distance / (distance + z)
+        out[i, 0] = place[0] + x * nearer
+        out[i, 1] = place[1] + y * nearer
+        out[i, 2] = z
+
+
+@nb.njit(cache=True)
+def _draw(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    depth: NDArray[np.float64],
+    number: NDArray[np.int32],
+) -> None:
+    """The nearest face in each pixel of the square, or -1."""
+    side = len(depth)
+    depth[:] = np.inf
+    number[:] = -1
+    for k in range(len(faces)):
+        a, b, c = points[faces[k, 0]], points[faces[k, 1]], points[faces[k, 2]]
+        double = (b[1] - c[1]) * (a[0] - c[0]) + (c[0] - b[0]) * (a[1] - c[1])
+        if abs(double) < 1e-9:
+            continue
+        x0 = max(0, int(np.ceil(min(a[0], b[0], c[0]) - 0.5)))
+        x1 = min(side - 1, int(np.floor(max(a[0], b[0], c[0]) - 0.5)))
+        y0 = max(0, int(np.ceil(min(a[1], b[1], c[1]) - 0.5)))
+        y1 = min(side - 1, int(np.floor(max(a[1], b[1], c[1]) - 0.5)))
+        for y in range(y0, y1 + 1):
+            for x in range(x0, x1 + 1):
+                px, py = x + 0.5 - c[0], y + 0.5 - c[1]
+                of_a = ((b[1] - c[1]) * px + (c[0] - b[0]) * py) / double
+                of_b = ((c[1] - a[1]) * px + (a[0] - c[0]) * py) / double
+                of_c = 1.0 - of_a - of_b
+                if of_a < -1e-6 or of_b < -1e-6 or of_c < -1e-6:
+                    continue
+                z = of_a * a[2] + of_b * b[2] + of_c * c[2]
+                if z < depth[y, x]:
+                    depth[y, x] = z
+                    number[y, x] = k
+
+
+@nb.njit(cache=True)
+def _moments(cover: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Area and centroid of what is covered, pixels of the square."""
+    area, across, down = 0.0, 0.0, 0.0
+    for y in range(cover.shape[0]):
+        for x in range(cover.shape[1]):
+            area += cover[y, x]
+            across += cover[y, x] * (x + 0.5)
+            down += cover[y, x] * (y + 0.5)
+    return area, across / max(area, 1e-9), down / max(area, 1e-9)
+
+
+@nb.njit(cache=True)
+def _drawn_moments(number: NDArray[np.int32]) -> tuple[float, float, float]:
+    area, across, down = 0.0, 0.0, 0.0
+    for y in range(number.shape[0]):
+        for x in range(number.shape[1]):
+            if number[y, x] >= 0:
+                area += 1.0
+                across += x + 0.5
+                down += y + 0.5
+    return area, across / max(area, 1e-9), down / max(area, 1e-9)
+
+
+@nb.njit(cache=True)
+def _explained(total: float, products: NDArray[np.float64], along: NDArray[np.float64]) -> float:
+    """Share of the variance that a ridge regression explains."""
+    for i in range(HARMONICS):
+        for j in range(i):
+            products[j, i] = products[i, j]
+    weights = np.linalg.solve(products, along)
+    return float((weights * along).sum() / total)
+
+
+@nb.njit(cache=True)
+def _shading(
+    turn: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    number: NDArray[np.int32],
+    cover: NDArray[np.float64],
+    tone: NDArray[np.float64],
+) -> float:
+    """Share of the grey values' variance that the drawn normals explain, 0 to 1."""
+    products = np.zeros((HARMONICS, HARMONICS))
+    along, sums, h = np.zeros(HARMONICS), np.zeros(HARMONICS), np.empty(HARMONICS)
+    count, grey, squares = 0.0, 0.0, 0.0
+    for row in range(number.shape[0]):
+        for column in range(number.shape[1]):
+            k = number[row, column]
+            if k < 0 or cover[row, column] < 0.99:
+                continue
+            n = normals[k]
+            x = turn[0, 0] * n[0] + turn[0, 1] * n[1] + turn[0, 2] * n[2]
+            y = turn[1, 0] * n[0] + turn[1, 1] * n[1] + turn[1, 2] * n[2]
+            z = turn[2, 0] * n[0] + turn[2, 1] * n[1] + turn[2, 2] * n[2]
+            if z > 0.0:
+                x, y, z = -x, -y, -z
+            h[0], h[1], h[2], h[3], h[4], h[5] = x, y, z, x * y, x * z, y * z
+            h[6], h[7] = x * x - y * y, 3.0 * z * z - 1.0
+            value = tone[row, column]
+            count += 1.0
+            grey += value
+            squares += value * value
+            for i in range(HARMONICS):
+                sums[i] += h[i]
+                along[i] += h[i] * value
+                for j in range(i + 1):
+                    products[i, j] += h[i] * h[j]
+    total = squares - grey * grey / max(count, 1.0)
+    if (
+        count < _FEWEST or total < count
+    ):  # of a tone within one grey value there is nothing to explain
+        return 0.0
+    for i in range(HARMONICS):
+        along[i] -= sums[i] * grey / count
+        for j in range(i + 1):
+            products[i, j] -= sums[i] * sums[j] / count
+        products[i, i] += _RIDGE * count
+    return _explained(total, products, along)
+
+
+@nb.njit(cache=True)
+def fit_of(
+    mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
+    seen: tuple[NDArray[np.float64], NDArray[np.float64]],
+    turn: NDArray[np.float64],
+    distance: float,
+    scratch: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
+) -> tuple[float, float, float]:
+    """How well a drawn mesh fits: overlap of the outlines (IoU), share of the tone explained, scale."""
+    vertices, faces, normals = mesh
+    cover, tone = seen
+    points, depth, number = scratch
+    area, x, y = _moments(cover)
+    place = np.array([x, y, area**0.5])
+    for again in range(3):
+        _project(vertices, turn, distance, place, points)
+        _draw(points, faces, depth, number)
+        if again == 2:
+            break
+        drawn, left, top = _drawn_moments(number)
+        if drawn < 4.0:
+            return 0.0, 0.0, place[2]
+        grown = (area / drawn) ** 0.5
+        place[0] = x - (left - place[0]) * grown
+        place[1] = y - (top - place[1]) * grown
+        place[2] *= grown
+    both, either = 0.0, 0.0
+    for row in range(cover.shape[0]):
+        for column in range(cover.shape[1]):
+            drawn = 1.0 if number[row, column] >= 0 else 0.0
+            both += min(drawn, cover[row, column])
+            either += max(drawn, cover[row, column])
+    explained = _shading(turn, normals, number, cover, tone)
+    return both / max(either, 1e-9), explained, place[2]
+
+
+@nb.njit(cache=True)
+def _about(axis: int, angle: float) -> NDArray[np.float64]:
+    """Rotation about one of the camera's axes."""
+    turn = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turn[i, i] = turn[j, j] = np.cos(angle)
+    turn[j, i] = np.sin(angle)
+    turn[i, j] = -turn[j, i]
+    return turn
+
+
+@nb.njit(cache=True)
+def climb(
+    mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
+    seen: tuple[NDArray[np.float64], NDArray[np.float64]],
+    start: NDArray[np.float64],
+    distance: float,
+    steps: NDArray[np.float64],
+    shading: float,
+) -> tuple[NDArray[np.float64], float, float, float]:
+    """The orientation from which no turn of the last step about a camera axis fits better.
+
+    Args:
+        mesh: Vertices (V, 3), faces (F, 3), normals (F, 3).
+        seen: `cover` and `tone` of a `RegionPicture`.
+        start: (3, 3) orientation, model to camera.
+        distance: From the viewer to the mesh's centre, in units of its radius.
+        steps: Turns to try, radians, largest first; each up to three rounds.
+        shading: Weight of the tone explained beside the overlap.
+
+    Returns:
+        Orientation (3, 3), its overlap, the share of tone explained, and pixels of the square that the
+        mesh's radius takes at its centre.
+    """
+    side = len(seen[0])
+    scratch = (
+        np.empty((len(mesh[0]), 3)),
+        np.empty((side, side)),
+        np.empty((side, side), np.int32),
+    )
+    turn = start.copy()
+    overlap, explained, scale = fit_of(mesh, seen, turn, distance, scratch)
+    for step in steps:
+        for _ in range(3):
+            moved = False
+            for axis in range(3):
+                for sign in (1.0, -1.0):
+                    other = _about(axis, sign * step) @ turn
+                    o, e, r = fit_of(mesh, seen, other, distance, scratch)
+                    if o + shading * e > overlap + shading * explained + 1e-6:
+                        turn, overlap, explained, scale, moved = other, o, e, r, True
+                        break
+            if not moved:
+                break
+    return turn, overlap, explained, scale

@@ -1,0 +1,198 @@
+"""View hypotheses with the orientations that fit what is seen, in place of those of stored views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.orientation import orientations, views
+from visup.agent.model.records import Frame, Hypothesis, Region
+from visup.percepts.shape.refinement.mesh_model import MeshModel
+from visup.percepts.shape.refinement.pose_fit import (
+    COARSE,
+    FINE,
+    USUAL_FOCAL,
+    PoseFit,
+    fitted_poses,
+)
+from visup.percepts.shape.refinement.region_picture import RegionPicture, region_picture
+
+SizedHypothesis = tuple[Hypothesis, float | None]
+"""A hypothesis with the area of its silhouette, model units squared, where that is known."""
+
+MoreViews = Callable[[str], Sequence[SizedHypothesis]]
+"""Gives further views of one model that a region looks like, best first."""
+
+
+@dataclass(frozen=True, slots=True)
+class RefinerSettings:
+    """How orientations are fitted.
+
+    Attributes:
+        names: Models of a region that are fitted, the most similar first.
+        starts: Views from which a whole search begins.
+        kept: Orientations that are told and followed.
+        renew_s: Seconds after which a whole search is made again.
+        least_overlap: A fit that overlaps less is none: the region shows a part, or something else.
+        lost: Overlap lost since the last whole search that calls for another.
+        rank: What a fit that is worth 1 less loses of its similarity.
+    """
+
+    names: int = 2
+    starts: int = 8
+    kept: int = 3
+    renew_s: float = 3.0
+    least_overlap: float = 0.7
+    lost: float = 0.05
+    rank: float = 1.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedModel:
+    """What was fitted of a model to a region.
+
+    Attributes:
+        time: Seconds of the last whole search.
+        overlap: Of the best fit then.
+        orientations: (K, 3, 3), best first, as fitted last.
+        views: (K,) numbers of the views from which each was found.
+    """
+
+    time: float
+    overlap: float
+    orientations: NDArray[np.float64]
+    views: tuple[int, ...]
+
+
+FitMemory = Mapping[tuple[int, str], FittedModel]
+"""(region, model) -> what was fitted."""
+
+
+class PoseRefiner:
+    """Fits the meshes of models to regions, from look to look.
+
+    Args:
+        meshes: By the models' names.
+        settings: How.
+    """
+
+    def __init__(
+        self, meshes: Mapping[str, MeshModel], settings: RefinerSettings | None = None
+    ) -> None:
+        self.meshes = meshes
+        self.settings = settings or RefinerSettings()
+        self.memory: dict[tuple[int, str], FittedModel] = {}
+
+    def forget(self, here: Collection[int]) -> None:
+        """Drop what is remembered of regions that are not in view."""
+        self.memory = {key: fit for key, fit in self.memory.items() if key[0] in here}
+
+    def refined(
+        self, frame: Frame, region: Region, said: Sequence[SizedHypothesis], more: MoreViews
+    ) -> tuple[SizedHypothesis, ...]:
+        """Hypotheses of one region, those of its likeliest models with fitted orientations.
+
+        Args:
+            frame: Where it was seen.
+            region: The region; one that the image border cuts is left as it is.
+            said: Hypotheses of views, best first.
+            more: Asked for further views when a whole search is made.
+
+        Returns:
+            Hypotheses, best first; the similarity of the best of each model is as it was.
+        """
+        names = self._names(said)
+        if not names or region.cut:
+            return tuple(said)
+        picture = region_picture(frame, region)
+        out = [(h, area) for h, area in said if h.name not in names]
+        for name in names:
+            own = [(h, area) for h, area in said if h.name == name]
+            out += self._fitted(frame, region, picture, own, more) or own
+        return tuple(sorted(out, key=lambda sized: -sized[0].similarity))
+
+    def _names(self, said: Sequence[SizedHypothesis]) -> list[str]:
+        known = (h.name for h, _ in said if h.name in self.meshes and h.direction is not None)
+        return list(dict.fromkeys(known))[: self.settings.names]
+
+    def _fitted(
+        self,
+        frame: Frame,
+        region: Region,
+        picture: RegionPicture,
+        own: Sequence[SizedHypothesis],
+        more: MoreViews,
+    ) -> list[SizedHypothesis]:
+        """Hypotheses of one model with fitted orientations; none where it does not fit."""
+        s, best = self.settings, own[0][0]
+        key = region.id, best.name
+        before = self.memory.get(key)
+        if before is not None and frame.time - before.time < s.renew_s:
+            starts, numbers = list(before.orientations), before.views
+            fits = self._search(frame, best.name, picture, starts, FINE)
+            if fits and fits[0].overlap >= before.overlap - s.lost:
+                return self._remembered(key, before.time, before.overlap, fits, numbers, best)
+        wide = _orientations([h for h, _ in [*own, *more(best.name)]])[: s.starts]
+        starts = [turn for _, turn in wide]
+        numbers = tuple(view for view, _ in wide)
+        if before is not None:
+            starts, numbers = [*before.orientations, *starts], (*before.views, *numbers)
+        fits = self._search(frame, best.name, picture, starts, COARSE)
+        if not fits or fits[0].overlap < s.least_overlap:
+            self.memory.pop(key, None)
+            return []
+        return self._remembered(key, frame.time, fits[0].overlap, fits, numbers, best)
+
+    def _search(
+        self,
+        frame: Frame,
+        name: str,
+        picture: RegionPicture,
+        starts: Sequence[NDArray[np.float64]],
+        steps: NDArray[np.float64],
+    ) -> list[PoseFit]:
+        focal = USUAL_FOCAL * frame.size[0]
+        fits = fitted_poses(self.meshes[name], picture, starts, steps=steps, focal_px=focal)
+        return fits[: self.settings.kept]
+
+    def _remembered(
+        self,
+        key: tuple[int, str],
+        time: float,
+        overlap: float,
+        fits: Sequence[PoseFit],
+        numbers: Sequence[int],
+        best: Hypothesis,
+    ) -> list[SizedHypothesis]:
+        """The fits as hypotheses, and remembered."""
+        turns = np.stack([f.orientation for f in fits])
+        chosen = tuple(numbers[f.start] for f in fits)
+        self.memory[key] = FittedModel(time, overlap, turns, chosen)
+        directions, rotations = views(turns)
+        top, rank = fits[0].worth, self.settings.rank
+        return [
+            (
+                replace(
+                    best,
+                    view=view,
+                    similarity=max(0.0, best.similarity - rank * (top - fit.worth)),
+                    direction=(float(d[0]), float(d[1]), float(d[2])),
+                    rotation=float(r),
+                ),
+                fit.area,
+            )
+            for fit, view, d, r in zip(fits, chosen, directions, rotations, strict=True)
+        ]
+
+
+def _orientations(said: Sequence[Hypothesis]) -> list[tuple[int, NDArray[np.float64]]]:
+    """(view, orientation) of each view once, those alone that tell an orientation."""
+    once = {
+        (h.view, h.direction): (h.view, orientations(h.direction, h.rotation))
+        for h in said
+        if h.direction is not None and h.rotation is not None
+    }
+    return list(once.values())

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.paths import SHARED
+from visup.agent.model.errors import SettingsError
+from visup.evaluation.machines.clips import clip_folders, parse_truth, read_brief, read_truth
+from visup.evaluation.machines.runner import clip_settings
+
+SHOWN = {"clip": "one", "frame": 3, "polygon": [[0, 0], [9, 0], [9, 9]]}
+TASK = "<lift> ::= coupled(gripper, part)\n"
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    """A clip without pictures: what is told of it alone is read."""
+    folder = tmp_path / "one"
+    folder.mkdir()
+    (folder / "clip.mp4").touch()
+    (folder / "own.task").write_text(TASK, encoding="utf-8")
+    return folder
+
+
+def write(folder: Path, **told: Any) -> None:
+    (folder / "brief.json").write_text(json.dumps({"task": "own.task", **told}), encoding="utf-8")
+
+
+def test_what_is_outlined_in_the_clip_itself_takes_the_place_of_what_is_taught_elsewhere(
+    clip: Path,
+) -> None:
+    write(clip, teach={"part": {**SHOWN, "frame": 8}}, teach_own={"part": SHOWN})
+    assert [o.frame for o in read_brief(clip).actors] == [3]
+
+
+def test_things_that_are_no_actors_are_taught_too_but_bound_to_nothing(clip: Path) -> None:
+    write(clip, teach={"part": SHOWN, "gripper": SHOWN, "lamp": SHOWN}, teach_extra={"hand": SHOWN})
+    brief = read_brief(clip)
+    assert [o.name for o in brief.others] == ["hand"]
+    assert clip_settings(brief).actors == {"part": ("part",), "gripper": ("gripper",)}
+
+
+@pytest.mark.parametrize(
+    "told", [{}, {"teach": {"part": {"frame": 0}}}, {"teach": {"part": {**SHOWN, "frame": "x"}}}]
+)
+def test_a_brief_that_is_not_as_it_should_be_is_refused(clip: Path, told: dict[str, Any]) -> None:
+    write(clip, **told)
+    with pytest.raises(SettingsError):
+        read_brief(clip)
+
+
+def test_a_folder_without_briefs_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError):
+        clip_folders(tmp_path)
+
+
+def test_boxes_that_are_null_or_absent_are_not_scored() -> None:
+    truth = parse_truth({"boxes": [{"frame": 2, "part": None, "tray": [1, 2, 3, 4]}]})
+    assert truth.boxes[0].boxes == {"tray": (1, 2, 3, 4)}
+
+
+def test_a_tolerance_is_never_less_than_seven_tenths() -> None:
+    assert parse_truth({"tolerance_s": 0.2}).tolerance_s == 0.7
+    assert parse_truth({"tolerance_s": 1.5}).tolerance_s == 1.5
+
+
+def test_a_verdict_is_accepted_where_no_list_is_given() -> None:
+    assert parse_truth({"verdict": "failed"}).accept == {"failed"}
+    assert parse_truth({"verdict": "failed", "accept": ["in_progress"]}).accept == {"in_progress"}
+
+
+@pytest.mark.skipif(not (SHARED / "machines").is_dir(), reason="no shared data beside the checkout")
+@pytest.mark.parametrize("kind", ["machines", "worlds"])
+def test_all_shared_briefs_can_be_read(kind: str) -> None:
+    for folder in clip_folders(SHARED / kind):
+        brief, truth = read_brief(folder), read_truth(folder)
+        assert clip_settings(brief).actors
+        assert truth.accept

@@ -1,0 +1,124 @@
+"""`visup teach`: show things once, by outlines on the command line, in a file, or in the browser."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from visup.agent.model.errors import SettingsError
+
+if TYPE_CHECKING:
+    from visup.teaching.clip_frames import ClipFrames
+    from visup.teaching.lesson import Lesson
+
+
+class OutlineCommand(TyperCommand):
+    """A command whose `--outline` takes corners as several words, so that none must be quoted."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As of any command, the corners of each outline joined."""
+        from visup.teaching.outlines import join_corners
+
+        return super().parse_args(ctx, join_corners(args))
+
+
+def teach(
+    clip: Annotated[
+        str | None,
+        typer.Argument(metavar="[CLIP]", help="Video, folder of images, or picture."),
+    ] = None,
+    models: Annotated[
+        Path | None, typer.Option(metavar="DB", help="Model database; begun if there is none.")
+    ] = None,
+    frame: Annotated[int, typer.Option(min=0, help="Number of the frame, from 0.")] = 0,
+    outline: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=x,y x,y ...", help="A thing's corners, in pixels; repeatable."),
+    ] = None,
+    brief: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Outlines in a brief.json, with their clips."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="PNG", help="Picture of what was stored (default: beside DB)."),
+    ] = None,
+    browser: Annotated[
+        bool, typer.Option(help="Open the window; without, only its address is told.")
+    ] = True,
+) -> None:
+    """Show things once, so that visup knows them from then on.
+
+    Without --outline and --brief a window opens in the browser, in which you draw the outlines.
+    """
+    if models is None:
+        raise SettingsError(
+            "it is not said where to store what is taught",
+            expected="--models DB",
+            hint="a database that does not exist yet is begun",
+        )
+    lesson = _lesson(clip, models, frame, outline or [], brief, browser)
+    if lesson is None:
+        typer.echo("Nothing was stored.")
+        return
+    for sentence in lesson.told:
+        typer.echo(sentence)
+    _draw(lesson, out or models.with_name(f"{models.stem}-taught.png"))
+
+
+def _lesson(
+    clip: str | None,
+    models: Path,
+    frame: int,
+    outlines: Sequence[str],
+    brief: Path | None,
+    browser: bool,
+) -> Lesson | None:
+    from visup.teaching.clip_frames import ClipFrames
+    from visup.teaching.lesson import teach_brief, teach_outlines
+    from visup.teaching.outlines import parse_outline
+
+    if brief is not None and (outlines or clip is not None):
+        raise SettingsError(
+            "a brief says itself what is outlined in which clip",
+            expected="--brief FILE --models DB, without CLIP and --outline",
+        )
+    if brief is not None:
+        return teach_brief(brief, models)
+    if clip is None:
+        raise SettingsError(
+            "there is nothing to draw outlines in",
+            expected="CLIP: a video, a folder of images or a picture; or --brief FILE",
+        )
+    drawn = [(frame, parse_outline(text)) for text in outlines]
+    with ClipFrames(clip) as frames:
+        if drawn:
+            return teach_outlines(frames, drawn, models)
+        return _in_the_browser(frames, frame, models, browser)
+
+
+def _in_the_browser(frames: ClipFrames, frame: int, models: Path, browser: bool) -> Lesson | None:
+    from visup.teaching.page.server import TeachingPage
+
+    frames.at(frame)
+    with TeachingPage(frames, models, frame) as page:
+        typer.echo(f"Draw the outlines at {page.url}")
+        typer.echo("Ctrl-C ends.")
+        if browser:
+            typer.launch(page.url)
+        try:
+            page.wait()
+        except KeyboardInterrupt:
+            typer.echo("")
+        return page.lesson
+
+
+def _draw(lesson: Lesson, out: Path) -> None:
+    from visup.commands.models import write_picture
+    from visup.teaching.drawing import taught_picture
+
+    write_picture(out, taught_picture(lesson.views))

@@ -1,0 +1,175 @@
+"""Clips of machines on disk: what a supervisor is told and shown of each, and what is true of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import SettingsError
+from visup.evaluation.machines.scores import Interval, MachineTruth, TrueBoxes
+from visup.evaluation.missions.files import read_json
+from visup.evaluation.missions.scores import TrueStage
+
+VIDEOS = ("clip.mp4", "video.mp4")
+TOLERANCE_S = 0.7
+"""No clip's times are held to be known better than so, seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """A thing as a user outlines it once.
+
+    Attributes:
+        name: Of the thing.
+        video: The clip in which it is shown.
+        frame: Number of the frame.
+        corners: (x, y), pixels of that frame.
+    """
+
+    name: str
+    video: Path
+    frame: int
+    corners: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """All that a supervisor is told of a clip.
+
+    Attributes:
+        folder: Of the clip.
+        video: Its file.
+        family: Clips of one scene have the same.
+        task: A file in the folder, or the name of a shipped task.
+        actors: Outlines of what plays a part in the task.
+        others: Outlines of things that play none.
+        fov_vertical_deg: Field of view, where it is told.
+    """
+
+    folder: Path
+    video: Path
+    family: str
+    task: str
+    actors: tuple[Outline, ...]
+    others: tuple[Outline, ...] = ()
+    fov_vertical_deg: float | None = None
+
+
+def clip_folders(folder: Path) -> list[Path]:
+    """All folders with a brief, from this one downwards, by path.
+
+    Raises:
+        SettingsError: There is none.
+    """
+    found = sorted(p.parent for p in folder.rglob("brief.json"))
+    if not found:
+        raise SettingsError(
+            "no clip here has a brief",
+            where=str(folder),
+            expected="folders with brief.json, truth.json and clip.mp4 or video.mp4",
+        )
+    return found
+
+
+def read_brief(folder: Path) -> Brief:
+    """What is told of a clip.
+
+    Raises:
+        SettingsError: The brief or a video is missing, or the brief is not as it should be.
+    """
+    path = folder / "brief.json"
+    told = read_json(path)
+    try:
+        task = str(told["task"])
+        actors = told.get("teach_own") or told["teach"]
+        return Brief(
+            folder,
+            video_of(folder),
+            str(told.get("family", folder.name)),
+            str(folder / task) if (folder / task).is_file() else task,
+            tuple(_outlines(actors, folder)),
+            tuple(_outlines(told.get("teach_extra", {}), folder)),
+            told.get("fov_vertical_deg"),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as fault:
+        raise SettingsError(
+            f"this brief cannot be used: {type(fault).__name__}: {fault}",
+            where=str(path),
+            expected='"task", and "teach": {actor: {"clip": ..., "frame": ..., "polygon": [[x, y], ...]}}',
+        ) from fault
+
+
+def video_of(folder: Path) -> Path:
+    """The video of a clip.
+
+    Raises:
+        SettingsError: There is none.
+    """
+    for name in VIDEOS:
+        if (folder / name).is_file():
+            return folder / name
+    raise SettingsError("there is no video", where=str(folder), expected=" or ".join(VIDEOS))
+
+
+def _outlines(given: Mapping[str, Any], folder: Path) -> Iterator[Outline]:
+    """Outlines as a brief gives them; the clip that one names is a folder beside this one."""
+    for name, shown in given.items():
+        corners = tuple((float(x), float(y)) for x, y in shown["polygon"])
+        clip = str(shown.get("clip", folder.name))
+        video = video_of(folder.parent / clip)
+        yield Outline(str(name), video, int(shown["frame"]), corners)
+
+
+def read_truth(folder: Path) -> MachineTruth:
+    """What is true of a clip.
+
+    Raises:
+        SettingsError: It is missing, or not as it should be.
+    """
+    path = folder / "truth.json"
+    given = read_json(path)
+    try:
+        return parse_truth(given)
+    except (KeyError, TypeError, ValueError) as fault:
+        raise SettingsError(
+            f"this truth cannot be used: {type(fault).__name__}: {fault}", where=str(path)
+        ) from fault
+
+
+def parse_truth(given: Mapping[str, Any]) -> MachineTruth:
+    """What is true of a clip, from its `truth.json` as read; what is not there is not scored."""
+    stages = tuple(
+        TrueStage(str(s["stage"]), float(s["from_s"]), float(s["to_s"]), str(s["outcome"]))
+        for s in given.get("stages", ())
+    )
+    accepted = given.get("accept") or ([given["verdict"]] if "verdict" in given else [])
+    contacts, moves = given.get("contacts"), given.get("moves")
+    return MachineTruth(
+        stages,
+        frozenset(map(str, accepted)),
+        max(TOLERANCE_S, float(given.get("tolerance_s", 0.0))),
+        tuple(_true_boxes(given.get("boxes", ()))),
+        None if contacts is None else tuple(_contact(c) for c in contacts),
+        None if moves is None else tuple(_interval((str(m["what"]),), m) for m in moves),
+    )
+
+
+def _true_boxes(given: Any) -> Iterator[TrueBoxes]:
+    """Boxes of one frame; an object that is out of view, hidden or not annotated has none."""
+    for row in given:
+        boxes = {n: tuple(map(float, b)) for n, b in row.items() if n != "frame" and _is_box(b)}
+        yield TrueBoxes(int(row["frame"]), boxes)
+
+
+def _is_box(given: Any) -> bool:
+    return isinstance(given, list) and len(given) == 4 and min(given[2:]) > 0
+
+
+def _contact(given: Mapping[str, Any]) -> Interval:
+    return _interval(tuple(sorted((str(given["a"]), str(given["b"])))), given)
+
+
+def _interval(who: tuple[str, ...], given: Mapping[str, Any]) -> Interval:
+    return Interval(who, float(given["from_s"]), float(given["to_s"]))

@@ -1,0 +1,112 @@
+"""Eyes that see the truth: regions from the masks of a world, named by the roles.
+
+So what reasoning loses is told apart from what seeing loses. Only what shows in the mask is a region; an
+object that nothing shows of has none. Image motion is taken from the masks, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Directive, Frame, Health, HealthStatus, Hypothesis, Observation, Percept
+from visup.agent.contract.behaviour import Behaviour, Contract
+from visup.agent.model.errors import SettingsError
+from visup.evaluation.missions.files import read_json
+from visup.evaluation.simulation.truth_masks import LAG_S, TrueMask, moved_since, true_mask
+from visup.testing import region_of
+
+LEAST_PX = 30
+"""An object of which less shows is not seen."""
+
+VELOCITY_SIGMA = 1.0
+SIMILARITY = 0.95
+
+
+@dataclass(slots=True)
+class MaskRegions:
+    """A behaviour that reports what the masks of a world show.
+
+    Attributes:
+        folder: With `masks/`.
+        labels: Role -> value in the masks.
+        fps: Frames per second.
+    """
+
+    folder: Path
+    labels: Mapping[str, int]
+    fps: float
+    contract: Contract = field(default=Contract("masks", gives=("region", "health")), init=False)
+    _past: list[dict[str, TrueMask]] = field(default_factory=list, init=False)
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report one frame; see `Behaviour`."""
+        yield Percept("health", Health(HealthStatus.OK), frame.time, "masks")
+        picture = self._read(frame)
+        here = {n: m for n, v in self.labels.items() if (m := true_mask(picture == v)) is not None}
+        lag = max(1, round(LAG_S * self.fps))
+        self._past = [*self._past[-lag:], here]
+        span = (len(self._past) - 1) / self.fps
+        moved = moved_since(self._past[0], here, span, frame.size) if span else here
+        for number, (name, value) in enumerate(sorted(self.labels.items()), start=1):
+            mask = picture == value
+            if np.count_nonzero(mask) < LEAST_PX:
+                continue
+            velocity = moved[name].velocity
+            region = replace(
+                region_of(mask, number, velocity or (0.0, 0.0)),
+                velocity_sigma=0.0 if velocity is None else VELOCITY_SIGMA,
+            )
+            yield Percept("region", region, frame.time, "masks", region.confidence)
+
+    def _read(self, frame: Frame) -> NDArray[np.uint8]:
+        path = self.folder / "masks" / f"{frame.index:05d}.png"
+        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if picture is None:
+            raise SettingsError("a mask is missing or cannot be read", where=str(path))
+        return np.asarray(picture, dtype=np.uint8)
+
+
+def has_masks(folder: Path) -> bool:
+    """Whether a clip has masks to see by."""
+    return (folder / "masks").is_dir()
+
+
+def mask_behaviours(folder: Path) -> list[Behaviour]:
+    """What sees a world by its masks: each role's region by its name.
+
+    Raises:
+        SettingsError: The truth cannot be read.
+    """
+    truth = read_json(folder / "truth.json")
+    roles: Mapping[str, str] = truth.get("roles") or {n: n for n in truth["labels"]}
+    labels = {role: int(truth["labels"][name]) for role, name in roles.items()}
+    names = dict(enumerate(sorted(labels), start=1))
+    regions = MaskRegions(folder, labels, float(truth["fps"]))
+
+    return [regions, RoleNames(names)]
+
+
+@dataclass(slots=True)
+class RoleNames:
+    """A behaviour that says of each region which role it is."""
+
+    names: Mapping[int, str]
+    contract: Contract = field(
+        default=Contract("roles", gives=("hypothesis",), needs=("region",)), init=False
+    )
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report one frame; see `Behaviour`."""
+        for region in observation.of("region"):
+            named = Hypothesis(region.id, self.names[region.id], 0, SIMILARITY)
+            yield Percept("hypothesis", named, frame.time, "roles", SIMILARITY)

@@ -1,0 +1,182 @@
+"""What a supervisor reports of a clip, taken down step by step: the agent calls it."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+from visup.agent import Event, Frame, Mind, Presence, Severity, Truth, Verdict
+from visup.agent.model.step import Step
+from visup.evaluation.machines.scores import (
+    Box,
+    Interval,
+    MachineReport,
+    ReportedAlert,
+    ReportedStage,
+)
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.predicates.vocabulary import PREDICATES
+from visup.runs.wiring import final_verdict
+
+BRIDGED_S = 0.5
+"""A break of a contact or movement that is shorter is none: who tells times by eye sees none either."""
+
+SHORTEST_S = 0.3
+"""A contact or movement that is shorter is not told."""
+
+
+@dataclass(slots=True)
+class IntervalLog:
+    """When something held, from single moments.
+
+    Attributes:
+        spans: Who -> [begin, end] of each time that it held, seconds.
+    """
+
+    spans: dict[tuple[str, ...], list[list[float]]] = field(default_factory=dict)
+
+    def add(self, who: tuple[str, ...], now: float) -> None:
+        """Take down that it holds at a moment, no earlier than the last one."""
+        spans = self.spans.setdefault(who, [])
+        if spans and now - spans[-1][1] <= BRIDGED_S:
+            spans[-1][1] = now
+        else:
+            spans.append([now, now])
+
+    def intervals(self) -> tuple[Interval, ...]:
+        """All that lasted, by who and time."""
+        found = ((who, a, b) for who, spans in sorted(self.spans.items()) for a, b in spans)
+        return tuple(Interval(who, a, b) for who, a, b in found if b - a >= SHORTEST_S)
+
+
+@dataclass(slots=True)
+class MachineRecorder:
+    """What the supervisor said of one clip, frame by frame.
+
+    Attributes:
+        others: Names of taught things that play no part in the task.
+    """
+
+    others: Collection[str] = ()
+    boxes: dict[int, dict[str, Box]] = field(default_factory=dict)
+    contacts: IntervalLog = field(default_factory=IntervalLog)
+    moves: IntervalLog = field(default_factory=IntervalLog)
+    events: list[Event] = field(default_factory=list)
+    alerts: list[ReportedAlert] = field(default_factory=list)
+    interrupted_in: str | None = None
+    last: Mind | None = None
+    _clock: float = field(default_factory=time.perf_counter)
+    _times: list[float] = field(default_factory=list)
+
+    def __call__(self, step: Step, frame: Frame) -> None:
+        """Take down one step."""
+        now = time.perf_counter()
+        self._times.append(now - self._clock)
+        mind = step.mind
+        who = dict(actor_objects(mind, self.others))
+        self.boxes[step.frame_index] = {
+            name: mind.objects[i].region.bbox
+            for name, i in who.items()
+            if mind.objects[i].last_seen == step.time and mind.objects[i].presence is Presence.SEEN
+        }
+        for pair in touching(mind, who):
+            self.contacts.add(pair, step.time)
+        for name in moving(mind, who):
+            self.moves.add((name,), step.time)
+        self.events += [e for e in step.events if e.kind.startswith("stage_")]
+        self.alerts += [
+            ReportedAlert(a.kind, a.key.rpartition("/")[2], a.opened)
+            for a in step.alerts
+            if a.closed is None and a.severity >= Severity.WARNING
+        ]
+        self._note_interruption(mind)
+        self.last = mind
+        self._clock = time.perf_counter()
+
+    def _note_interruption(self, mind: Mind) -> None:
+        """In which stage the task was interrupted: the one that was under way just before."""
+        task = mind.tasks[0] if mind.tasks else None
+        if task and task.verdict is Verdict.INTERRUPTED and self.interrupted_in is None:
+            before = self.last.tasks[0] if self.last and self.last.tasks else task
+            self.interrupted_in = before.current or task.current or ""
+
+    def report(self) -> MachineReport:
+        """All that was said."""
+        verdict = final_verdict(self.last) if self.last else Verdict.UNKNOWN
+        return MachineReport(
+            verdict=verdict.value,
+            stages=told_stages(self.events, self._unsafe(verdict)),
+            boxes=self.boxes,
+            contacts=self.contacts.intervals(),
+            moves=self.moves.intervals(),
+            alerts=tuple(self.alerts),
+            seconds=self.last.time if self.last else 0.0,
+            ms=1000 * statistics.median(self._times) if self._times else None,
+        )
+
+    def _unsafe(self, verdict: Verdict) -> str | None:
+        return self.interrupted_in if verdict is Verdict.INTERRUPTED else None
+
+
+def actor_objects(mind: Mind, others: Collection[str]) -> Iterator[tuple[str, int]]:
+    """Names of actors, and of taught things that are none, with the object that is believed to be each."""
+    bound: dict[str, int] = {}
+    for task in mind.tasks:
+        bound |= {b.actor: b.object_id for b in task.bindings if b.object_id in mind.objects}  # type: ignore[misc]  # an id that is known is not None
+    yield from bound.items()
+    for name in others:
+        like = [b for b in mind.present() if b.name == name and b.id not in bound.values()]
+        if like and name not in bound:
+            yield name, max(like, key=lambda b: (b.strength, -b.id)).id
+
+
+def touching(mind: Mind, who: Mapping[str, int]) -> Iterator[tuple[str, str]]:
+    """Pairs of names, in order, whose objects are believed to be in contact."""
+    for (a, i), (b, j) in combinations(sorted(who.items()), 2):
+        if mind.coupled(i, j) or mind.truth("touching", i, j) is Truth.TRUE:
+            yield a, b
+
+
+def moving(mind: Mind, who: Mapping[str, int]) -> Iterator[str]:
+    """Names whose objects are believed to move."""
+    facts = Snapshot(mind)
+    codes = PREDICATES["moving"].look(facts)
+    for name, i in sorted(who.items()):
+        if i in facts.row and codes[facts.row[i]] == 1:
+            yield name
+
+
+def told_stages(events: Sequence[Event], unsafe: str | None = None) -> tuple[ReportedStage, ...]:
+    """Stages as events told them: when each was told to have begun, and how it went at last.
+
+    Args:
+        events: Of stages, by time.
+        unsafe: The stage in which the task was interrupted, or None when it was not.
+
+    Returns:
+        One for each time that a stage was told to have begun; it is complete unless the last word on it
+        was that it fails.
+    """
+    told: list[ReportedStage] = []
+    for event in events:
+        name = str(event.data.get("stage", ""))
+        at = next((k for k in reversed(range(len(told))) if told[k].stage == name), None)
+        if event.kind == "stage_started":
+            told.append(ReportedStage(name, event.time, "complete"))
+        elif at is not None and event.kind in _OUTCOMES:
+            told[at] = ReportedStage(name, told[at].time, _OUTCOMES[event.kind])
+    last = next((k for k in reversed(range(len(told))) if told[k].stage == unsafe), None)
+    if last is not None:
+        told[last] = ReportedStage(told[last].stage, told[last].time, "unsafe")
+    return tuple(told)
+
+
+_OUTCOMES = {
+    "stage_progressing": "complete",
+    "stage_done": "complete",
+    "stage_failing": "failing",
+    "stage_failed": "failing",
+}

@@ -1,0 +1,128 @@
+"""`visup eval machines`: machines at work, taught from a brief, watched, and scored.
+
+The supervisor is given the brief and the video, as a user would give them; `truth.json` and masks are read by
+the scoring alone, but for `--eyes`, where masks stand in for eyes so that reasoning is measured by itself.
+The baseline has the same tasks, rules and scoring, and other eyes.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from visup.agent.contract.behaviour import Behaviour
+from visup.agent.cycle.agent import Agent
+from visup.agent.model.errors import SettingsError
+from visup.agent.model.step import Observer
+from visup.evaluation.figures import Progress, silent
+from visup.evaluation.machines.clips import Brief, clip_folders, read_brief, read_truth
+from visup.evaluation.machines.csrt import box_behaviour
+from visup.evaluation.machines.mask_regions import has_masks, mask_behaviours
+from visup.evaluation.machines.recorder import MachineRecorder
+from visup.evaluation.machines.scores import MachineReport, machine_scores, machine_total
+from visup.evaluation.machines.teaching import taught_database
+from visup.runs.wiring import WatchSettings, build_agent, open_video, reasoning_agent
+from visup.tasks import load_tasks
+from visup.tasks.grammar.structure import task_actors
+
+
+def evaluate_machines(
+    folder: Path,
+    *,
+    eyes: bool = False,
+    baseline: bool = True,
+    limit: int | None = None,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Figures over all clips with a brief below a folder.
+
+    Args:
+        folder: A clip, or a folder with clips anywhere below it.
+        eyes: Regions are made from the masks, named by the roles; clips without masks are left out.
+        baseline: Whether CSRT watches, too.
+        limit: Frames of each clip, for a quick look; all by default.
+        progress: Shows what is being done.
+
+    Returns:
+        {"total": {...}, "items": {clip: {...}}, "baseline": {...}} with the keys of the data's README;
+        each item has its own `baseline`.
+
+    Raises:
+        SettingsError: There is no clip, or a brief or truth is not as it should be.
+    """
+    folders = _with_masks(folder) if eyes else clip_folders(folder)
+    items: dict[str, dict[str, Any]] = {}
+    for clip in folders:
+        brief, truth = read_brief(clip), read_truth(clip)
+        report = (watch_by_masks if eyes else watch_taught)(brief, limit)
+        items[clip.name] = machine_scores(report, truth)
+        progress(f"{clip.name}: {report.verdict}")
+        if baseline and not eyes:
+            items[clip.name]["baseline"] = machine_scores(watch_boxes(brief, limit), truth)
+    figures = {"total": machine_total(list(items.values())), "items": items}
+    rivals = [i["baseline"] for i in items.values() if "baseline" in i]
+    return figures | ({"baseline": machine_total(rivals)} if rivals else {})
+
+
+def _with_masks(folder: Path) -> list[Path]:
+    found = [f for f in clip_folders(folder) if has_masks(f)]
+    if not found:
+        raise SettingsError(
+            "no clip here has masks to see by",
+            where=str(folder),
+            expected="folders with masks/00000.png, ... beside brief.json",
+            hint="leave --eyes out to see by the pictures",
+        )
+    return found
+
+
+def clip_settings(brief: Brief) -> WatchSettings:
+    """What a supervisor is told of a clip: each actor of the task is the taught thing of its name."""
+    wanted = {a for task in load_tasks(brief.task) for a in task_actors(task)}
+    taught = [o.name for o in brief.actors if o.name in wanted]
+    return WatchSettings(
+        source=str(brief.video),
+        tasks=(brief.task,),
+        actors={name: (name,) for name in taught},
+        fov_vertical_deg=brief.fov_vertical_deg,
+    )
+
+
+def watch_taught(brief: Brief, limit: int | None = None) -> MachineReport:
+    """Watch a clip as `visup watch` does, taught from its brief."""
+    with tempfile.TemporaryDirectory() as scratch:
+        models = Path(scratch) / "taught.models"
+        taught_database(brief, models)
+        settings = replace(clip_settings(brief), models=models)
+        return _watched(brief, settings, limit, lambda o: build_agent(settings, (o,)))
+
+
+def watch_by_masks(brief: Brief, limit: int | None = None) -> MachineReport:
+    """Watch a world by its masks in place of eyes."""
+    return _watched_by(mask_behaviours(brief.folder), brief, limit)
+
+
+def watch_boxes(brief: Brief, limit: int | None = None) -> MachineReport:
+    """Watch a clip by tracked boxes: the baseline."""
+    return _watched_by([box_behaviour(brief)], brief, limit)
+
+
+def _watched_by(eyes: list[Behaviour], brief: Brief, limit: int | None) -> MachineReport:
+    settings = clip_settings(brief)
+    return _watched(brief, settings, limit, lambda o: reasoning_agent(settings, (o,), eyes))
+
+
+def _watched(
+    brief: Brief, settings: WatchSettings, limit: int | None, make: Callable[[Observer], Agent]
+) -> MachineReport:
+    record = MachineRecorder([o.name for o in brief.others])
+    agent = make(record)
+    try:
+        with open_video(settings) as source:
+            agent.run(source, until=lambda s: limit is not None and s.frame_index + 1 >= limit)
+    finally:
+        agent.close()
+    return record.report()

@@ -1,0 +1,266 @@
+"""Figures of a supervised clip against its truth, as pure functions.
+
+The definitions are those of the data's README under `visup eval machines`. What was reported comes in as
+plain records (`MachineReport`), what is true as `MachineTruth`, and the two meet only here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from visup.evaluation.missions.scores import TrueStage, precision_recall_f1
+
+INTERVAL_TOLERANCE_S = 1.0
+ACTOR_IOU = 0.5
+BAD_OUTCOMES = ("failing", "unsafe")
+
+Box = tuple[float, ...]
+"""(x, y, width, height), pixels."""
+
+Counts = tuple[int, int, int]
+"""Right, in excess, missed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A contact of two, or a movement of one: who, by name and in order; begin and end in seconds."""
+
+    who: tuple[str, ...]
+    from_s: float
+    to_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrueBoxes:
+    """Boxes of one frame by actor; one that is not in view has none."""
+
+    frame: int
+    boxes: Mapping[str, Box]
+
+
+@dataclass(frozen=True, slots=True)
+class MachineTruth:
+    """What truly happens in a clip.
+
+    Attributes:
+        stages: In their order.
+        accept: All verdicts that are right.
+        tolerance_s: How far off the begin of a stage may be told.
+        boxes: At some frames.
+        contacts: Who touches whom, or None when that is not told.
+        moves: Who moves, or None when that is not told.
+    """
+
+    stages: tuple[TrueStage, ...]
+    accept: frozenset[str]
+    tolerance_s: float
+    boxes: tuple[TrueBoxes, ...] = ()
+    contacts: tuple[Interval, ...] | None = None
+    moves: tuple[Interval, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedStage:
+    """A stage as it was reported: name, when it was told to have begun, how it went at last."""
+
+    stage: str
+    time: float
+    outcome: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedAlert:
+    """An alert of severity warning or above: kind, the stage that it speaks of or '', when it opened."""
+
+    kind: str
+    stage: str
+    time: float
+
+
+@dataclass(frozen=True, slots=True)
+class MachineReport:
+    """What a supervisor reported of a clip.
+
+    Attributes:
+        verdict: Final.
+        stages: By time.
+        boxes: Frame -> actor -> box of the region under its name.
+        contacts: Who touched whom.
+        moves: Who moved.
+        alerts: Grave ones.
+        seconds: Length of what was watched.
+        ms: Median of a frame.
+    """
+
+    verdict: str
+    stages: tuple[ReportedStage, ...] = ()
+    boxes: Mapping[int, Mapping[str, Box]] | None = None
+    contacts: tuple[Interval, ...] = ()
+    moves: tuple[Interval, ...] = ()
+    alerts: tuple[ReportedAlert, ...] = ()
+    seconds: float = 0.0
+    ms: float | None = None
+
+
+def machine_scores(report: MachineReport, truth: MachineTruth) -> dict[str, Any]:
+    """Figures of one clip by the keys of the data's README, and the counts that they come from.
+
+    What comes after the end of what was watched is not scored.
+    """
+    end = report.seconds if report.seconds > 0.0 else float("inf")
+    stages = [s for s in truth.stages if s.from_s <= end]
+    found = actor_counts(report.boxes or {}, truth.boxes)
+    scores: dict[str, Any] = {
+        "stage_counts": list(matched_stages(report.stages, stages, truth.tolerance_s)),
+        "actor_counts": list(found),
+        "false_alerts": false_alerts(report.alerts, truth),
+        "minutes": max(report.seconds, 1.0) / 60,
+        "verdict": report.verdict,
+        "told": [f"{s.stage} {s.time:.1f} {s.outcome}" for s in report.stages],
+    }
+    if truth.accept:
+        scores |= {"verdicts_right": int(report.verdict in truth.accept), "verdicts": 1}
+    if truth.contacts is not None:
+        counts = matched_intervals(report.contacts, _begun(truth.contacts, end))
+        scores["contact_counts"] = list(counts)
+    if truth.moves is not None:
+        scores["move_counts"] = list(matched_intervals(report.moves, _begun(truth.moves, end)))
+    if report.ms is not None:
+        scores["ms"] = report.ms
+    return scores | figures_of(scores)
+
+
+def _begun(intervals: Sequence[Interval], end: float) -> list[Interval]:
+    """Those that begin before the end, none of them longer than that."""
+    return [Interval(i.who, i.from_s, min(i.to_s, end)) for i in intervals if i.from_s < end]
+
+
+def figures_of(counted: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures that follow from counts, of one clip or of all."""
+    figures: dict[str, Any] = {}
+    if sum(counted["stage_counts"]):
+        names = ("stage_precision", "stage_recall", "stage_f1")
+        figures |= dict(zip(names, precision_recall_f1(*counted["stage_counts"]), strict=True))
+    if counted["actor_counts"][1]:
+        figures["actors"] = counted["actor_counts"][0] / counted["actor_counts"][1]
+    for kind in ("contact", "move"):
+        counts = counted.get(f"{kind}_counts", (0, 0, 0))
+        if sum(counts):
+            figures[f"{kind}_f1"] = precision_recall_f1(*counts)[2]
+    figures["false_alerts_per_min"] = counted["false_alerts"] / counted["minutes"]
+    return figures
+
+
+def machine_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Figures over all clips: counts are added up, so that each stage, box and interval weighs alike."""
+    total: dict[str, Any] = {
+        key: [sum(i.get(key, (0,) * width)[k] for i in items) for k in range(width)]
+        for key, width in COUNTED.items()
+    }
+    for key in ("false_alerts", "minutes", "verdicts_right", "verdicts"):
+        total[key] = sum(i.get(key, 0) for i in items)
+    times = [i["ms"] for i in items if "ms" in i]
+    if times:
+        total["ms"] = sum(times) / len(times)
+    return total | (figures_of(total) if items else {})
+
+
+COUNTED = {"stage_counts": 3, "actor_counts": 2, "contact_counts": 3, "move_counts": 3}
+
+
+def matched_stages(
+    told: Sequence[ReportedStage], true: Sequence[TrueStage], tolerance_s: float
+) -> Counts:
+    """Stages whose begin was told in time, in the right order, with the right outcome.
+
+    Args:
+        told: By time.
+        true: In their order.
+        tolerance_s: How far off a begin may be told, seconds.
+
+    Returns:
+        Right, in excess, missed, of the longest row of stages that is right.
+    """
+
+    def same(a: ReportedStage, b: TrueStage) -> bool:
+        near = abs(a.time - b.from_s) <= tolerance_s + 1e-9
+        return near and a.stage == b.stage and a.outcome == b.outcome
+
+    right = longest_common(told, true, same)
+    return right, len(told) - right, len(true) - right
+
+
+A = TypeVar("A")
+B = TypeVar("B")
+
+
+def longest_common(first: Sequence[A], second: Sequence[B], same: Callable[[A, B], bool]) -> int:
+    """Length of the longest row of pairs that are the same, in the order of both."""
+    before = [0] * (len(second) + 1)
+    for a in first:
+        row = [0]
+        for k, b in enumerate(second):
+            row.append(max(before[k] + same(a, b), before[k + 1], row[k]))
+        before = row
+    return before[-1]
+
+
+def matched_intervals(told: Sequence[Interval], true: Sequence[Interval]) -> Counts:
+    """Intervals of the same bodies whose begins and ends agree to a second, one to one.
+
+    Intervals of the same bodies are matched in their order.
+    """
+    right = 0
+    for who in sorted({i.who for i in true}):
+        mine = sorted((i.from_s, i.to_s) for i in told if i.who == who)
+        theirs = sorted((i.from_s, i.to_s) for i in true if i.who == who)
+        right += longest_common(mine, theirs, _agree)
+    return right, len(told) - right, len(true) - right
+
+
+def _agree(a: tuple[float, float], b: tuple[float, float]) -> bool:
+    return all(abs(x - y) <= INTERVAL_TOLERANCE_S + 1e-9 for x, y in zip(a, b, strict=True))
+
+
+def actor_counts(
+    seen: Mapping[int, Mapping[str, Box]], true: Sequence[TrueBoxes]
+) -> tuple[int, int]:
+    """Annotated boxes that a region under the actor's name covers, and all in frames that were watched."""
+    right = scored = 0
+    for row in true:
+        if row.frame not in seen:
+            continue
+        for name, box in row.boxes.items():
+            scored += 1
+            told = seen[row.frame].get(name)
+            right += told is not None and box_iou(told, box) >= ACTOR_IOU
+    return right, scored
+
+
+def box_iou(a: Box, b: Box) -> float:
+    """Intersection over union of two boxes, 0 to 1."""
+    wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+    high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+    both = max(0.0, wide) * max(0.0, high)
+    return both / (a[2] * a[3] + b[2] * b[3] - both)
+
+
+def false_alerts(alerts: Sequence[ReportedAlert], truth: MachineTruth) -> int:
+    """How many grave alerts no stage accounts for that truly goes wrong."""
+    return sum(not _accounted(alert, truth) for alert in alerts)
+
+
+def _accounted(alert: ReportedAlert, truth: MachineTruth) -> bool:
+    """Whether a stage that goes wrong has begun, and the alert speaks of that stage or of what it breaks."""
+    for stage in truth.stages:
+        begun = alert.time >= stage.from_s - truth.tolerance_s - 1e-9
+        if stage.outcome not in BAD_OUTCOMES or not begun:
+            continue
+        if alert.kind == "stage_failing":
+            if alert.stage == stage.stage:
+                return True
+        elif alert.kind == "invariant_broken" or stage.outcome == "unsafe":
+            return True
+    return False

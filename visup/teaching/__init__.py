@@ -1,0 +1,10 @@
+"""Showing things once: a user outlines them in one picture, and a model database keeps what was shown.
+
+Read `lesson.py` (`visup.teach`, and what it tells), `outlines.py` (outlines as they are typed), `briefs.py`
+(outlines in a file), `clip_frames.py` (the frame in which something is shown), `snapping.py` (outlines that
+follow edges), `drawing.py` (a picture of what was stored), and `page/` (the window in the browser).
+"""
+
+from visup.teaching.lesson import teach
+
+__all__ = ["teach"]

@@ -1,0 +1,131 @@
+"""Frames of a clip by their number, as a user leafs through it; a single picture is a clip of one."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Frame
+from visup.agent.model.errors import SourceError
+from visup.percepts.video import VideoSource, open_source
+from visup.percepts.video.source import to_bgr
+
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
+"""Endings of the files that are read as one picture."""
+
+KEPT_BYTES = 1 << 26
+"""Frames that were passed are kept up to so many bytes, so that going back a little costs nothing."""
+
+NEAR = 40
+"""Frames further ahead than so many are reached by passing over those between undecoded."""
+
+Picture = NDArray[np.uint8]
+
+
+class ClipFrames:
+    """The frames of a clip, counted from 0 as `visup watch` counts them.
+
+    Frames are found by decoding from the start, since seeking in a video is not exact to a frame.
+
+    Args:
+        source: A video file, a folder of images, a camera, a URL, or a single picture.
+
+    Attributes:
+        name: As the user named it.
+        count: How many frames it announces; None when that is not known.
+
+    Raises:
+        SourceError: It cannot be opened.
+    """
+
+    def __init__(self, source: str) -> None:
+        self.name = source
+        self._kept: OrderedDict[int, Picture] = OrderedDict()
+        self._source: VideoSource | None = None
+        self._next = 0
+        path = Path(source).expanduser()
+        if path.suffix.lower() in PICTURES and path.is_file():
+            self._kept[0] = _read_picture(path)
+            self.count: int | None = 1
+        else:
+            self._source = open_source(source)
+            self.count = self._source.frame_count
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._source is not None:
+            self._source.close()
+
+    def at(self, number: int) -> Picture:
+        """A frame.
+
+        Args:
+            number: From 0.
+
+        Returns:
+            (H, W, 3) uint8, BGR; not to be written to.
+
+        Raises:
+            SourceError: There is no such frame, or it is gone by: a camera cannot be wound back.
+        """
+        if number in self._kept:
+            return self._kept[number]
+        if number < 0 or self._source is None:
+            raise self._missing(number)
+        if not self._source.live and not self._next <= number < self._next + NEAR:
+            return self._jump(number)
+        return self._read_on(self._source, number)
+
+    def _read_on(self, source: VideoSource, number: int) -> Picture:
+        while self._next <= number:
+            frame = next(source, None)
+            if frame is None:
+                raise self._missing(number)
+            self._next = frame.index + 1
+            self._keep(frame)
+        if number not in self._kept:
+            raise SourceError(
+                f"frame {number} has gone by", where=self.name, hint="a camera cannot be wound back"
+            )
+        return self._kept[number]
+
+    def _jump(self, number: int) -> Picture:
+        """A frame far from the last one: what lies between is passed over, which is faster."""
+        with open_source(self.name, every=max(1, number)) as source:
+            for frame in source:
+                self._keep(frame)
+                if frame.index >= number:
+                    return frame.image
+        raise self._missing(number)
+
+    def _keep(self, frame: Frame) -> None:
+        self._kept[frame.index] = frame.image
+        self._kept.move_to_end(frame.index)
+        while len(self._kept) > max(2, KEPT_BYTES // max(1, frame.image.nbytes)):
+            self._kept.popitem(last=False)
+
+    def _missing(self, number: int) -> SourceError:
+        expected = f"0 to {self.count - 1}" if self.count else "a frame's number, from 0"
+        if self.count and 0 <= number < self.count:
+            expected = "a smaller number: the video is shorter than it announces"
+        return SourceError(f"there is no frame {number}", where=self.name, expected=expected)
+
+
+def _read_picture(path: Path) -> Picture:
+    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if picture is None:
+        raise SourceError("this is not a picture that can be read", where=str(path))
+    return to_bgr(picture)

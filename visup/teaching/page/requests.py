@@ -1,0 +1,83 @@
+"""What the page asks for: facts on the clip, an outline snapped to edges, things to be stored."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import SettingsError
+from visup.percepts.shape.database.model_database import ModelDatabase
+from visup.teaching.clip_frames import ClipFrames
+from visup.teaching.lesson import Lesson, teach_outlines
+from visup.teaching.outlines import DrawnOutline
+from visup.teaching.snapping import snapped
+
+MOST_THINGS = 200
+MOST_CORNERS = 5000
+
+Answer = dict[str, Any]
+
+
+def clip_facts(frames: ClipFrames, frame: int, models: Path) -> Answer:
+    """What the page shows at first: the clip, the database, and the names that it knows.
+
+    Raises:
+        DatabaseError: The database is damaged.
+    """
+    known = ModelDatabase.open(models) if models.exists() else None
+    taught = Counter(v.name for v in known.taught) if known else Counter()
+    return {
+        "clip": frames.name,
+        "count": frames.count,
+        "frame": frame,
+        "models": str(models),
+        "known": {name: taught[name] for name in known.names()} if known else {},
+    }
+
+
+def snap(frames: ClipFrames, asked: Mapping[str, Any]) -> Answer:
+    """The corners of an outline, snapped to the edges near it.
+
+    Raises:
+        VisupError: It is no outline, or the frame is not there.
+    """
+    outline = _outline({"name": "outline", **asked})
+    return {"corners": snapped(frames.at(_number(asked)), outline).corners}
+
+
+def save(frames: ClipFrames, models: Path, asked: Mapping[str, Any]) -> Lesson:
+    """Store things that were drawn, all or nothing.
+
+    Raises:
+        VisupError: One has no name, or shows nothing.
+    """
+    things = asked.get("things")
+    if not isinstance(things, Sequence) or not 0 < len(things) <= MOST_THINGS:
+        raise SettingsError("nothing was outlined", expected="at least one outline with its name")
+    return teach_outlines(frames, [(_number(t), _outline(t)) for t in things], models)
+
+
+def _number(asked: object) -> int:
+    number = asked.get("frame") if isinstance(asked, Mapping) else None
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 1 << 31:
+        raise SettingsError(f"{number!r} is no frame's number")
+    return number
+
+
+def _outline(asked: Mapping[str, Any]) -> DrawnOutline:
+    name, corners = asked.get("name"), asked.get("corners")
+    if not isinstance(name, str) or not name.strip():
+        raise SettingsError("an outline has no name yet", hint="give it one in the list")
+    if not isinstance(corners, list) or not 3 <= len(corners) <= MOST_CORNERS:
+        raise SettingsError(f"the outline of '{name}' has too few corners", expected="at least 3")
+    return DrawnOutline(name.strip(), tuple(_corner(name, c) for c in corners))
+
+
+def _corner(name: str, corner: object) -> tuple[float, float]:
+    sound = isinstance(corner, list) and len(corner) == 2
+    if sound and all(isinstance(n, int | float) and math.isfinite(n) for n in corner):  # type: ignore[attr-defined]
+        return float(corner[0]), float(corner[1])  # type: ignore[index]
+    raise SettingsError(f"the outline of '{name}' has a corner that is none: {corner!r}")
