@@ -46,7 +46,7 @@ MOST = 256  # regions of which evidence is remembered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ground:
+class BareGround:
     """What was seen where nothing moved, brought along with the camera.
 
     Attributes:
@@ -66,7 +66,7 @@ class CastShadowFilter:
     """Leaves out the regions that are cast shadows; one per video."""
 
     def __init__(self) -> None:
-        self._ground: Ground | None = None
+        self._ground: BareGround | None = None
         self._evidence: dict[int, float] = {}
 
     def step(
@@ -87,7 +87,7 @@ class CastShadowFilter:
         ground = self._ground
         if ground is None or ground.bare.shape != image.shape:
             nowhere = np.full_like(image, np.nan)
-            self._ground = Ground(nowhere, nowhere, frame.time - DELAY_S)
+            self._ground = BareGround(nowhere, nowhere, frame.time - DELAY_S)
             return tuple(regions)
         if not static:
             ground = _followed(ground, scene)
@@ -97,7 +97,7 @@ class CastShadowFilter:
         self._evidence = dict(list(self._evidence.items())[-MOST:])
         return tuple(r for r in regions if self._evidence.get(r.id, 0.0) < SURE)
 
-    def _weigh(self, region: Region, image: Floats, ground: Ground, frame: Frame) -> None:
+    def _weigh(self, region: Region, image: Floats, ground: BareGround, frame: Frame) -> None:
         before = self._evidence.pop(region.id, 0.0)  # what is weighed anew comes last
         now = before + shadow_evidence(*_cut(region, image, ground, frame))
         self._evidence[region.id] = min(max(now, BOUNDS[0]), BOUNDS[1])
@@ -168,7 +168,7 @@ def _prepared(frame: Frame) -> Floats:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
-def _followed(ground: Ground, scene: FrameMeasurements) -> Ground:
+def _followed(ground: BareGround, scene: FrameMeasurements) -> BareGround:
     """The ground where it lies in the newest image."""
     if not scene.measured:
         return ground
@@ -181,7 +181,7 @@ def _followed(ground: Ground, scene: FrameMeasurements) -> Ground:
     corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]]).T
     if np.abs((off - np.eye(2, 3)) @ corners).max() < STEP_PX:
         return replace(ground, off=off)
-    return Ground(_moved(ground.bare, off), _moved(ground.latest, off), ground.since)
+    return BareGround(_moved(ground.bare, off), _moved(ground.latest, off), ground.since)
 
 
 def _moved(image: Floats, back: Doubles) -> Floats:
@@ -193,7 +193,7 @@ def _moved(image: Floats, back: Doubles) -> Floats:
     )
 
 
-def _renewed(ground: Ground, image: Floats, covered: Mask, now: float) -> Ground:
+def _renewed(ground: BareGround, image: Floats, covered: Mask, now: float) -> BareGround:
     """The ground after one more image."""
     if now - ground.since < DELAY_S:
         return ground
@@ -216,7 +216,7 @@ def _covered(regions: Sequence[Region], frame: Frame, image: Floats) -> Mask:
 
 
 def _cut(
-    region: Region, image: Floats, ground: Ground, frame: Frame
+    region: Region, image: Floats, ground: BareGround, frame: Frame
 ) -> tuple[Floats, Floats, Mask]:
     (x0, y0, x1, y1), mask = _scaled(region, frame, image)
     part = np.s_[y0:y1, x0:x1]
