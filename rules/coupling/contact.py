@@ -32,7 +32,7 @@ class ContactSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class OutlineContact:
     """What is remembered of two whose outlines meet; seconds and pixels.
 
     Attributes:
@@ -53,12 +53,12 @@ class Contact:
 
 
 def updated_contact(
-    before: Contact | None,
+    before: OutlineContact | None,
     speed: float | None,
     limit: float,
     moment: tuple[float, float],
     settings: ContactSettings,
-) -> Contact:
+) -> OutlineContact:
     """What is believed of two whose outlines meet after another look.
 
     Args:
@@ -69,7 +69,7 @@ def updated_contact(
         settings: Patience.
     """
     now, dt = moment
-    contact = before or Contact(now, changed_at=now)
+    contact = before or OutlineContact(now, changed_at=now)
     if speed is not None:
         passing = speed > limit
         if passing is not contact.passing or not contact.known:

@@ -12,7 +12,7 @@ import numpy as np
 from visup.agent import Column, Coupling, Mind, Presence, Region, RelationTable
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
-from visup.rules.coupling.contact import Contact, ContactSettings
+from visup.rules.coupling.contact import ContactSettings, OutlineContact
 from visup.rules.coupling.relative_motion import RelativeTrack
 from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.reasoner import kinematics
@@ -52,7 +52,7 @@ class CouplingEvidence:
     rest_since: float | None = None
     apart_since: float | None = None
     relative_track: RelativeTrack | None = None
-    contact: Contact | None = None
+    contact: OutlineContact | None = None
 
 
 COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
@@ -144,7 +144,7 @@ def coupling_cells(
     return RelationBlock(COLUMNS, state, since, np.full((1, len(observed)), CONFIDENCE))
 
 
-def _in_front(contact: Contact, pair: Pair, mind: Mind) -> bool:
+def _in_front(contact: OutlineContact, pair: Pair, mind: Mind) -> bool:
     """Whether one of two whose outlines meet has gone so far across the other that it does not touch it."""
     size = min(float(np.sqrt(mind.objects[i].region.area)) for i in pair)
     return contact.passing and contact.path > ContactSettings().doubt_share * size

@@ -30,7 +30,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.rules.coupling.contact import Contact, ContactSettings, updated_contact
+from visup.rules.coupling.contact import ContactSettings, OutlineContact, updated_contact
 from visup.rules.coupling.evidence import (
     CONFIDENCE,
     COUPLING,
@@ -236,7 +236,7 @@ class CouplingReasoner:
         found: RelativeVelocity | None,
         seen: PairObservation,
         mind: Mind,
-    ) -> Contact:
+    ) -> OutlineContact:
         """Two whose outlines meet: whether one goes past the other."""
         s, track = self.settings.contact, before.relative_track
         limit = s.passing * image_diagonal(mind.frame_size)
@@ -245,7 +245,7 @@ class CouplingReasoner:
         dt = mind.time - track.path_end if track is not None else 0.0
         return updated_contact(before.contact, speed, limit, (mind.time, dt), s)
 
-    def _leaves(self, contact: Contact | None, seen: PairObservation, mind: Mind) -> bool:
+    def _leaves(self, contact: OutlineContact | None, seen: PairObservation, mind: Mind) -> bool:
         """Whether one of two whose outlines still meet moves on, while the other rests."""
         if contact is None or not contact.passing:
             return False

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.rules.coupling.contact import Contact, ContactSettings, updated_contact
+from visup.rules.coupling.contact import ContactSettings, OutlineContact, updated_contact
 
 SETTINGS = ContactSettings()
 LIMIT, DT = 10.0, 0.1
@@ -15,7 +15,7 @@ LIMIT, DT = 10.0, 0.1
 speeds = st.lists(st.one_of(st.none(), st.floats(0, 40)), min_size=1, max_size=30)
 
 
-def seen(speeds: Sequence[float | None]) -> Contact:
+def seen(speeds: Sequence[float | None]) -> OutlineContact:
     contact = None
     for k, speed in enumerate(speeds):
         contact = updated_contact(contact, speed, LIMIT, (k * DT, DT), SETTINGS)
