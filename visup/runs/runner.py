@@ -20,6 +20,7 @@ from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
+from visup.runs.taught_actors import told_of_taught_actors
 from visup.runs.wiring import build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 
@@ -159,11 +160,15 @@ class _Run:
         past: InterruptedRun | None,
         stack: ExitStack,
     ) -> None:
-        self._settings, self._folder, self._stack = settings, folder, stack
         self._faults = RuntimeFaults()
         self.source = stack.enter_context(open_video(settings))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
+        # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
+        actors = self._agent.mind.actors
+        self._notes = told_of_taught_actors(settings.actors, actors)
+        settings = replace(settings, actors=dict(actors))
+        self._settings, self._folder, self._stack = settings, folder, stack
         self._recorder = (
             Recorder(settings, self.source, folder, options, resume=past is not None)
             if folder
@@ -178,7 +183,6 @@ class _Run:
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
         self._stopped = False
-        self._notes: tuple[str, ...] = ()
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
         """Make the agent what it was, and give the frames that are left."""
@@ -186,7 +190,8 @@ class _Run:
         if recorder and past.state:
             recorder.collector.load(past.state.kept)
         tell = recorder.catch_up if recorder else lambda step, frame: None
-        frames, self._notes = catch_up(self._agent, self.source, past, tell)
+        frames, notes = catch_up(self._agent, self.source, past, tell)
+        self._notes = (*self._notes, *notes)
         return frames
 
     def connect(self, audience: Audience, past: InterruptedRun | None) -> None:

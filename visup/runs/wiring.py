@@ -24,6 +24,7 @@ from visup.rules.reasoners import default_reasoners
 from visup.runs.plugins import user_behaviours
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
+from visup.runs.taught_actors import with_taught_actors
 from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
@@ -79,12 +80,13 @@ def build_agent(
     _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    behaviours = [*_behaviours(settings, database, declared_sizes(tasks, settings.actors)), *also]
+    actors = with_taught_actors(tasks, settings.actors, database)
+    behaviours = [*_behaviours(settings, database, declared_sizes(tasks, actors)), *also]
     contracts = [b.contract for b in behaviours]
     return Agent(
         behaviours=behaviours,
         reasoners=_reasoners(settings, tasks, contracts),
-        actors=settings.actors,
+        actors=actors,
         zones=zones,
         observers=observers,
         models=database.names() if database is not None else (),
