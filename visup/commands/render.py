@@ -1,4 +1,4 @@
-"""`visup render`: a scenario file becomes a video with masks and truth."""
+"""`visup render`: a scenario file or a seed becomes a video with masks and truth."""
 
 from __future__ import annotations
 
@@ -11,18 +11,61 @@ SIZE_FORM = "WIDTHxHEIGHT, such as 320x240"
 
 
 def render(
-    scenario: Annotated[
-        str, typer.Argument(help="Scenario file (TOML), or the name of a shipped scenario.")
-    ],
     out: Annotated[Path, typer.Option(help="Folder for the mission; new or empty.")],
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help="Scenario file (TOML), or the name of a shipped scenario."),
+    ] = None,
     container: Annotated[str, typer.Option(help="Kind of video: mp4, avi or webm.")] = "mp4",
     size: Annotated[
         str | None, typer.Option(help=f"Another size of the image: {SIZE_FORM}.")
     ] = None,
+    random: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help="In place of a scenario: a random world of a kind, such as pick."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of a random world.")] = 0,
+    outcome: Annotated[
+        str | None, typer.Option(help="How a random world goes, such as ok; drawn when not given.")
+    ] = None,
 ) -> None:
-    """Render a scenario: a video, a mask for each frame, and what is true of it."""
+    """Render a scenario or a random world: a video, a mask for each frame, and what is true of it."""
     needs_renderer()
+    if (scenario is None) == (random is None):
+        from visup.agent.model.errors import SettingsError
 
+        raise SettingsError(
+            "there is nothing to render" if random is None else "there are two things to render",
+            expected="a scenario, or --random KIND",
+        )
+    if random is not None:
+        _render_random(random, seed, outcome, out, size)
+    elif scenario is not None:
+        _render_scenario(scenario, out, container, size)
+
+
+def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: str | None) -> None:
+    from dataclasses import replace
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from visup.render.worlds.kinds.catalogue import random_world
+    from visup.render.worlds.writer import write_world
+
+    world = random_world(kind, seed, outcome)
+    if size is not None:
+        world = replace(world, size=parse_size(size))
+    with Progress(transient=True) as bar:
+        task = bar.add_task("frames", total=world.frames)
+        truth = write_world(world, out, lambda done, _: bar.update(task, completed=done))
+    told = f"{world.frames} frames of {kind}, which goes {truth['outcome']!r}, in {out}"
+    Console().print(told, highlight=False)
+
+
+def _render_scenario(scenario: str, out: Path, container: str, size: str | None) -> None:
     from rich.console import Console
     from rich.progress import Progress
 

@@ -42,6 +42,7 @@ def main() -> int:
         _run(kind, None, given.out)
         for kind in (
             "clips",
+            "random",
             "robustness",
             "relations",
             "rules",

@@ -82,6 +82,25 @@ def machines_closing(figures: Figures) -> Iterator[RenderableType]:
     yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
 
+def random_worlds(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
+    """Random worlds."""
+    from visup.commands.render import needs_renderer
+    from visup.evaluation.machines.random_worlds import evaluate_random
+
+    needs_renderer()
+    return evaluate_random(kinds=kind or (), progress=progress, **settings)
+
+
+def random_closing(figures: Figures) -> Iterator[str]:
+    """The worlds whose verdict is wrong, and how many are right."""
+    for name, world in figures["worlds"].items():
+        if not world["verdicts_right"]:
+            yield f"{name}: {world['verdict']}, not {' or '.join(world['accept'])}"
+    for who, total in (("visup", figures["total"]), ("CSRT", figures.get("baseline"))):
+        if total:
+            yield f"{who}: {total['verdicts_right']} of {total['verdicts']} verdicts are right"
+
+
 def reasoning(
     folder: Path, *, merge: bool, long: int, progress: Progress, **settings: int
 ) -> Figures:

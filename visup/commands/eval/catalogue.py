@@ -92,6 +92,29 @@ EVALUATIONS = (
         adapters.machines_closing,
     ),
     EvaluationCommand(
+        "random",
+        """Worlds drawn from a seed: rendered, taught, watched, scored like machines, thrown away.
+
+        Kinds are spread evenly over the count; rows are kinds.
+        """,
+        f"{_ADAPTERS}:random_worlds",
+        "rendering and watching",
+        (
+            *("verdicts_right", "verdicts", "stage_f1", "actors"),
+            *("contact_f1", "move_f1", "false_alerts_per_min", "ms"),
+        ),
+        (
+            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
+            _count("count", 60, "How many worlds."),
+            _SEED,
+            _flag("eyes", "Regions are made from the masks: reasoning by itself."),
+            Setting("baseline", bool, False, Option("Let CSRT watch, too.", "--baseline/--alone")),
+            _LIMIT,
+            _count("workers", None, "Processes that share the work; as many as there are cores."),
+        ),
+        closing=adapters.random_closing,
+    ),
+    EvaluationCommand(
         "health",
         "Camera faults put into sound video: found within 1 s, rightly named, false reports.",
         "visup.evaluation.health.runner:evaluate_health",

@@ -1,0 +1,153 @@
+"""`visup eval random`: worlds are drawn from a seed, rendered, watched, scored and thrown away."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import SettingsError
+from visup.evaluation.figures import Progress, silent
+from visup.evaluation.machines.runner import evaluate_machines
+from visup.evaluation.machines.scores import machine_total
+
+SEEDS_APART = 10_000
+"""Seeds of worlds that one seed of an evaluation has to itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class RandomTrial:
+    """One world and how it is watched.
+
+    Attributes:
+        kind: Of world.
+        seed: Of the world.
+        eyes: Whether masks stand in for eyes.
+        baseline: Whether CSRT watches, too.
+        limit: Frames that are watched; all when None.
+    """
+
+    kind: str
+    seed: int
+    eyes: bool = False
+    baseline: bool = False
+    limit: int | None = None
+
+
+def evaluate_random(
+    *,
+    kinds: Sequence[str] = (),
+    count: int = 60,
+    seed: int = 0,
+    eyes: bool = False,
+    baseline: bool = False,
+    limit: int | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Figures of `evaluate_machines` on random worlds.
+
+    Args:
+        kinds: Which; all when empty. They are spread evenly over the count.
+        count: How many worlds.
+        seed: Of all of them.
+        eyes: Regions are made from the masks.
+        baseline: Whether CSRT watches, too.
+        limit: Frames of each world, for a quick look.
+        workers: Processes that share the work; as many as there are cores when None.
+        progress: Shows what is being done.
+
+    Returns:
+        `items` by kind, `total`, and `worlds` by name: what is said of each.
+
+    Raises:
+        SettingsError: There is no kind of a name.
+    """
+    trials = planned(kinds, count, seed, RandomTrial("", 0, eyes, baseline, limit))
+    worlds: dict[str, dict[str, Any]] = {}
+    for name, scores in _scored(trials, workers or os.cpu_count() or 1):
+        worlds[name] = scores
+        progress(f"{len(worlds)} of {count} worlds")
+    ordered = dict(sorted(worlds.items()))
+    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in _known(kinds)}
+    items = {kind: machine_total(found) for kind, found in by_kind.items() if found}
+    figures = {"total": machine_total(list(ordered.values())), "items": items, "worlds": ordered}
+    rivals = [w["baseline"] for w in ordered.values() if "baseline" in w]
+    return figures | ({"baseline": machine_total(rivals)} if rivals else {})
+
+
+def planned(
+    kinds: Sequence[str], count: int, seed: int, like: RandomTrial
+) -> tuple[RandomTrial, ...]:
+    """The worlds that are watched: kinds take turns, each world has a seed of its own.
+
+    Args:
+        kinds: Which; all when empty.
+        count: How many worlds.
+        seed: Of all of them.
+        like: How they are watched.
+    """
+    known = _known(kinds)
+    return tuple(
+        RandomTrial(
+            known[number % len(known)],
+            seed * SEEDS_APART + number,
+            like.eyes,
+            like.baseline,
+            like.limit,
+        )
+        for number in range(count)
+    )
+
+
+def _known(kinds: Sequence[str]) -> tuple[str, ...]:
+    from visup.render.worlds.kinds.catalogue import KINDS
+
+    for kind in kinds:
+        if kind not in KINDS:
+            raise SettingsError(f"there is no kind of world {kind!r}", expected=", ".join(KINDS))
+    return tuple(kinds) or tuple(KINDS)
+
+
+def _scored(trials: Sequence[RandomTrial], workers: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Names and figures of worlds as they come."""
+    if min(workers, len(trials)) <= 1:
+        yield from (score(trial) for trial in trials)
+        return
+    # Fresh processes: a fork would share the state of OpenCV's threads.
+    with ProcessPoolExecutor(workers, get_context("spawn"), _alone) as pool:
+        for done in as_completed([pool.submit(score, trial) for trial in trials]):
+            yield done.result()
+
+
+def _alone() -> None:
+    """One thread for each process: the processes share the cores already."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+def score(trial: RandomTrial) -> tuple[str, dict[str, Any]]:
+    """Render one world, watch it, throw it away.
+
+    Returns:
+        Its name, and what `evaluate_machines` says of it with `kind`, `outcome` and the true `verdict_true`.
+    """
+    from visup.render.worlds.kinds.catalogue import random_world
+    from visup.render.worlds.writer import write_world
+
+    world = random_world(trial.kind, trial.seed)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / world.name
+        truth = write_world(world, folder)
+        figures = evaluate_machines(
+            folder, eyes=trial.eyes, baseline=trial.baseline, limit=trial.limit
+        )
+    told: dict[str, Any] = figures["items"][world.name]
+    extra = {"kind": trial.kind, "outcome": truth["outcome"], "accept": truth["accept"]}
+    return world.name, told | extra

@@ -1,0 +1,50 @@
+"""All kinds of random worlds."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from visup.agent.model.errors import SettingsError
+from visup.render.worlds.kinds import charge, inspect, pick
+from visup.render.worlds.kinds.kind import WorldKind
+from visup.render.worlds.world import World
+
+KINDS: Mapping[str, WorldKind] = {
+    k.name: k
+    for k in (
+        WorldKind("pick", pick.OUTCOMES, pick.build),
+        WorldKind("charge", charge.OUTCOMES, charge.build),
+        WorldKind("inspect", inspect.OUTCOMES, inspect.build),
+    )
+}
+
+
+def random_world(kind: str, seed: int, outcome: str | None = None) -> World:
+    """A world of a kind, the same for the same kind, seed and outcome.
+
+    Args:
+        kind: One of `KINDS`.
+        seed: Chooses all that is random.
+        outcome: How it goes; drawn from the seed when None, half of the time success.
+
+    Raises:
+        SettingsError: There is no such kind, or it cannot go that way.
+    """
+    if kind not in KINDS:
+        raise SettingsError(f"there is no kind of world {kind!r}", expected=", ".join(KINDS))
+    chosen = KINDS[kind]
+    # Seeds are shared by kinds: the name keeps them from drawing the same numbers.
+    rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
+    drawn = chosen.outcomes[0]
+    if rng.random() > 0.35:
+        drawn = chosen.outcomes[int(rng.integers(1, len(chosen.outcomes)))]
+    if outcome is not None and outcome not in chosen.outcomes:
+        raise SettingsError(
+            f"a world of kind {kind!r} cannot go {outcome!r}", expected=", ".join(chosen.outcomes)
+        )
+    way = outcome or drawn
+    return replace(chosen.build(rng, way), name=f"{kind}_{seed:04d}_{way}")

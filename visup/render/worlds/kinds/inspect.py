@@ -1,0 +1,278 @@
+"""`inspect`: a drone or a rover goes round a statue or tower within a range, and leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from visup.render.meshes.solids import Colour, Solid, box, cone, join
+from visup.render.meshes.spacecraft import mesh
+from visup.render.worlds import clutter, machines
+from visup.render.worlds.kinds.kind import cut_short, frames_until, spans
+from visup.render.worlds.motion import clock, dropped, eased, posed, still
+from visup.render.worlds.scenery import (
+    hall,
+    meadow,
+    pick_colour,
+    random_heaven,
+    random_imager,
+    random_light,
+    seed_of,
+    unlike,
+)
+from visup.render.worlds.viewpoint import disturbed, projected, steady
+from visup.render.worlds.world import (
+    FPS,
+    SIZE,
+    Contact,
+    Course,
+    Motion,
+    Poses,
+    Surface,
+    Thing,
+    Viewpoint,
+    World,
+)
+
+OUTCOMES = ("ok", "touch", "leave", "in_progress")
+INSPECTOR, STATION = 2, 3
+STATUES = (
+    "dog",
+    "horse",
+    "camel",
+    "pig",
+    "teapot",
+    "chair",
+    "lamp",
+    "dish",
+    "astronaut",
+    "espresso",
+)
+HOLD_S = 5
+Doubles = NDArray[np.float64]
+
+TASK = """\
+# inspect_gap.task: the inspector goes round the station within a range, and leaves.
+<inspect>    ::= <approach> <fly_around> <retreat>
+<approach>   ::= converging(inspector, station)
+<fly_around> ::= gap(inspector, station) < {gap} px for {hold} s
+<retreat>    ::= diverging(inspector, station) for 1 s
+never touching(inspector, station)
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class InspectTimes:
+    """When it sets out, is on its circle, leaves it (or hits the station), and the clip ends; seconds."""
+
+    begin: float
+    arrive: float
+    leave: float
+    end: float
+
+
+def build(rng: np.random.Generator, outcome: str) -> World:
+    """A world in which a station is inspected; `outcome` is one of `OUTCOMES`."""
+    flies = bool(rng.random() < 0.65)
+    station, height = _station(rng)
+    colour = unlike(rng, [(0.4, 0.4, 0.4)])
+    craft, level = _craft(rng, colour, height, flies)
+    radius = float(np.linalg.norm(station.vertices[:, :2], axis=1).max() + rng.uniform(0.9, 1.5))
+    times = _times(rng, outcome)
+    frames = frames_until(times.end)
+    view = _view(rng, radius, height, frames)
+    poses, hit_s = _flight(rng, (station, craft), (radius, level), times, outcome, frames)
+    standing = still(0, 0, 0, float(rng.uniform(0, 6.3)))
+    gaps = _gaps(view, station, standing, craft, poses)
+    truth, limit = _course(times, outcome, gaps, hit_s)
+    if outcome == "in_progress":
+        end = times.arrive + float(rng.uniform(1.5, 3.5))
+        truth, frames = cut_short(truth, end), frames_until(end)
+    light = random_light(rng, np.asarray(view.position))
+    surface = Surface("grain", 0.4, float(rng.uniform(0.05, 0.3)), seed_of(rng))
+    things = [
+        Thing("station", station, standing, STATION, surface),
+        Thing("inspector", craft, poses, INSPECTOR, surface),
+        *_surroundings(rng, radius),
+    ]
+    return World(
+        name="", kind="inspect", things=tuple(things), viewpoint=view, light=light,
+        heaven=random_heaven(rng), imager=random_imager(rng, light), task="inspect_gap",
+        task_text=TASK.format(gap=limit, hold=HOLD_S),
+        actors={a: a for a in ("inspector", "station")}, course=truth, frames=frames, seed=seed_of(rng),
+    )  # fmt: skip
+
+
+def _station(rng: np.random.Generator) -> tuple[Solid, float]:
+    """A statue on a pedestal, or a tower; its height."""
+    stone = pick_colour(rng, bool(rng.random() < 0.3))
+    if rng.random() < 0.35:
+        return _tower(rng, stone)
+    solid = mesh(str(rng.choice(STATUES)))
+    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    size = float(rng.uniform(1.6, 2.4)) / float((high - low).max())
+    middle = (low + high) / 2
+    foot = float(rng.uniform(0.1, 0.5))
+    statue = (
+        solid.moved(by=(-middle[0], -middle[1], -low[2])).moved(scale=size).moved(by=(0, 0, foot))
+    )
+    if rng.random() < 0.7:
+        statue = statue.painted(stone)
+    r = float(np.linalg.norm(statue.vertices[:, :2], axis=1).max()) * 0.75
+    pedestal = cone((0, 0, 0), (0, 0, foot), r, None, pick_colour(rng, vivid=False))
+    return join(statue, pedestal), foot + size * float(high[2] - low[2])
+
+
+def _tower(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
+    high, r = float(rng.uniform(1.4, 2.2)), float(rng.uniform(0.35, 0.6))
+    top = pick_colour(rng)
+    if rng.random() < 0.5:
+        return join(
+            cone((0, 0, 0), (0, 0, high), r, 0.7 * r, colour),
+            cone((0, 0, high), (0, 0, high + 0.4), 0.9 * r, 0.0, top),
+        ), high + 0.4
+    return join(
+        box((1.6 * r, 1.6 * r, high), (0, 0, high / 2), colour),
+        box((2 * r, 2 * r, 0.2), (0, 0, high + 0.1), top),
+    ), high + 0.2
+
+
+def _craft(
+    rng: np.random.Generator, colour: Colour, height: float, flies: bool
+) -> tuple[Solid, float]:
+    """The inspector and the height at which it goes."""
+    if flies:
+        return machines.drone(rng, colour, float(rng.uniform(0.6, 0.9))), height * float(
+            rng.uniform(0.35, 0.75)
+        )
+    return machines.vehicle(rng, colour)[0].moved(scale=0.75), 0.0
+
+
+def _times(rng: np.random.Generator, outcome: str) -> InspectTimes:
+    begin = float(rng.uniform(0.2, 0.9))
+    arrive = begin + float(rng.uniform(2.4, 3.4))
+    stay = {"leave": rng.uniform(2.0, 3.2), "touch": rng.uniform(2.5, 5.0)}
+    leave = arrive + float(stay.get(outcome, rng.uniform(6.3, 7.4)))
+    return InspectTimes(begin, arrive, leave, min(leave + float(rng.uniform(2.6, 3.4)), 15.0))
+
+
+def _view(rng: np.random.Generator, radius: float, height: float, frames: int) -> Viewpoint:
+    """From high up, so that going round is seen as such; no zoom, since the task counts pixels."""
+    high, side = np.radians(rng.uniform(55, 85)), rng.uniform(0, 2 * np.pi)
+    far = 3.6 * (radius + 0.5)
+    way = np.array([np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)])
+    aim = np.array([0.0, 0.0, 0.3 * height])
+    place = far * way + aim
+    view = steady(place, aim, float(rng.uniform(38, 44)), frames)
+    return disturbed(view, rng, str(rng.choice(["fixed", "fixed", "shaking", "panning"])))
+
+
+def _flight(
+    rng: np.random.Generator,
+    solids: tuple[Solid, Solid],
+    circle: tuple[float, float],
+    times: InspectTimes,
+    outcome: str,
+    frames: int,
+) -> tuple[Poses, float]:
+    """(F, 4, 4) of the inspector, and when it hits the station (past the end if it does not), seconds."""
+    t = clock(frames)
+    (station, craft), (radius, level) = solids, circle
+    first, turn = rng.uniform(0, 2 * np.pi), rng.choice([-1, 1]) * rng.uniform(0.45, 0.7)
+    moving = np.clip(t, times.arrive - 0.8, times.leave + (0.0 if outcome == "touch" else 0.8))
+    angle = first + turn * (moving - times.arrive)
+    away = radius * float(rng.uniform(1.9, 2.4))
+    keys = [(times.begin, away), (times.arrive, radius), (times.leave, radius)]
+    if outcome == "touch":
+        keys += [(times.leave + 1.8, 0.0)]
+    else:
+        keys += [(times.leave + 2.4, away)]
+    distance = eased(t, keys)
+    bob = 0.03 * np.sin(2 * np.pi * t / 1.7) if level else np.zeros(frames)
+    at = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), level + bob])
+    way = np.gradient(at[:, :2], axis=0)
+    heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0])) if not level else angle + np.pi
+    poses = posed(at, heading)
+    if outcome != "touch":
+        return poses, times.end + 1
+    return _stopped(poses, _first_hit(station, craft, poses), level)
+
+
+def _first_hit(station: Solid, craft: Solid, poses: Poses) -> int:
+    """The first frame in which the craft is within 4 cm of the station."""
+    tree = cKDTree(_scattered_over(station, 20_000))
+    own = _scattered_over(craft, 500)
+    for index, pose in enumerate(poses):
+        points = own @ pose[:3, :3].T + pose[:3, 3]
+        if tree.query(points)[0].min() < 0.04:
+            return index
+    return len(poses) - 1
+
+
+def _scattered_over(solid: Solid, count: int) -> Doubles:
+    """(count, 3) points spread evenly over the faces of a solid."""
+    rng = np.random.default_rng(0)
+    corners = solid.vertices[solid.faces]
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    chosen = corners[rng.choice(len(area), count, p=area / area.sum())]
+    return np.asarray(np.einsum("nk,nkd->nd", rng.dirichlet((1, 1, 1), count), chosen))
+
+
+def _stopped(poses: Poses, hit: int, level: float) -> tuple[Poses, float]:
+    """It stops where it hits; what flies falls a little later."""
+    out = poses.copy()
+    out[hit:] = poses[hit]
+    since = hit + FPS
+    if level and since + 1 < len(out):
+        out, _ = dropped(out, since, 0.1, (0.5, 0.4, 0.0))
+    return out, hit / FPS
+
+
+def _gaps(view: Viewpoint, station: Solid, standing: Poses, craft: Solid, poses: Poses) -> Doubles:
+    """(F,) pixels between the outlines of both, about, as the undisturbed camera sees them."""
+    still_points = projected(view, _scattered_over(station, 600) @ standing[0, :3, :3].T, SIZE)
+    own = _scattered_over(craft, 200)
+    found = []
+    for pose in poses:
+        points = projected(view, own @ pose[:3, :3].T + pose[:3, 3], SIZE)
+        found.append(cdist(points, still_points).min())
+    return np.array(found)
+
+
+def _course(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> tuple[Course, int]:
+    """What is true, and the range in pixels that its user chose."""
+    t = clock(len(gaps))
+    round_about = (t >= times.arrive) & (t <= times.leave)
+    limit = int(np.ceil(gaps[round_about].max() * 1.12 / 10) * 10)
+    near = gaps < limit
+    begin = float(t[int(np.argmax(near))])
+    over = float(t[len(near) - 1 - int(np.argmax(near[::-1]))])
+    moves = (Motion("inspector", times.begin, times.end),)
+    approach = ("approach", times.begin, begin)
+    if outcome == "touch":
+        stages = spans(approach, ("fly_around", begin, hit_s, "unsafe"))
+        touch = (Contact("inspector", "station", hit_s, times.end),)
+        alerts = {"never touching": hit_s}
+        return Course(outcome, "interrupted", stages, (), touch, moves, alerts), limit
+    if outcome == "leave":
+        stages = spans(approach, ("fly_around", begin, over, "failing"))
+        return Course(outcome, "failed", stages, (), (), moves), limit
+    stages = spans(
+        approach, ("fly_around", begin, times.leave), ("retreat", times.leave, times.end)
+    )
+    return Course(outcome, "succeeded", stages, (), (), moves), limit
+
+
+def _surroundings(rng: np.random.Generator, radius: float) -> list[Thing]:
+    indoors = rng.random() < 0.3
+    found = list(hall(rng, radius * 3.5) if indoors else meadow(rng))
+    side = 2.6 * radius
+    free = [(0.0, 0.0, 1.8 * radius)]
+    return found + clutter.scattered(
+        rng, int(rng.integers(0, 6)), 0.2, (-side, side, -side, side), free
+    )

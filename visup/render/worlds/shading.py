@@ -1,0 +1,84 @@
+"""Light on things: what a ray meets, of which colour it is, how it faces the lamp."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.render.imaging.raycast import Body, Hits, RayCaster
+from visup.render.scenario.trajectories import inverse
+from visup.render.worlds.surfaces import mixed
+from visup.render.worlds.world import Daylight, Floats, Heaven, Thing
+
+CLOUD_SIZE = 0.35
+SHADOW_OFFSET = 2e-3
+"""Metres by which a ray towards the lamp starts off a surface, so as not to meet it again."""
+
+
+class PlacedThings:
+    """Things at one time, ready for rays, in world coordinates.
+
+    Args:
+        things: At least one.
+        index: The frame.
+    """
+
+    def __init__(self, things: Sequence[Thing], index: int) -> None:
+        self.things = tuple(things)
+        self.caster = RayCaster(
+            [Body(t.name, t.label, t.solid, t.poses[min(index, len(t.poses) - 1)]) for t in things]
+        )
+        self.labels = np.array([*(t.label for t in things), 0], np.uint8)
+
+    def cast(self, origin: NDArray[np.float64], directions: Floats) -> Hits:
+        """What rays from one point meet first; directions (N, 3), world."""
+        origins = np.ascontiguousarray(np.broadcast_to(origin, directions.shape), np.float32)
+        return self.caster.cast(origins, directions)
+
+    def blocked(self, points: Floats, towards: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(N,): whether something stands between points (N, 3) and a distant lamp."""
+        way = np.asarray(towards, np.float32)
+        direction = np.ascontiguousarray(np.broadcast_to(way, points.shape), np.float32)
+        start = (points + SHADOW_OFFSET * way).astype(np.float32)
+        return self.caster.cast(start, direction).body >= 0
+
+    def surface(self, hits: Hits, points: Floats, directions: Floats) -> tuple[Floats, Floats]:
+        """Reflectance (N, 3; red, green, blue) and unit normals (N, 3) towards the viewer where rays met."""
+        albedo = self.caster.albedo[hits.face]
+        for number, (thing, body) in enumerate(zip(self.things, self.caster.bodies, strict=True)):
+            mine = hits.body == number
+            if mine.any():
+                back = inverse(body.pose)
+                own = points[mine] @ back[:3, :3].T.astype(np.float32) + back[:3, 3]
+                albedo[mine] = mixed(own, albedo[mine], thing.surface)
+        normals = self.caster.normals[hits.face]
+        away = np.sum(normals * directions, axis=1, keepdims=True) > 0
+        return np.clip(albedo, 0, 1), np.where(away, -normals, normals)
+
+
+def ambient(normals: Floats, light: Daylight) -> Floats:
+    """(N, 3) light from all around on white surfaces: most from above, some thrown back from below."""
+    share = 0.72 + 0.28 * normals[:, 2:3]
+    # Walls that face each other would be alike without a little from one side.
+    side = 1 + 0.12 * normals[:, :1] - 0.05 * normals[:, 1:2]
+    return np.asarray(share * side * np.asarray(light.ambient, np.float32), np.float32)
+
+
+def direct(normals: Floats, light: Daylight) -> Floats:
+    """(N, 3) light of the lamp on white surfaces with nothing between."""
+    facing = np.clip(normals @ np.asarray(light.sun, np.float32), 0, None)
+    return np.asarray(facing[:, None] * np.asarray(light.sun_colour, np.float32), np.float32)
+
+
+def sky(directions: Floats, heaven: Heaven) -> Floats:
+    """(N, 3) radiance of the sky in some directions, world."""
+    from visup.render.imaging.texture import pattern
+
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    high = np.clip(unit[:, 2:3], 0, 1) ** 0.6
+    blue = (1 - high) * np.asarray(heaven.horizon) + high * np.asarray(heaven.zenith)
+    flat = unit / (0.25 + np.abs(unit[:, 2:3])) / CLOUD_SIZE / 4
+    cloud = heaven.clouds * np.clip(0.5 + pattern(flat, heaven.seed), 0, 1)[:, None] * (high + 0.2)
+    return np.asarray(blue * (1 - cloud) + 0.95 * cloud, np.float32)

@@ -1,0 +1,117 @@
+"""How the camera looks: rotations, focal lengths, rays, and ways to hold a camera."""
+
+from __future__ import annotations
+
+from math import radians, tan
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
+
+from visup.render.scenario.trajectories import look_at
+from visup.render.worlds.motion import clock, eased
+from visup.render.worlds.world import FPS, Floats, Viewpoint
+
+Doubles = NDArray[np.float64]
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def base_rotation(view: Viewpoint) -> Doubles:
+    """(3, 3) from the undisturbed camera's frame (x right, y down, z forward) to the world's."""
+    ahead = np.subtract(view.look_at, view.position)
+    steep = abs(ahead[2]) > 0.995 * float(np.linalg.norm(ahead))
+    up = np.array([0.0, 1.0, 0.0]) if steep else UP
+    turned = look_at(np.asarray(view.position), np.asarray(view.look_at), up)
+    return np.asarray(turned.as_matrix(), float)
+
+
+def turn(view: Viewpoint, index: int) -> Doubles:
+    """(3, 3) from the camera's frame in a frame of the clip to the undisturbed one's."""
+    pan, tilt, roll = np.radians(view.turns[index])
+    return np.asarray(Rotation.from_euler("YXZ", [pan, tilt, roll]).as_matrix(), float)
+
+
+def focal_px(view: Viewpoint, height: int, zoom: float = 1.0) -> float:
+    """Focal length in pixels of a picture of some height."""
+    return zoom * height / 2 / tan(radians(view.fov_vertical_deg) / 2)
+
+
+def rays(width: int, height: int, focal: float, at: Doubles | None = None) -> Floats:
+    """(N, 3) float32 in the camera's frame, z = 1, through all pixels or through points (x, y)."""
+    if at is None:
+        y, x = np.mgrid[:height, :width]
+        at = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+    flat = (at - [(width - 1) / 2, (height - 1) / 2]) / focal
+    return np.column_stack([flat, np.ones(len(flat))]).astype(np.float32)
+
+
+def projected(view: Viewpoint, points: ArrayLike, size: tuple[int, int]) -> Doubles:
+    """(N, 2) pixels at which the undisturbed camera sees points (N, 3) before it, world."""
+    own = (np.atleast_2d(np.asarray(points, float)) - view.position) @ base_rotation(view)
+    middle = np.array([(size[0] - 1) / 2, (size[1] - 1) / 2])
+    return np.asarray(own[:, :2] / own[:, 2:] * focal_px(view, size[1]) + middle)
+
+
+def shows(view: Viewpoint, points: ArrayLike, size: tuple[int, int], margin: float = 0.06) -> bool:
+    """Whether the undisturbed camera sees all points, a share of the picture from its border."""
+    share = projected(view, points, size) / size
+    return bool(((share > margin) & (share < 1 - margin)).all())
+
+
+def steady(position: ArrayLike, aim: ArrayLike, fov_vertical_deg: float, frames: int) -> Viewpoint:
+    """A camera on a tripod; position and aim are (3,), metres."""
+    (x, y, z), (a, b, c) = np.asarray(position, float).tolist(), np.asarray(aim, float).tolist()
+    zero, one = np.zeros((frames, 3)), np.ones(frames)
+    return Viewpoint((x, y, z), (a, b, c), fov_vertical_deg, zero, one, "fixed")
+
+
+def disturbed(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoint:
+    """The same camera, held or led otherwise.
+
+    Args:
+        view: On a tripod.
+        rng: Draws how much and when.
+        style: `fixed`, `shaking`, `panning` or `zooming`.
+
+    Returns:
+        A viewpoint whose picture keeps the middle of the scene in view.
+    """
+    frames = len(view.zoom)
+    size = view.fov_vertical_deg
+    turns, zoom = view.turns, view.zoom
+    if style == "shaking":
+        turns = _jitter(rng, frames, rng.uniform(0.004, 0.016) * size)
+    elif style == "panning":
+        turns = _jitter(rng, frames, 0.002 * size) + _pan(rng, frames, size)
+    elif style == "zooming":
+        zoom = _zoom(rng, frames)
+    return Viewpoint(view.position, view.look_at, view.fov_vertical_deg, turns, zoom, style)
+
+
+def _jitter(rng: np.random.Generator, frames: int, degrees: float) -> Doubles:
+    """(F, 3): an unsteady hand; slow sway and quick tremor, little roll."""
+    white = rng.standard_normal((frames + 40, 3))
+    slow = gaussian_filter1d(white, 0.45 * FPS, axis=0)[20:-20]
+    quick = gaussian_filter1d(white[:, ::-1], 0.1 * FPS, axis=0)[20:-20]
+    mix = slow / slow.std() + 0.35 * quick / quick.std()
+    return np.asarray(degrees * mix * [1.0, 1.0, 0.4])
+
+
+def _pan(rng: np.random.Generator, frames: int, size: float) -> Doubles:
+    """(F, 3): the camera turns to one side, or there and back."""
+    t = clock(frames)
+    end = t[-1]
+    reach = rng.choice([-1, 1]) * rng.uniform(0.08, 0.2) * size
+    a, b = end * rng.uniform(0.05, 0.3), end * rng.uniform(0.5, 0.9)
+    back = rng.choice([-1.0, 0.0, 1.0])
+    pan = eased(t, [(a, -reach / 2), ((a + b) / 2, reach / 2), (b, -back * reach / 2)])
+    return np.column_stack([pan, 0.15 * pan, np.zeros(frames)])
+
+
+def _zoom(rng: np.random.Generator, frames: int) -> Doubles:
+    t = clock(frames)
+    most = rng.uniform(1.12, 1.35)
+    a, b = t[-1] * rng.uniform(0.05, 0.3), t[-1] * rng.uniform(0.45, 0.9)
+    first, last = (1.0, most) if rng.random() < 0.6 else (most, 1.0)
+    return eased(t, [(a, first), (b, last)])

@@ -1,0 +1,60 @@
+"""Water: waves that tilt a mirror of the sky."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from visup.render.worlds.world import Daylight, Floats, Heaven, Water
+
+SMOOTH_AT = 60.0
+"""Metres at which waves look half as rough, since a pixel holds several of them."""
+
+
+def radiance(
+    points: Floats, eye: tuple[float, float, float], time: float, water: Water, heaven: Heaven
+) -> Floats:
+    """Light from the surface of the water.
+
+    Args:
+        points: (N, 3) on it, world.
+        eye: The camera's position.
+        time: Seconds.
+        water: Colour and waves.
+        heaven: What it mirrors.
+
+    Returns:
+        (N, 3) radiance, red, green, blue, without shadows.
+    """
+    x, y = points[:, 0], points[:, 1]
+    rough = np.zeros(len(points), np.float32)
+    for number, (kx, ky, speed, steep) in enumerate(water.waves.astype(np.float32)):
+        rough += steep * np.sin(
+            kx * x + ky * y - np.float32(speed * time) + np.float32(2.4 * number)
+        )
+    away = np.asarray(eye, np.float32) - points
+    distance = np.linalg.norm(away, axis=1)
+    steepness = away[:, 2] / np.maximum(distance, 1e-6)
+    rough /= 1 + (distance / SMOOTH_AT) ** 2
+    # Schlick's approximation, with the share that water mirrors at right angles.
+    mirror = np.clip(0.04 + 0.96 * (1 - np.clip(steepness, 0, 1)) ** 4 + rough, 0, 1)[:, None]
+    glow = (
+        np.asarray(heaven.horizon, np.float32) * 0.75 + np.asarray(heaven.zenith, np.float32) * 0.25
+    )
+    deep = np.asarray(water.colour, np.float32) * (1 + 1.5 * rough[:, None])
+    return np.asarray((1 - mirror) * deep + mirror * glow, np.float32)
+
+
+def random_waves(rng: np.random.Generator, length: float, steepness: float) -> Floats:
+    """(7, 4) waves about one direction of the wind; `length` is of the longest, metres."""
+    heading = rng.uniform(0, 2 * np.pi)
+    lengths = length * 0.62 ** np.arange(7)
+    angle = heading + rng.normal(0, 0.6, 7)
+    number = 2 * np.pi / lengths
+    speed = np.sqrt(9.81 * number)
+    steep = steepness * rng.uniform(0.6, 1.4, 7) / np.sqrt(7)
+    return np.column_stack([number * np.cos(angle), number * np.sin(angle), speed, steep])
+
+
+def dimmed(light: Daylight) -> float:
+    """Share of the water's light that is lost where the lamp does not reach it."""
+    return 0.25 * float(np.mean(light.sun_colour)) / (float(np.mean(light.ambient)) + 0.2)
