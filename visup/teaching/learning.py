@@ -34,7 +34,9 @@ LEAST_AREA = 64
 
 _CLEAR_SHARE = 0.5  # of all sightings, the clearest are chosen from
 _STEADY = 3  # sightings before and after with which a size is compared
-_SIZE = 2.0  # how much twice the size counts against being at the other end of the picture
+_SIZE = 2.0  # body lengths that twice the size counts for
+_TIME = 0.4  # body lengths that all the time counts for: light changes
+_ALIKE = 0.25  # body lengths by which a further sighting differs at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,30 +199,32 @@ def _doubt(sighting: Sighting, around: NDArray[np.float64]) -> float:
 
 
 def spread(seen: Sequence[Sighting], most: int) -> list[Sighting]:
-    """A few sightings that differ most in time, place, size and form, in their order.
+    """A few sightings that differ most in place, size, form and time, in their order.
 
     The first is the one in the middle of all; each further one is as far as can be from those chosen.
+    What hardly differs from them is left out: a body that rests shows itself once or twice.
     """
     if not seen:
         return []
-    traits = np.array([_traits(s) for s in seen])
-    low, high = traits[:, :3].min(axis=0), traits[:, :3].max(axis=0)
-    traits[:, :3] = (traits[:, :3] - low) / np.maximum(high - low, 1e-9)
+    traits = _traits(seen)
     middle = np.median(traits, axis=0)
     chosen = [int(np.argmin(np.abs(traits - middle).sum(axis=1)))]
     while len(chosen) < min(most, len(seen)):
         gaps = np.abs(traits[:, None] - traits[chosen]).sum(axis=2).min(axis=1)
-        if gaps.max() <= 0:
+        if gaps.max() <= _ALIKE:
             break
         chosen.append(int(np.argmax(gaps)))
     return [seen[k] for k in sorted(chosen)]
 
 
-def _traits(sighting: Sighting) -> list[float]:
-    region = sighting.region
-    form = np.log2(region.bbox[2] / region.bbox[3])
-    size = _SIZE * np.log2(region.area) / 2
-    return [float(sighting.frame), *region.centroid, float(size), float(form)]
+def _traits(seen: Sequence[Sighting]) -> NDArray[np.float64]:
+    """In which sightings may differ: place in body lengths, size and form in doublings, share of time."""
+    areas = np.array([s.region.area for s in seen])
+    places = np.array([s.region.centroid for s in seen]) / np.sqrt(np.median(areas))
+    forms = np.log2([s.region.bbox[2] / s.region.bbox[3] for s in seen])
+    times = np.array([float(s.frame) for s in seen])
+    lasted = max(float(np.ptp(times)), 1.0)
+    return np.column_stack([places, np.log2(areas) / 2 * _SIZE, forms, _TIME * times / lasted])
 
 
 def _views(
