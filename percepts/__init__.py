@@ -8,8 +8,9 @@ Read in this order:
 4. `shape/`: what a region looks like: its silhouette matched against known models (section 4).
 5. `depth.py`: how far away a region is, from its size and its model's (section 7.4).
 6. `taught/`: things that a user has shown once, as they are kept.
+7. `appearance/`: these things, found and followed, at rest and in motion.
 
-`health`, `motion`, `shape` and `depth` are behaviours: each takes a frame and what was reported of it
-before, and reports percepts. None of them knows another but by percepts; `depth` alone also reads the
-model database.
+`health`, `motion`, `shape`, `depth` and `appearance` are behaviours: each takes a frame and what was
+reported of it before, and reports percepts. None of them knows another but by percepts; but `depth` also
+reads the model database, and `appearance` runs `motion` within it, in whose place it stands.
 """

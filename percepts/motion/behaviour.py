@@ -14,6 +14,20 @@ HARMED = frozenset(HealthStatus) - {HealthStatus.OK, HealthStatus.DROPPED}
 """Faults of the image itself; where frames are missing, those that come are sound."""
 
 
+def image_is_sound(observation: Observation) -> bool:
+    """Whether a frame shows what there is, as far as its health was looked at."""
+    return all(p.confidence >= 1.0 and p.value.status not in HARMED for p in _health(observation))
+
+
+def image_is_trusted(observation: Observation) -> bool:
+    """Whether what moves in a frame may be told: its health is OK, or nobody looked at it."""
+    return all(p.value.status is HealthStatus.OK for p in _health(observation))
+
+
+def _health(observation: Observation) -> list[Percept]:
+    return [p for r in observation.reports for p in r.percepts if p.kind == "health"]
+
+
 class MotionBehaviour:
     """Reports regions; nothing while the camera's image is not to be trusted.
 
@@ -41,6 +55,10 @@ class MotionBehaviour:
         for region in observation.of("region"):
             self._segmenter.used(region.id)
 
+    def new_id(self) -> int:
+        """An id that no region of this video has had, nor will have."""
+        return self._segmenter.new_id()
+
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
@@ -55,11 +73,10 @@ class MotionBehaviour:
         Returns:
             Percepts of kind 'region', by id.
         """
-        health = [p for r in observation.reports for p in r.percepts if p.kind == "health"]
         # Tracks live on over frames that are left out, but not over black ones taken for sight.
-        if any(p.confidence < 1.0 or p.value.status in HARMED for p in health):
+        if not image_is_sound(observation):
             return []
         regions = self._backward.step(frame, self._segmenter.step(frame, directives))
-        if any(p.value.status is not HealthStatus.OK for p in health):
+        if not image_is_trusted(observation):
             return []
         return [Percept("region", r, frame.time, self.contract.name, r.confidence) for r in regions]

@@ -118,6 +118,10 @@ class MotionSegmenter:
         """A region of this id was reported before: no other is given it."""
         self._ids.reserve(region_id)
 
+    def new_id(self) -> int:
+        """An id that no region has had, for what is seen by other means."""
+        return self._ids.new()
+
     def step(self, frame: Frame, directives: Sequence[Directive] = ()) -> tuple[Region, ...]:
         """Segment one frame.
 

@@ -11,6 +11,7 @@ from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer
+from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
@@ -154,7 +155,9 @@ def _limits(settings: WatchSettings, live: bool) -> Limits:
 def _behaviours(
     settings: WatchSettings, database: ModelDatabase | None, sizes_m: Mapping[str, float]
 ) -> list[Behaviour]:
-    seeing: list[Behaviour] = [HealthBehaviour(), MotionBehaviour()]
+    taught = database.taught if database is not None else ()
+    moving = AppearanceBehaviour(taught) if taught else MotionBehaviour()
+    seeing: list[Behaviour] = [HealthBehaviour(), moving]
     if database is not None:
         seeing += [
             ShapeBehaviour(database),

@@ -12,15 +12,12 @@ from scipy.spatial.distance import cdist
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
 from visup.render.meshes.spacecraft import mesh
 from visup.render.worlds import clutter, machines
-from visup.render.worlds.kinds.kind import cut_short, frames_until, spans
+from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, spans
 from visup.render.worlds.motion import clock, dropped, eased, posed, still
 from visup.render.worlds.scenery import (
     hall,
     meadow,
     pick_colour,
-    random_heaven,
-    random_imager,
-    random_light,
     seed_of,
     unlike,
 )
@@ -92,19 +89,21 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     if outcome == "in_progress":
         end = times.arrive + float(rng.uniform(1.5, 3.5))
         truth, frames = cut_short(truth, end), frames_until(end)
-    light = random_light(rng, np.asarray(view.position))
     surface = Surface("grain", 0.4, float(rng.uniform(0.05, 0.3)), seed_of(rng))
     things = [
         Thing("station", station, standing, STATION, surface),
         Thing("inspector", craft, poses, INSPECTOR, surface),
         *_surroundings(rng, radius),
     ]
-    return World(
-        name="", kind="inspect", things=tuple(things), viewpoint=view, light=light,
-        heaven=random_heaven(rng), imager=random_imager(rng, light), task="inspect_gap",
-        task_text=TASK.format(gap=limit, hold=HOLD_S),
-        actors={a: a for a in ("inspector", "station")}, course=truth, frames=frames, seed=seed_of(rng),
-    )  # fmt: skip
+    script = Script(
+        things,
+        view,
+        ("inspect_gap", TASK.format(gap=limit, hold=HOLD_S)),
+        ("inspector", "station"),
+        truth,
+        frames,
+    )
+    return finished(rng, "inspect", script)
 
 
 def _station(rng: np.random.Generator) -> tuple[Solid, float]:

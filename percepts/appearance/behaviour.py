@@ -1,0 +1,100 @@
+"""Taught things and what moves, as one behaviour: a region for each, and names for the taught ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.percepts.appearance.looks.scene import Scene, prepare_scene
+from visup.percepts.appearance.looks.thing_model import view_models
+from visup.percepts.appearance.output.explaining import shares, unexplained
+from visup.percepts.appearance.output.thing_region import confidence, thing_region
+from visup.percepts.appearance.tracking.track import Blob, ThingTrack
+from visup.percepts.appearance.tracking.tracker import ThingTracker
+from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
+from visup.percepts.taught.view import TaughtView
+
+SAME = 0.4  # overlap (IoU) at which what moves is a thing that is now known by name
+
+
+class AppearanceBehaviour:
+    """Reports taught things, at rest and in motion, and whatever else moves.
+
+    It takes the place of the behaviour that sees motion, which runs within it: a region that moves and
+    is mainly a taught thing is that thing, and not told twice.
+
+    Args:
+        taught: Views of things; several of one name add up.
+        motion: Finds what moves by itself.
+    """
+
+    contract = Contract("appearance", gives=("region", "hypothesis"))
+
+    def __init__(
+        self, taught: Sequence[TaughtView] = (), motion: MotionBehaviour | None = None
+    ) -> None:
+        self._motion = motion or MotionBehaviour()
+        self._tracker = ThingTracker(view_models(taught))
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        return {"motion": self._motion.save(), "tracker": self._tracker.save()}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a behaviour of the same settings remembered."""
+        self._motion.load(state["motion"])
+        self._tracker.load(state["tracker"])
+
+    def missed(self, observation: Observation) -> None:
+        """Take note of regions reported since the state that was taken on: their ids are used."""
+        self._motion.missed(observation)
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report the things and the other moving regions of one frame.
+
+        Args:
+            frame: The next frame.
+            observation: What was reported before of this frame; unless its health is OK beyond doubt,
+                nothing is reported.
+            directives: Those that seeing motion obeys.
+
+        Returns:
+            Percepts of kind 'region', by id, then of kind 'hypothesis'.
+        """
+        moving = [p.value for p in self._motion.perceive(frame, observation, directives)]
+        if not image_is_sound(observation):
+            return []
+        last = self._tracker.scene
+        scene = prepare_scene(frame.image, frame.time)
+        tracks = self._tracker.step(scene, lambda blob: self._id_of(blob, moving, scene))
+        if not image_is_trusted(observation):
+            return []
+        before = None if last is None else last.time
+        seen = [(t, thing_region(t, scene, before)) for t in tracks]
+        things = [(t, r) for t, r in seen if r is not None]
+        known = {t.id for t in tracks}
+        moving = [r for r in moving if r.id not in known]
+        others = unexplained(moving, [r for _, r in things], frame.size)
+        regions = sorted([*others, *(r for _, r in things)], key=lambda r: r.id)
+        return [
+            *(self._percept(frame, "region", r, r.confidence) for r in regions),
+            *(self._named(frame, t, r) for t, r in things),
+        ]
+
+    def _id_of(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:
+        """The id of a thing seen for the first time: that of the region that was seen to move there."""
+        known = {t.id for t in self._tracker.tracks}
+        same = [r for r in moving if r.id not in known and shares(r, blob, scene) > SAME]
+        return min((r.id for r in same), default=None) or self._motion.new_id()
+
+    def _percept(self, frame: Frame, kind: str, value: Any, sure: float) -> Percept:
+        return Percept(kind, value, frame.time, self.contract.name, sure)
+
+    def _named(self, frame: Frame, track: ThingTrack, region: Region) -> Percept:
+        sure = confidence(track)
+        number = self._tracker.view_number(track)
+        it = Hypothesis(region_id=region.id, name=track.name, view=number, similarity=sure)
+        return self._percept(frame, "hypothesis", it, sure)

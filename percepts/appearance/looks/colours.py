@@ -1,0 +1,118 @@
+"""Which colours are a thing's own, and which those of what surrounds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+_STEPS = 16  # of lightness and of each colour; 4096 bins
+# Shares of the pixels below which a colour says little. A colour never met, neither on the thing nor
+# around it, is rather that of something else that has come: it speaks against the thing, a little.
+_RARE, _STRANGE = np.float32(1 / 1500), np.float32(1 / 450)
+_CLIP = np.float32(3.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColourModel:
+    """Histograms over CIE Lab of a thing and of its surroundings.
+
+    Attributes:
+        thing: (4096,) float32, shares that add up to 1.
+        around: (4096,) float32, the same of what surrounds it.
+        table: (4096,) float32, log odds of the thing for each colour, -3 to 3.
+    """
+
+    thing: Floats
+    around: Floats
+    table: Floats
+
+    def odds(self, bins: NDArray[np.int32]) -> Floats:
+        """Log odds that pixels of these colours are the thing's.
+
+        Args:
+            bins: Any shape, as of `colour_bins`.
+        """
+        return self.table[bins]
+
+    def blended(self, other: ColourModel, thing: float, around: float) -> ColourModel:
+        """This model with a share of another's thing and surroundings."""
+        return colour_model(
+            self.thing * np.float32(1 - thing) + other.thing * np.float32(thing),
+            self.around * np.float32(1 - around) + other.around * np.float32(around),
+        )
+
+
+def colour_bins(lab: Bytes) -> NDArray[np.int32]:
+    """The bin of each pixel's colour.
+
+    Args:
+        lab: (..., 3) uint8, CIE Lab as OpenCV codes it.
+
+    Returns:
+        (...) int32, 0 to 4095. Colours are told apart finely near grey, where most are.
+    """
+    bins = _LIGHT[lab[..., 0]]
+    bins += _GREEN[lab[..., 1]]
+    bins += _BLUE[lab[..., 2]]
+    return bins
+
+
+def colour_model(thing: Floats, around: Floats) -> ColourModel:
+    """The model that follows from two histograms."""
+    table = np.log((thing + _RARE) / (around + _STRANGE))
+    return ColourModel(thing, around, np.clip(table, -_CLIP, _CLIP).astype(np.float32))
+
+
+def learn_colours(lab: Bytes, thing: Floats, around: Floats) -> ColourModel:
+    """The colours of a patch.
+
+    Args:
+        lab: (h, w, 3) uint8, CIE Lab.
+        thing: (h, w) float32, how much each pixel is the thing's.
+        around: (h, w) float32, how much each pixel is of its surroundings.
+    """
+    bins = colour_bins(lab).ravel()
+    return colour_model(_histogram(bins, thing.ravel()), _histogram(bins, around.ravel()))
+
+
+def summed_colours(models: list[ColourModel]) -> ColourModel:
+    """The colours of several views of one thing."""
+    share = np.float32(1 / len(models))
+    thing = reduce(np.add, [m.thing for m in models]) * share
+    return colour_model(thing, reduce(np.add, [m.around for m in models]) * share)
+
+
+def _histogram(bins: NDArray[np.int32], weights: Floats) -> Floats:
+    counts = np.bincount(bins, weights, minlength=_STEPS**3).reshape((_STEPS,) * 3)
+    binned: Floats = counts.astype(np.float32)
+    for axis in range(3):
+        # Light and noise shift a colour to the bins beside its own.
+        flat = np.moveaxis(binned, axis, 0).reshape(_STEPS, -1)
+        smooth = cv2.filter2D(
+            np.ascontiguousarray(flat), -1, _KERNEL, borderType=cv2.BORDER_REPLICATE
+        )
+        binned = np.moveaxis(np.asarray(smooth, dtype=np.float32).reshape((_STEPS,) * 3), 0, axis)
+    total = binned.sum()
+    return np.ascontiguousarray(binned / max(total, np.float32(1e-6)), dtype=np.float32).ravel()
+
+
+_KERNEL = np.array([[0.2], [0.6], [0.2]], dtype=np.float32)
+
+
+def _chroma_steps() -> NDArray[np.int32]:
+    away = np.abs(np.arange(256) - 128.0)
+    steps = np.minimum(np.sqrt(away / 64) * (_STEPS / 2), _STEPS / 2 - 0.01)
+    signed = np.where(np.arange(256) < 128, -steps, steps)
+    return np.asarray(np.clip(np.floor(signed + _STEPS / 2), 0, _STEPS - 1), dtype=np.int32)
+
+
+_LIGHT = (np.arange(256) // (256 // _STEPS)).astype(np.int32) * np.int32(_STEPS**2)
+_GREEN = _chroma_steps() * np.int32(_STEPS)
+_BLUE = _chroma_steps()

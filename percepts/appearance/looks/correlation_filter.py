@@ -1,0 +1,137 @@
+"""Where a thing is, from a filter learned on what it looks like and what surrounds it.
+
+A discriminative correlation filter with spatial reliability (Lukezic et al., CSR-DCF, 2017): one
+filter for each channel of features, allowed to use only cells that show the thing, found by
+alternating between the frequency domain, where the filter fits, and space, where it is cut to the mask.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Spectrum = NDArray[np.complex64]
+
+_ROUNDS = 4
+_PENALTY, _GROWTH = np.float32(5.0), np.float32(3.0)
+_RIDGE = np.float32(0.01)
+_SHARP = 0.06  # width of the wanted peak, of the thing's size in cells
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorrelationFilter:
+    """A filter as it was learned.
+
+    Attributes:
+        spectrum: (channels, h, w // 2 + 1) complex64.
+        weights: (channels,) float32, how much each channel is trusted; they add up to 1.
+        peak: Height of the response where it was learned.
+    """
+
+    spectrum: Spectrum
+    weights: Floats
+    peak: float
+
+    def blended(self, other: CorrelationFilter, share: float) -> CorrelationFilter:
+        """This filter with a share of another."""
+        keep, new = np.float32(1 - share), np.float32(share)
+        return CorrelationFilter(
+            self.spectrum * keep + other.spectrum * new,
+            self.weights * keep + other.weights * new,
+            self.peak * (1 - share) + other.peak * share,
+        )
+
+    def response(self, features: Floats) -> Floats:
+        """How much each shift of a patch looks like the thing.
+
+        Args:
+            features: (channels, h, w) float32.
+
+        Returns:
+            (h, w) float32, shift 0 in the middle; about 1 where the thing is as it was learned.
+        """
+        spectrum = _forward(windowed(features)) * np.conj(self.spectrum)
+        summed = np.asarray(np.tensordot(self.weights, spectrum, 1), dtype=np.complex64)
+        raw = _backward(summed, features.shape[1:])
+        return np.asarray(np.fft.fftshift(raw) / np.float32(self.peak), dtype=np.float32)
+
+
+def windowed(features: Floats) -> Floats:
+    """Features faded out towards the border, for what lies beyond it is not what follows."""
+    rows, cols = features.shape[1:]
+    fade = np.outer(np.hanning(rows + 2)[1:-1], np.hanning(cols + 2)[1:-1])
+    return features * fade.astype(np.float32)
+
+
+def learn_filter(features: Floats, mask: Floats, size: float) -> CorrelationFilter:
+    """The filter that answers where the thing is and nowhere else in a patch.
+
+    Args:
+        features: (channels, h, w) float32, the thing in the middle.
+        mask: (h, w) float32, 0 to 1, the cells that show the thing.
+        size: Of the thing, cells: it gives the width of the peak.
+
+    Returns:
+        The filter.
+    """
+    shape = features.shape[1:]
+    f = _forward(windowed(features))
+    wanted = _forward(_label(shape, max(_SHARP * size, 0.7)))
+    cross, power = f * np.conj(wanted), (f * np.conj(f)).real
+    spectrum = cross / (power + _RIDGE)
+    cut = _forward(mask * _backward(spectrum, shape))
+    multiplier = np.zeros_like(cut)
+    penalty = _PENALTY
+    ridge = _RIDGE / np.float32(2 * shape[0] * shape[1])
+    for _ in range(_ROUNDS):
+        spectrum = (cross + penalty * cut - multiplier) / (power + penalty)
+        held = _backward(multiplier + penalty * spectrum, shape) / (ridge + penalty)
+        cut = _forward(mask * held)
+        multiplier = multiplier + penalty * (spectrum - cut)
+        penalty = penalty * _GROWTH
+    answers = _backward(f * np.conj(cut), shape)
+    weights = np.maximum(answers[:, 0, 0], np.float32(1e-4))
+    weights = weights / weights.sum()
+    peak = float(weights @ answers[:, 0, 0])
+    return CorrelationFilter(cut, weights.astype(np.float32), max(peak, 1e-4))
+
+
+def peak_of(response: Floats) -> tuple[float, float, float]:
+    """The highest point of a response, between its cells.
+
+    Args:
+        response: (h, w) float32, shift 0 in the middle.
+
+    Returns:
+        (dx, dy) in cells, and its height.
+    """
+    rows, cols = response.shape
+    r, c = divmod(int(response.argmax()), cols)
+    dx = _between(response[r, (c - 1) % cols], response[r, c], response[r, (c + 1) % cols])
+    dy = _between(response[(r - 1) % rows, c], response[r, c], response[(r + 1) % rows, c])
+    return c + dx - cols // 2, r + dy - rows // 2, float(response[r, c])
+
+
+def _between(before: np.float32, at: np.float32, after: np.float32) -> float:
+    bend = float(before) - 2 * float(at) + float(after)
+    return (
+        0.0 if bend >= -1e-9 else float(np.clip((float(before) - float(after)) / 2 / bend, -1, 1))
+    )
+
+
+def _label(shape: tuple[int, ...], sigma: float) -> Floats:
+    rows, cols = (np.fft.fftfreq(n) * n for n in shape)
+    square = rows[:, None] ** 2 + cols[None] ** 2
+    return np.exp(-square / (2 * sigma**2)).astype(np.float32)
+
+
+def _forward(values: Floats) -> Spectrum:
+    return np.asarray(scipy.fft.rfft2(values), dtype=np.complex64)
+
+
+def _backward(values: Spectrum, shape: tuple[int, ...]) -> Floats:
+    return np.asarray(scipy.fft.irfft2(values, s=shape), dtype=np.float32)

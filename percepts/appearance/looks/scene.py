@@ -1,0 +1,79 @@
+"""A frame as taught things are looked for in it: of bounded size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from visup.percepts.appearance.looks.pose import Bytes, PatchPose, cut_patch
+
+WORK_SIZE = 640
+"""Longer side of the picture in which things are looked for, pixels at most."""
+
+_LEVELS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """One frame at working size.
+
+    Attributes:
+        time: Seconds.
+        lab: Pictures in CIE Lab, (h, w, 3) uint8, each half as large as the one before, as far as
+            somebody has asked for them.
+        grey: (h, w) uint8.
+        frame_size: (width, height) of the frame, pixels.
+    """
+
+    time: float
+    lab: list[Bytes]
+    grey: Bytes
+    frame_size: tuple[int, int]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), working pixels."""
+        return self.grey.shape[1], self.grey.shape[0]
+
+    @property
+    def scale(self) -> float:
+        """Working pixels per pixel of the frame."""
+        return float(self.grey.shape[1] / self.frame_size[0])
+
+    def patch(self, pose: PatchPose, shape: tuple[int, ...]) -> Bytes:
+        """(height, width, 3) uint8, Lab: what a pose shows, from the picture of fitting fineness."""
+        level = int(np.clip(np.round(np.log2(max(pose.scale, 1e-3))), 0, _LEVELS - 1))
+        while level >= len(self.lab) and min(self.lab[-1].shape[:2]) >= 16:
+            self.lab.append(np.asarray(cv2.pyrDown(self.lab[-1]), dtype=np.uint8))
+        level = min(level, len(self.lab) - 1)
+        by = 2.0**-level
+        at = PatchPose(
+            (pose.x + 0.5) * by - 0.5, (pose.y + 0.5) * by - 0.5, pose.scale * by, pose.angle
+        )
+        return np.asarray(cut_patch(self.lab[level], at, shape), dtype=np.uint8)
+
+
+def prepare_scene(image: Bytes, time: float) -> Scene:
+    """A frame at working size.
+
+    Args:
+        image: (H, W), (H, W, 1) or (H, W, 3) uint8, BGR.
+        time: Seconds.
+    """
+    if image.ndim == 2 or image.shape[2] == 1:
+        image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    height, width = image.shape[:2]
+    small = work_scale((width, height))
+    if small < 1:
+        size = max(1, round(width * small)), max(1, round(height * small))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    lab = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), dtype=np.uint8)
+    grey = np.ascontiguousarray(lab[..., 0])
+    return Scene(time, [lab], grey, (width, height))
+
+
+def work_scale(size: tuple[int, int]) -> float:
+    """Working pixels per pixel of a frame of (width, height)."""
+    return min(1.0, WORK_SIZE / max(size))

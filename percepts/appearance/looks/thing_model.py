@@ -1,0 +1,151 @@
+"""What is known of a thing from the views that a user has shown: patch, mask, colours, filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.colours import ColourModel, colour_bins, learn_colours
+from visup.percepts.appearance.looks.correlation_filter import CorrelationFilter, learn_filter
+from visup.percepts.appearance.looks.features import CELL, cell_features
+from visup.percepts.appearance.looks.pose import PatchPose
+from visup.percepts.appearance.looks.scene import Scene, prepare_scene, work_scale
+from visup.percepts.taught.view import TaughtView
+
+Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+SIDE = 44.0  # side of a thing in its patch, pixels, if it were square
+LONGEST = 104.0  # most pixels of its longer side
+AROUND = 1.15  # how much of its surroundings a patch shows, of its side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Appearance:
+    """What one view shows of a thing, as a patch with the thing in the middle.
+
+    Attributes:
+        lab: (h, w, 3) uint8, CIE Lab.
+        mask: (h, w) float32, 0 to 1, the thing.
+        colours: Its colours and those around it.
+        filter: Learned where it is.
+    """
+
+    lab: Bytes
+    mask: Floats
+    colours: ColourModel
+    filter: CorrelationFilter
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width) of the patch."""
+        return self.lab.shape[0], self.lab.shape[1]
+
+    @property
+    def area(self) -> float:
+        """Of the thing, pixels of the patch."""
+        return float(self.mask.sum())
+
+    @property
+    def radius(self) -> float:
+        """Half the side of a square as large as the thing, pixels of the patch."""
+        return 0.5 * float(np.sqrt(self.area))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewModel:
+    """An appearance with where it was shown.
+
+    Attributes:
+        name: Of the thing.
+        appearance: What the view shows.
+        pose: Where it was, working pixels of the picture in which it was shown.
+        size: (width, height) of that picture, working pixels.
+        scene: (H, W, 3) uint8, BGR: that picture, small.
+    """
+
+    name: str
+    appearance: Appearance
+    pose: PatchPose
+    size: tuple[int, int]
+    scene: Bytes
+
+
+def view_models(views: Sequence[TaughtView]) -> tuple[ViewModel, ...]:
+    """The models of taught views, in their order."""
+    return tuple(_view_model(v) for v in views)
+
+
+def _view_model(view: TaughtView) -> ViewModel:
+    small = work_scale(view.frame_size)
+    scene = _part_scene(view.image, small)
+    x, y, w, h = cv2.boundingRect(view.mask.astype(np.uint8))
+    pose, shape = _fitted((x * small, y * small, w * small, h * small))
+    mask = _mask_patch(view.mask, pose, shape, small)
+    by = small
+    origin = view.origin[0] * by, view.origin[1] * by
+    placed = PatchPose(pose.x + origin[0], pose.y + origin[1], pose.scale)
+    size = round(view.frame_size[0] * by), round(view.frame_size[1] * by)
+    return ViewModel(
+        view.name, learn_appearance(scene.patch(pose, shape), mask), placed, size, view.scene
+    )
+
+
+def _part_scene(image: Bytes, small: float) -> Scene:
+    if small < 1:
+        size = max(1, round(image.shape[1] * small)), max(1, round(image.shape[0] * small))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return prepare_scene(image, 0.0)
+
+
+def _fitted(box: tuple[float, float, float, float]) -> tuple[PatchPose, tuple[int, int]]:
+    """The pose and the size of the patch that shows a box and some of its surroundings."""
+    x, y, w, h = box
+    side = float(np.sqrt(w * h))
+    by = min(SIDE / side, LONGEST / max(w, h))
+    around = AROUND * side * by
+    width, height = (int(np.ceil((v * by + around) / CELL)) * CELL for v in (w, h))
+    return PatchPose(x + (w - 1) / 2, y + (h - 1) / 2, 1 / by), (height, width)
+
+
+def _mask_patch(
+    mask: NDArray[np.bool_], pose: PatchPose, shape: tuple[int, int], small: float
+) -> Floats:
+    whole = PatchPose(
+        (pose.x + 0.5) / small - 0.5, (pose.y + 0.5) / small - 0.5, pose.scale / small
+    )
+    soft = np.asarray(mask, dtype=np.float32)
+    if whole.scale > 1.5:
+        soft = np.asarray(cv2.GaussianBlur(soft, (0, 0), whole.scale / 2.5), dtype=np.float32)
+    matrix = whole.matrix(shape)
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(
+        cv2.warpAffine(soft, matrix, shape[::-1], flags=flags, borderMode=cv2.BORDER_CONSTANT),
+        dtype=np.float32,
+    )
+
+
+def learn_appearance(lab: Bytes, mask: Floats) -> Appearance:
+    """All that follows from a patch and its mask."""
+    colours = learn_colours(lab, mask, surroundings(mask))
+    return Appearance(lab, mask, colours, learned_filter(lab, mask, colours))
+
+
+def surroundings(mask: Floats) -> Floats:
+    """(h, w) float32: how much each pixel of a patch is surely not the thing."""
+    near = cv2.dilate(mask, np.ones((5, 5), np.uint8))
+    return np.asarray(1 - near, dtype=np.float32)
+
+
+def learned_filter(lab: Bytes, mask: Floats, colours: ColourModel) -> CorrelationFilter:
+    """The filter of a patch with the thing in the middle."""
+    features = cell_features(lab, colours.odds(colour_bins(lab)))
+    rows, cols = features.shape[1:]
+    support = cv2.resize(mask, (cols, rows), interpolation=cv2.INTER_AREA)
+    support = np.asarray(cv2.dilate(support, np.ones((3, 3), np.uint8)), dtype=np.float32)
+    size = float(np.sqrt(max((support > 0.3).sum(), 1)))
+    return learn_filter(features, (support > 0.25).astype(np.float32), size)

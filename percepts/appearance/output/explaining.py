@@ -1,0 +1,127 @@
+"""Which moving regions are taught things, seen once more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent import Region
+from visup.agent.model.fast_replace import replace
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.tracking.track import Blob
+from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
+
+SMALL = 384  # longer side of the picture in which regions are compared, pixels
+RIM = 0.12  # how far a moving region may lie beyond the outline of a thing, of the thing's side
+MAINLY = 0.5  # share of a region that a thing explains
+LEFT = 0.35  # least share of a region that is left when it is reported without the thing
+LEAST = 0.0004  # of the picture, that is left
+
+Mask = NDArray[np.bool_]
+
+
+def unexplained(
+    moving: Sequence[Region], things: Sequence[Region], size: tuple[int, int]
+) -> tuple[Region, ...]:
+    """The moving regions that no thing explains, each without the pixels that things have.
+
+    Args:
+        moving: Found by their motion.
+        things: Taught things in view.
+        size: (width, height) of the frame.
+    """
+    if not moving or not things:
+        return tuple(moving)
+    near = _near(things, size)
+    out = []
+    for region in moving:
+        left = _rest_of(region, things, near, size)
+        if left is not None:
+            out.append(left)
+    return tuple(out)
+
+
+def shares(region: Region, blob: Blob, scene: Scene) -> float:
+    """How much a region and a blob have in common (IoU).
+
+    Args:
+        region: In frame pixels.
+        blob: In working pixels of the scene.
+        scene: Gives the scale.
+    """
+    here = np.zeros(scene.size[::-1], dtype=bool)
+    left, top, right, bottom = blob.window
+    here[top:bottom, left:right] = blob.mask
+    there = _small(region, (here.shape[0], here.shape[1]), scene.scale)
+    both, either = int(np.sum(here & there)), int(np.sum(here | there))
+    return both / max(either, 1)
+
+
+def _near(things: Sequence[Region], size: tuple[int, int]) -> tuple[Mask, float]:
+    """(h, w) bool: on a thing or at its rim, in a small picture; and the scale of that picture."""
+    scale = min(1.0, SMALL / max(size))
+    shape = max(1, round(size[1] * scale)), max(1, round(size[0] * scale))
+    out = np.zeros(shape, dtype=bool)
+    for r in things:
+        side = float(np.sqrt(r.area)) * scale
+        reach = 2 * max(1, round(RIM * side)) + 1
+        mask = _small(r, shape, scale)
+        grown = cv2.dilate(mask.view(np.uint8), np.ones((reach, reach), np.uint8))
+        out |= np.asarray(grown) > 0
+    return out, scale
+
+
+def _small(region: Region, shape: tuple[int, int], scale: float) -> Mask:
+    x, y, w, h = region.bbox
+    x0, y0 = min(int(x * scale), shape[1] - 1), min(int(y * scale), shape[0] - 1)
+    x1 = min(max(x0 + 1, round((x + w) * scale)), shape[1])
+    y1 = min(max(y0 + 1, round((y + h) * scale)), shape[0])
+    out = np.zeros(shape, dtype=bool)
+    part = cv2.resize(region.mask.view(np.uint8), (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
+    out[y0:y1, x0:x1] = np.asarray(part) > 0
+    return out
+
+
+def _rest_of(
+    region: Region,
+    things: Sequence[Region],
+    near: tuple[Mask, float],
+    size: tuple[int, int],
+) -> Region | None:
+    """What of a region is left beside the things; None when that is nothing of its own."""
+    covered, scale = near
+    small = _small(region, (covered.shape[0], covered.shape[1]), scale)
+    share = float(np.mean(covered[small]))
+    if share == 0.0:
+        return region
+    if share >= MAINLY:
+        return None
+    left = region.mask.copy()
+    for r in things:
+        _take(left, region.bbox, r)
+    # What is left of the rim is not worth telling.
+    mask = clean_mask(left, LEAST * size[0] * size[1])
+    if mask is None or np.count_nonzero(mask) < LEFT * region.area:
+        return None
+    o = describe_mask(mask, region.bbox[:2], size)
+    return replace(
+        region,
+        bbox=o.bbox,
+        mask=o.mask,
+        contour=o.contour,
+        centroid=o.centroid,
+        area=o.area,
+        cut=o.cut,
+    )
+
+
+def _take(left: Mask, bbox: tuple[int, int, int, int], thing: Region) -> None:
+    """Take a thing's pixels from a mask in place."""
+    x, y, w, h = bbox
+    u, v, n, m = thing.bbox
+    x0, y0, x1, y1 = max(x, u), max(y, v), min(x + w, u + n), min(y + h, v + m)
+    if x1 > x0 and y1 > y0:
+        left[y0 - y : y1 - y, x0 - x : x1 - x] &= ~thing.mask[y0 - v : y1 - v, x0 - u : x1 - u]

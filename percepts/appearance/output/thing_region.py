@@ -1,0 +1,90 @@
+"""The region of a taught thing, at the full size of the frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from visup.agent import Region
+from visup.percepts.appearance.looks.pose import Doubles
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
+from visup.percepts.motion.outlines.region_outline import describe_mask
+
+OVER_S = 0.2  # over which a velocity is taken, seconds
+JITTER_PX = 0.5  # working pixels by which a pose is off
+LEAST_SIGMA = 0.5  # pixels per second
+
+
+def thing_region(track: ThingTrack, scene: Scene, last: float | None) -> Region | None:
+    """What is reported of a thing in a frame.
+
+    Args:
+        track: The thing.
+        scene: The frame.
+        last: Time of the frame before, seconds; None when there was none.
+
+    Returns:
+        Its region in frame pixels, None when nothing of it is seen.
+    """
+    if track.visible is None:
+        return None
+    size = scene.frame_size
+    mask, origin = _enlarged(track.visible, scene)
+    if not mask.any():
+        return None
+    shape = describe_mask(mask, origin, size)
+    velocity, sigma = _velocity(track, scene.scale, shape.centroid)
+    region = shape.region(track.id, velocity, sigma, confidence(track))
+    return replace(region, motion=_motion(track, scene.scale, last), visible_since=track.since)
+
+
+def confidence(track: ThingTrack) -> float:
+    """How sure it is that this is the thing: it was recognised, and looks as it should now."""
+    return float(0.7 + 0.3 * np.clip(track.peak, 0, 1) * track.explained)
+
+
+def _enlarged(
+    blob: Blob, scene: Scene
+) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.bool_]], tuple[int, int]]:
+    """A mask of the working picture in frame pixels, and its corner there."""
+    width, height = scene.frame_size
+    if scene.size == scene.frame_size:
+        return blob.mask, blob.window[:2]
+    by = width / scene.size[0], height / scene.size[1]
+    left, top, right, bottom = blob.window
+    x0, y0 = round(left * by[0]), round(top * by[1])
+    x1, y1 = min(round(right * by[0]), width), min(round(bottom * by[1]), height)
+    soft = blob.mask.astype(np.float32)
+    return np.asarray(cv2.resize(soft, (x1 - x0, y1 - y0)) > 0.5), (x0, y0)
+
+
+def _velocity(
+    track: ThingTrack, scale: float, at: tuple[float, float]
+) -> tuple[tuple[float, float], float]:
+    """(vx, vy) of a point of a thing and its standard deviation, frame pixels per second."""
+    if len(track.path) < 2:
+        return (0.0, 0.0), 0.0
+    now, pose = track.path[-1]
+    before = next(p for p in track.path if now - p[0] <= OVER_S + 1e-6)
+    span = now - before[0]
+    if span <= 0:
+        return (0.0, 0.0), 0.0
+    sigma = max(JITTER_PX / scale / span, LEAST_SIGMA)
+    if track.state is State.RESTING:
+        return (0.0, 0.0), sigma
+    back = pose.motion_to(before[1])
+    x, y = at[0] * scale, at[1] * scale
+    was = back[:, :2] @ (x, y) + back[:, 2]
+    return (float((x - was[0]) / scale / span), float((y - was[1]) / scale / span)), sigma
+
+
+def _motion(track: ThingTrack, scale: float, last: float | None) -> Doubles | None:
+    """(2, 3) affine from the frame before to this one, frame pixels."""
+    if last is None or len(track.path) < 2 or track.path[-2][0] < last - 1e-6:
+        return None
+    out = track.path[-2][1].motion_to(track.path[-1][1])
+    out[:, 2] /= scale
+    return out

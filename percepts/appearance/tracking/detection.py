@@ -1,0 +1,139 @@
+"""Looking for a thing in the whole picture, at several sizes and turns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.colours import colour_bins
+from visup.percepts.appearance.looks.pose import PatchPose
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.looks.thing_model import Appearance
+from visup.percepts.appearance.tracking.verification import OWN, Match, verify
+
+Floats = NDArray[np.float32]
+
+COARSE = 13.0  # side of a thing when the whole picture is searched, pixels
+_MOST = 6  # places that are looked at closely
+_EACH = 3  # of one size and turn
+
+
+def search(
+    scene: Scene, it: Appearance, poses: Sequence[PatchPose], most: int = _MOST
+) -> list[Match]:
+    """The places that look most like a thing.
+
+    Args:
+        scene: The frame.
+        it: What the thing looks like.
+        poses: Sizes and turns to try; where they are does not matter.
+        most: Places that are looked at closely.
+
+    Returns:
+        The best first.
+    """
+    found = [c for p in poses for c in _coarse(scene, it, p)]
+    found.sort(key=lambda c: c[0])
+    places: list[PatchPose] = []
+    for _, pose in found:
+        if len(places) < most and not any(_alike(pose, p, it.radius) for p in places):
+            places.append(pose)
+    matches = [verify(scene, it, p) for p in places]
+    return sorted(matches, key=lambda m: -m.score)
+
+
+def colour_peaks(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[float, PatchPose]]:
+    """Where a thing's colours are gathered, whatever its shape: for what has bent or turned.
+
+    Args:
+        scene: The frame.
+        it: What the thing looked like.
+        pose: Its size and turn; where it is does not matter.
+
+    Returns:
+        The two best places: how much more of its colours they have than what is around, and the pose.
+    """
+    small = min(1.0, COARSE / (2 * it.radius * pose.scale))
+    width, height = scene.size
+    size = max(8, round(width * small)), max(8, round(height * small))
+    picture = np.asarray(cv2.resize(scene.lab[0], size, interpolation=cv2.INTER_AREA), np.uint8)
+    own = (it.colours.odds(colour_bins(picture)) > OWN).astype(np.float32)
+    at, inside, around = _gathering(it, pose, small)
+    off = own.mean()
+    more = cv2.filter2D(own - off, -1, inside - around, borderType=cv2.BORDER_CONSTANT)
+    reach = max(2, round(0.6 * COARSE))
+    out = []
+    for _ in range(2):
+        y, x = divmod(int(more.argmax()), more.shape[1])
+        place = (x + at[0] + 0.5) / small - 0.5, (y + at[1] + 0.5) / small - 0.5
+        out.append((float(more[y, x]), PatchPose(place[0], place[1], pose.scale, pose.angle)))
+        more[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = -1
+    return out
+
+
+def _gathering(
+    it: Appearance, pose: PatchPose, small: float
+) -> tuple[tuple[float, float], Floats, Floats]:
+    """Weights within a thing and around it, each adding up to 1, and the patch's middle in them."""
+    _, mask, middle = _small_template(it, pose, small)
+    wide = np.pad(mask, 5)
+    soft = cv2.GaussianBlur(wide, (0, 0), 1.5)
+    ring = cv2.dilate(wide, np.ones((9, 9), np.uint8)) - cv2.dilate(wide, np.ones((3, 3), np.uint8))
+    inside = np.asarray(soft / max(float(soft.sum()), 1e-6), dtype=np.float32)
+    around = np.asarray(ring / max(float(ring.sum()), 1e-6), dtype=np.float32)
+    h, w = wide.shape
+    return (middle[0] + 5 - w // 2, middle[1] + 5 - h // 2), inside, around
+
+
+def _alike(a: PatchPose, b: PatchPose, radius: float) -> bool:
+    """Whether looking closely at one place finds the other."""
+    near = a.apart(b, 0) <= 0.4 * radius * a.scale + abs(a.scale - b.scale)
+    return near and abs(a.angle - b.angle) < 0.3 and 0.8 < a.scale / b.scale < 1.25
+
+
+def _coarse(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[float, PatchPose]]:
+    """Places of one size and turn by colour alone: (mean squared difference, pose)."""
+    side = float(np.sqrt(it.mask.sum())) * pose.scale
+    small = min(1.0, COARSE / side)
+    width, height = scene.size
+    size = max(8, round(width * small)), max(8, round(height * small))
+    picture = cv2.resize(scene.lab[0], size, interpolation=cv2.INTER_AREA)
+    template, mask, middle = _small_template(it, pose, small)
+    h, w = mask.shape
+    if h >= size[1] or w >= size[0]:
+        return []
+    count = float(mask.sum())
+    off = cv2.matchTemplate(picture, template, cv2.TM_SQDIFF, mask=np.repeat(mask[..., None], 3, 2))
+    off = np.nan_to_num(off / np.float32(3 * max(count, 1.0)), nan=1e6, posinf=1e6)
+    out = []
+    for _ in range(_EACH):
+        y, x = divmod(int(off.argmin()), off.shape[1])
+        value = float(off[y, x])
+        at = (x + middle[0] + 0.5) / small - 0.5, (y + middle[1] + 0.5) / small - 0.5
+        out.append((value, PatchPose(at[0], at[1], pose.scale, pose.angle)))
+        off[max(0, y - h // 3) : y + h // 3 + 1, max(0, x - w // 3) : x + w // 3 + 1] = 1e6
+    return out
+
+
+def _small_template(
+    it: Appearance, pose: PatchPose, small: float
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], tuple[float, float]]:
+    """The thing as it would show at a scale and turn, cropped: picture, mask, its patch's middle."""
+    by = pose.scale * small
+    reach = int(np.ceil(np.hypot(*it.shape) * by / 2)) + 1
+    at = PatchPose(reach, reach, by, pose.angle)
+    matrix = at.matrix(it.shape)
+    lab = it.lab if by > 0.7 else cv2.GaussianBlur(it.lab, (0, 0), 0.4 / by)
+    mask = it.mask if by > 0.7 else cv2.GaussianBlur(it.mask, (0, 0), 0.4 / by)
+    size = (2 * reach + 1, 2 * reach + 1)
+    lab = cv2.warpAffine(lab, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    mask = cv2.warpAffine(mask, matrix, size, flags=cv2.INTER_LINEAR)
+    x, y, w, h = cv2.boundingRect((mask > 0.4).astype(np.uint8))
+    if w == 0 or h == 0:
+        x, y, w, h = reach, reach, 1, 1
+    part = np.s_[y : y + h, x : x + w]
+    sure = np.asarray(mask[part] > 0.4, dtype=np.float32)
+    return np.ascontiguousarray(lab[part]), sure, (reach - x, reach - y)

@@ -1,0 +1,89 @@
+"""How a thing looks now, learned while it moves, and what is remembered while it rests."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.colours import learn_colours
+from visup.percepts.appearance.looks.pose import Window, cut_patch
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.looks.thing_model import Appearance, learned_filter, surroundings
+from visup.percepts.appearance.tracking.track import Blob, RestMemory, State, ThingTrack
+
+Floats = NDArray[np.float32]
+
+SURE_PEAK, SURE_SHARE = 0.4, 0.5  # below these one does not learn: it may be something else
+SURE_COLOURS = 0.35
+GROW_RATE, SHRINK_RATE = 0.08, 0.05
+PIXEL_RATE, FILTER_RATE = 0.12, 0.04
+COLOUR_RATE, AROUND_RATE = 0.02, 0.1
+PATH_S = 0.4
+REST_SHARE = 0.7  # of `PATH_S` that a thing must have been followed to be seen to rest
+STILL_PX, STILL_SHARE = 0.6, 0.01  # what a thing at rest may seem to move, and of its size
+
+
+def learned(
+    track: ThingTrack, scene: Scene, claim: tuple[Window, Floats], blob: Blob
+) -> ThingTrack:
+    """A thing with how it looks now.
+
+    Args:
+        track: A thing that moves.
+        scene: The frame.
+        claim: Its window and log odds before others had their share.
+        blob: The pixels that it won.
+    """
+    it, pose = track.looks, track.pose
+    sure = track.peak >= SURE_PEAK and track.explained >= SURE_SHARE
+    if it is None or pose is None or not (sure or track.colours >= SURE_COLOURS):
+        return track
+    lab = scene.patch(pose, it.shape)
+    seen = _in_patch(blob.window, blob.mask, track, scene)
+    # What another thing has won tells nothing of the shape.
+    taken = _in_patch(claim[0], claim[1] > 0, track, scene) - seen
+    rate = np.where(seen > it.mask, GROW_RATE, SHRINK_RATE) * np.clip(1 - taken, 0, 1)
+    mask = (it.mask + rate * (seen - it.mask)).astype(np.float32)
+    share = (np.float32(PIXEL_RATE) * seen)[..., None]
+    pixels = np.round(it.lab + share * (lab.astype(np.float32) - it.lab)).astype(np.uint8)
+    now = learn_colours(lab, seen * it.mask, surroundings(np.maximum(it.mask, seen)))
+    colours = it.colours.blended(now, COLOUR_RATE, AROUND_RATE)
+    support = it.mask * np.clip(seen * 2, np.float32(0.3), 1)
+    new = learned_filter(lab, support.astype(np.float32), colours)
+    return replace(
+        track, looks=Appearance(pixels, mask, colours, it.filter.blended(new, FILTER_RATE))
+    )
+
+
+def _in_patch(window: Window, mask: NDArray[np.bool_], track: ThingTrack, scene: Scene) -> Floats:
+    """(h, w) float32: a mask of the picture as the thing's patch shows it."""
+    assert track.looks is not None
+    assert track.pose is not None
+    left, top, right, bottom = window
+    whole = np.zeros(scene.size[::-1], dtype=np.float32)
+    whole[top:bottom, left:right] = mask
+    return np.asarray(cut_patch(whole, track.pose, track.looks.shape), dtype=np.float32)
+
+
+def rested(track: ThingTrack, scene: Scene, first: bool) -> ThingTrack:
+    """A thing that was seen not to move for a while is at rest, as it is.
+
+    Args:
+        track: A thing that moves, as far as is known.
+        scene: The frame.
+        first: Whether it is the first frame: what is there is taken to rest.
+    """
+    it, pose = track.looks, track.pose
+    if it is None or pose is None or track.visible is None or not track.path:
+        return track
+    if not first and scene.time - track.path[0][0] < REST_SHARE * PATH_S:
+        return track
+    radius = it.radius
+    off = max(p.apart(pose, radius) for _, p in track.path)
+    if off > STILL_PX + STILL_SHARE * radius * pose.scale:
+        return track
+    left, top, right, bottom = track.visible.window
+    memory = RestMemory(track.visible, scene.lab[0][top:bottom, left:right].copy())
+    return replace(track, state=State.RESTING, rest=memory)

@@ -1,0 +1,132 @@
+"""Where points of a frame went: on things, and on a grid that tells how the camera moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.pose import Doubles
+from visup.percepts.appearance.looks.scene import Scene
+
+STILL = np.eye(2, 3)
+_GRID = 12, 8  # cells of the picture, in each of which one point tells of the camera
+_WINDOW = (13, 13)
+_BACK = 0.7  # pixels: a point that does not come back as near as this was lost
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointMotion:
+    """Points of one frame and where they are in the next.
+
+    Attributes:
+        before: (N, 2) float32, working pixels of the frame before.
+        after: (N, 2) float32, in this frame.
+        owner: (N,) int64, number of the thing that a point is on; -1 for the grid of the camera.
+    """
+
+    before: NDArray[np.float32]
+    after: NDArray[np.float32]
+    owner: NDArray[np.int64]
+
+    def of(self, owner: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """The points of one owner, before and after."""
+        mine = self.owner == owner
+        return self.before[mine], self.after[mine]
+
+
+def follow_points(
+    old: Scene, new: Scene, points: NDArray[np.float32], owner: NDArray[np.int64]
+) -> PointMotion:
+    """Where points went, those that come back when followed backwards.
+
+    Args:
+        old: The frame before.
+        new: The frame.
+        points: (N, 2) float32, working pixels of the frame before.
+        owner: (N,) int64, carried along.
+    """
+    if not len(points):
+        return PointMotion(points, points, owner)
+    here, there = old.grey, new.grey
+    start = points.reshape(-1, 1, 2)
+    at, found, _ = cv2.calcOpticalFlowPyrLK(
+        here, there, start, start.copy(), winSize=_WINDOW, maxLevel=3
+    )
+    back, again, _ = cv2.calcOpticalFlowPyrLK(
+        there,
+        here,
+        at,
+        start.copy(),
+        winSize=_WINDOW,
+        maxLevel=3,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+    )
+    off = np.abs(back - start).reshape(-1, 2).max(axis=1)
+    fine = (found.ravel() > 0) & (again.ravel() > 0) & (off < _BACK)
+    return PointMotion(points[fine], at.reshape(-1, 2)[fine], owner[fine])
+
+
+def grid_points(scene: Scene, taken: NDArray[np.bool_] | None) -> NDArray[np.float32]:
+    """(N, 2) float32: the best point to follow in each cell of a grid, away from things.
+
+    Args:
+        scene: The frame.
+        taken: (h, w) bool, where things are; None where none are known.
+    """
+    width, height = scene.size
+    strength = cv2.cornerMinEigenVal(cv2.pyrDown(scene.grey), 5)
+    if taken is not None:
+        small = cv2.resize(
+            taken.view(np.uint8), strength.shape[::-1], interpolation=cv2.INTER_NEAREST
+        )
+        strength[small > 0] = 0
+    cols, rows = _GRID
+    h, w = strength.shape[0] // rows, strength.shape[1] // cols
+    if h < 2 or w < 2:
+        return np.zeros((0, 2), dtype=np.float32)
+    cells = strength[: h * rows, : w * cols].reshape(rows, h, cols, w).swapaxes(1, 2)
+    flat = cells.reshape(rows * cols, h * w)
+    best = flat.argmax(axis=1)
+    good = flat[np.arange(len(flat)), best] > 1e-5
+    row, col = np.divmod(np.arange(rows * cols), cols)
+    y, x = row * h + best // w, col * w + best % w
+    at = np.stack([x, y], axis=1)[good] * 2.0 + 0.5
+    return np.asarray(np.minimum(at, (width - 1, height - 1)), dtype=np.float32)
+
+
+def camera_motion(points: PointMotion) -> Doubles | None:
+    """(2, 3) similarity of the picture that most of the grid follows; None when it does not agree.
+
+    A camera that rests gives exactly `STILL`.
+    """
+    before, after = points.of(-1)
+    if len(before) < 8:
+        return STILL
+    off = np.hypot(*(after - before).T)
+    if np.mean(off < 0.25) > 0.6:
+        return STILL
+    found = similarity_of(before, after, 1.0)
+    return found[0] if found is not None and found[1] > 0.45 else None
+
+
+def similarity_of(
+    before: NDArray[np.float32], after: NDArray[np.float32], off: float
+) -> tuple[Doubles, float] | None:
+    """The similarity that most points follow, and which share of them does.
+
+    Args:
+        before: (N, 2) float32.
+        after: (N, 2) float32.
+        off: How far a point may be off, pixels.
+    """
+    if len(before) < 4:
+        return None
+    found, fits = cv2.estimateAffinePartial2D(
+        before, after, method=cv2.RANSAC, ransacReprojThreshold=off, maxIters=300
+    )
+    if found is None:
+        return None
+    return np.asarray(found, dtype=np.float64), float(np.mean(fits))

@@ -1,0 +1,101 @@
+"""Comparing a thing that is followed with what was taught, so that it does not become another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from visup.percepts.appearance.looks.pose import PatchPose
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.looks.thing_model import ViewModel
+from visup.percepts.appearance.tracking.detection import search
+from visup.percepts.appearance.tracking.finding import SURE, footprint, overlap
+from visup.percepts.appearance.tracking.following import noted
+from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
+from visup.percepts.appearance.tracking.verification import Match, verify
+
+MOVING_S, RESTING_S = 0.3, 2.0  # between two comparisons
+BETTER = 0.15  # score by which another place must look more like what was taught
+REACH = 2.5  # how far it may be, of the thing's radius
+SIZES = (0.8, 1.0, 1.25)
+
+
+def recalled(
+    track: ThingTrack, views: Sequence[ViewModel], scene: Scene, others: Sequence[Blob]
+) -> ThingTrack:
+    """A thing that looks as it was taught is believed to look just so, where it does.
+
+    Args:
+        track: A thing in view.
+        views: All that were taught.
+        scene: The frame.
+        others: Where other things are.
+    """
+    it, pose = track.looks, track.pose
+    wait = MOVING_S if track.state is State.MOVING else RESTING_S
+    if it is None or pose is None or scene.time - track.asked < wait - 1e-6:
+        return track
+    track = replace(track, asked=scene.time)
+    known = [
+        (k, verify(scene, v.appearance, _as_large(pose, track, views[k], views)))
+        for k, v in enumerate(views)
+        if v.name == track.name
+    ]
+    number, best = max(known, key=lambda found: found[1].score)
+    near = best.pose.apart(pose, it.radius) < it.radius * pose.scale
+    if best.score > SURE and near:
+        return _as_taught(track, number, best, views, scene) if _strayed(track, best) else track
+    number, best = _elsewhere(track, number, best, views, scene)
+    taught = views[number].appearance
+    blob = footprint(scene, best.pose, taught)
+    if best.score <= SURE or blob is None or any(overlap(blob, o) > 0.5 for o in others):
+        return track
+    return _as_taught(track, number, best, views, scene)
+
+
+def _strayed(track: ThingTrack, best: Match) -> bool:
+    """Whether a thing looks more like what was taught than like what it was believed to have become."""
+    return (
+        track.state is State.MOVING and best.score > (max(track.peak, 0) * track.explained) ** 0.5
+    )
+
+
+def _elsewhere(
+    track: ThingTrack, number: int, here: Match, views: Sequence[ViewModel], scene: Scene
+) -> tuple[int, Match]:
+    """A place close by that looks clearly more like what was taught."""
+    assert track.pose is not None
+    it = views[number].appearance
+    size = _as_large(track.pose, track, views[number], views).scale
+    taught = views[number].pose.scale * max(scene.size) / max(views[number].size)
+    poses = [PatchPose(0, 0, size * s, track.pose.angle) for s in SIZES]
+    poses += [PatchPose(0, 0, taught * s) for s in SIZES]
+    far = REACH * it.radius * size
+    found = [m for m in search(scene, it, poses) if m.pose.apart(track.pose, 0) < far]
+    best = max(found, key=lambda m: m.score, default=here)
+    return number, best if best.score > here.score + BETTER else here
+
+
+def _as_large(
+    pose: PatchPose, track: ThingTrack, view: ViewModel, views: Sequence[ViewModel]
+) -> PatchPose:
+    """A pose of one view as a pose of another, so that the thing shows as large."""
+    now, then = views[track.number].appearance, view.appearance
+    return pose if now is then else pose.resized(now.radius / then.radius)
+
+
+def _as_taught(
+    track: ThingTrack, number: int, match: Match, views: Sequence[ViewModel], scene: Scene
+) -> ThingTrack:
+    assert track.looks is not None
+    taught = views[number].appearance
+    out = replace(
+        track,
+        number=number,
+        looks=replace(taught, colours=track.looks.colours),
+        peak=match.peak,
+        explained=match.explained,
+    )
+    if match.pose.apart(out.pose or match.pose, taught.radius) < 1.0:
+        return out
+    return noted(replace(out, state=State.MOVING, rest=None, path=()), scene.time, match.pose)

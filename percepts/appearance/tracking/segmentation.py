@@ -1,0 +1,120 @@
+"""Which pixels are which thing's: each goes to the thing that explains it best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.colours import colour_bins
+from visup.percepts.appearance.looks.pose import PatchPose, Window, paint, window_of
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.looks.thing_model import Appearance
+from visup.percepts.appearance.tracking._rest_check_jit import like_before
+from visup.percepts.appearance.tracking.track import Blob, RestMemory
+from visup.percepts.appearance.tracking.verification import explained_pixels, template_of
+
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+Claim = tuple[Window, Floats]
+"""A window (left, top, right, bottom) and (h, w) float32 log odds that its pixels are a thing's."""
+
+_SHAPE = np.float32(3.0)  # log odds of a pixel well within a thing, or well outside
+_COLOUR = np.float32(2.0)  # most that a colour says
+_LIKE, _UNLIKE = np.float32(1.0), np.float32(-1.5)  # of a pixel that looks as the template wants
+_SOFT = 2.5  # how far a thing's outline may be off, pixels of its patch
+_CHANGED = 14, 7  # steps of lightness and of colour by which a pixel at rest may differ
+# What looks as it did, to the pixel, is nothing that has come in front.
+_KEPT, _LOST = np.float32(5.0), np.float32(-2.0)
+NOWHERE = np.float32(-9.0)
+
+
+def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | None:
+    """How much each pixel near a thing speaks for it.
+
+    Args:
+        scene: The frame.
+        pose: Where the thing is.
+        looks: How it looks.
+
+    Returns:
+        The window and (h, w) float32 log odds; None when the thing is out of view.
+    """
+    window = window_of(pose, looks.shape, scene.size)
+    if window is None:
+        return None
+    lab = scene.patch(pose, looks.shape)
+    shape = cv2.GaussianBlur(looks.mask, (0, 0), _SOFT)
+    score = np.clip((shape - np.float32(0.5)) * 2 * _SHAPE * np.float32(1.3), -_SHAPE, _SHAPE)
+    score += np.clip(looks.colours.odds(colour_bins(lab)), -_COLOUR, _COLOUR)
+    like, _ = explained_pixels(template_of(looks.lab, looks.mask), lab)
+    score += np.where(like, _LIKE, _UNLIKE) * np.clip(looks.mask * 2 - 1, 0, 1)
+    return window, np.asarray(paint(score, pose, window, float(NOWHERE)), dtype=np.float32)
+
+
+def rest_scores(rest: RestMemory, same: Mask) -> Claim:
+    """How much each pixel still speaks for a thing at rest.
+
+    Args:
+        rest: As it was.
+        same: As of `unchanged`.
+    """
+    score = np.where(same, _KEPT, _LOST)
+    score[~rest.blob.mask] = NOWHERE
+    return rest.blob.window, score
+
+
+def unchanged(scene: Scene, rest: RestMemory) -> Mask:
+    """(h, w) bool: pixels of a window that look as they did, whatever the light."""
+    left, top, right, bottom = rest.blob.window
+    now = np.ascontiguousarray(scene.lab[0][top:bottom, left:right])
+    same = like_before(now, rest.lab, *_CHANGED)
+    if same.all():
+        return same
+    # Single pixels that flicker are noise.
+    changed = cv2.morphologyEx((~same).view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return np.asarray(changed == 0)
+
+
+def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob | None]:
+    """The pixels that each thing wins.
+
+    Args:
+        claims: For each thing its window and (h, w) float32 log odds.
+        size: (width, height) of the picture.
+
+    Returns:
+        For each thing what it shows, None where nothing is left.
+    """
+    best = np.zeros(size[::-1], dtype=np.float32)
+    for claim in claims:
+        if claim is not None:
+            left, top, right, bottom = claim[0]
+            part = best[top:bottom, left:right]
+            np.maximum(part, claim[1], out=part)
+    out: list[Blob | None] = []
+    for claim in claims:
+        if claim is None:
+            out.append(None)
+            continue
+        left, top, right, bottom = claim[0]
+        mask = (claim[1] > 0) & (claim[1] >= best[top:bottom, left:right])
+        out.append(_cleaned(Blob(claim[0], mask)))
+    return out
+
+
+def _cleaned(blob: Blob) -> Blob | None:
+    """Without specks."""
+    mask = blob.mask.view(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+    if count < 2:
+        return None
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    keep = np.zeros(count, dtype=bool)
+    keep[1:] = areas >= max(0.12 * areas.max(), 6)
+    if keep[1:].all():
+        return blob
+    return Blob(blob.window, keep[labels])

@@ -1,0 +1,239 @@
+"""Following taught things from frame to frame, all of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.looks.thing_model import ViewModel
+from visup.percepts.appearance.tracking.finding import (
+    ThingPlace,
+    assigned,
+    candidates,
+    lost_places,
+)
+from visup.percepts.appearance.tracking.following import (
+    AS_IT_WAS,
+    FrameMotion,
+    followed,
+    noted,
+)
+from visup.percepts.appearance.tracking.learning import learned, rested
+from visup.percepts.appearance.tracking.points import (
+    STILL,
+    PointMotion,
+    camera_motion,
+    follow_points,
+    grid_points,
+)
+from visup.percepts.appearance.tracking.recalling import recalled
+from visup.percepts.appearance.tracking.segmentation import (
+    Claim,
+    compete,
+    rest_scores,
+    thing_scores,
+    unchanged,
+)
+from visup.percepts.appearance.tracking.track import IN_VIEW, Blob, State, ThingTrack
+
+Mask = NDArray[np.bool_]
+
+NO_POINTS = np.zeros((0, 2), dtype=np.float32)
+POINTS = 24  # that are followed on each thing
+HOLD_S = 0.12  # how long a thing that is lost is still reported where it should be
+LEAST_SEEN = 0.04  # share of a thing below which nothing of it is seen
+EVERY = 3  # frames between two searches of the whole picture
+
+
+class ThingTracker:
+    """Where all taught things are; one per video.
+
+    Args:
+        views: What is known of them.
+
+    Attributes:
+        views: As given.
+        tracks: One for each name, in the order of teaching.
+        scene: The last frame.
+    """
+
+    def __init__(self, views: Sequence[ViewModel]) -> None:
+        self.views = tuple(views)
+        names = dict.fromkeys(v.name for v in views)
+        self.tracks = tuple(ThingTrack(n, self._numbers(n)[0]) for n in names)
+        self.scene: Scene | None = None
+        self._count = 0
+        self._static = True
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is remembered of the frames so far."""
+        return {k: v for k, v in vars(self).items() if k != "views"}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a tracker of the same views remembered."""
+        vars(self).update(state)
+
+    def step(self, scene: Scene, new_id: Callable[[Blob], int]) -> tuple[ThingTrack, ...]:
+        """The things in the next frame.
+
+        Args:
+            scene: The frame.
+            new_id: Gives the id of what is seen for the first time.
+
+        Returns:
+            One track for each name, in the order of teaching.
+        """
+        old, self.scene = self.scene, scene
+        self._count += 1
+        same: dict[str, Mask] = {}
+        if old is not None and old.size == scene.size:
+            same = {t.name: unchanged(scene, t.rest) for t in self.tracks if t.rest is not None}
+            self._follow(old, scene, same)
+        else:
+            self.tracks = tuple(_forgotten(t) for t in self.tracks)
+        self._find(scene)
+        self._share_pixels(scene, same)
+        self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
+        return self.tracks
+
+    def view_number(self, track: ThingTrack) -> int:
+        """Which of the views of its own name a thing looks like, from 0."""
+        return self._numbers(track.name).index(track.number)
+
+    def _numbers(self, name: str) -> list[int]:
+        return [k for k, v in enumerate(self.views) if v.name == name]
+
+    def _follow(self, old: Scene, scene: Scene, same: Mapping[str, Mask]) -> None:
+        calm = {n for n, mask in same.items() if np.mean(mask) > AS_IT_WAS}
+        resting = [t for t in self.tracks if t.state is State.RESTING and t.name in calm]
+        seen = [t for t in self.tracks if t.state in IN_VIEW]
+        if self._static and seen and len(resting) == len(seen):
+            # The camera rests, too: what it shows has not moved by a pixel.
+            moved = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64))
+        else:
+            moved = self._followed_points(old, scene, calm if self._static else set())
+        camera = camera_motion(moved)
+        self._static = camera is STILL
+        motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count, same)
+        tracks = [followed(t, k, motion) for k, t in enumerate(self.tracks)]
+        for k, t in enumerate(tracks):
+            if t.state in IN_VIEW and t.seen == scene.time:
+                others = [o.visible for o in tracks if o is not t and o.visible is not None]
+                tracks[k] = recalled(t, self.views, scene, others)
+        self.tracks = tuple(tracks)
+
+    def _followed_points(self, old: Scene, scene: Scene, calm: Collection[str]) -> PointMotion:
+        """Points of the whole picture and of things that may move, and where they went."""
+        points = [(-1, grid_points(old, _taken(self.tracks, old)))]
+        for k, t in enumerate(self.tracks):
+            rests = t.state is State.RESTING and t.name in calm
+            if t.visible is not None and not rests:
+                points.append((k, _points_on(old, t.visible)))
+        owner = np.concatenate([np.full(len(p), k) for k, p in points]).astype(np.int64)
+        return follow_points(old, scene, np.concatenate([p for _, p in points]), owner)
+
+    def _find(self, scene: Scene) -> None:
+        """Look for things that are not in view: all of them at first, then one after another."""
+        lost = sorted((t for t in self.tracks if t.state not in IN_VIEW), key=lambda t: t.asked)
+        first = self._count == 1
+        due = lost if first else lost[: self._count % EVERY == 0]
+        names = {t.name for t in due}
+        found = [
+            c
+            for number, view in enumerate(self.views)
+            if view.name in names
+            for c in candidates(scene, view, number)
+        ]
+        found += [c for t in due for c in lost_places(scene, t)]
+        taken = [t.visible for t in self.tracks if t.state in IN_VIEW and t.visible is not None]
+        placed = assigned(scene, found, taken)
+        asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
+        self.tracks = tuple(_found(t, placed.get(t.name), scene) for t in asked)
+
+    def _share_pixels(self, scene: Scene, same: Mapping[str, Mask]) -> None:
+        claims = [_claim(t, scene, same) for t in self.tracks]
+        blobs = compete(claims, scene.size)
+        shown = zip(self.tracks, claims, blobs, strict=True)
+        self.tracks = tuple(self._shown(t, c, b, scene) for t, c, b in shown)
+
+    def _shown(
+        self, track: ThingTrack, claim: Claim | None, blob: Blob | None, scene: Scene
+    ) -> ThingTrack:
+        """A thing with the pixels that it won, and with what they teach."""
+        pose, it, rest = track.pose, track.looks, track.rest
+        if claim is None or blob is None or pose is None or it is None:
+            return replace(track, visible=None)
+        if blob.area < LEAST_SEEN * it.area * pose.scale**2:
+            return replace(track, visible=None)
+        if track.state is State.RESTING:
+            as_it_was = rest is not None and np.array_equal(blob.mask, rest.blob.mask)
+            return replace(track, visible=rest.blob if rest and as_it_was else blob)
+        track = replace(track, visible=blob)
+        if self._count % 2:
+            track = learned(track, scene, claim, blob)
+        return rested(track, scene, self._count == 1) if self._static else track
+
+
+def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTrack:
+    if place is None:
+        return track
+    new = replace(
+        track,
+        number=place.number,
+        state=State.MOVING,
+        looks=place.looks,
+        rest=None,
+        path=(),
+        peak=place.match.peak,
+        explained=place.match.explained,
+    )
+    return noted(new, scene.time, place.match.pose)
+
+
+def _forgotten(track: ThingTrack) -> ThingTrack:
+    """A thing in a picture of another size: nothing is known of where it is."""
+    return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
+
+
+def _numbered(track: ThingTrack, scene: Scene, new_id: Callable[[Blob], int]) -> ThingTrack:
+    if track.id or track.visible is None:
+        return track
+    return replace(track, id=new_id(track.visible), since=scene.time)
+
+
+def _claim(track: ThingTrack, scene: Scene, same: Mapping[str, Mask]) -> Claim | None:
+    """What a thing that is in view claims of the picture."""
+    if track.state not in IN_VIEW or scene.time - track.seen > HOLD_S:
+        return None
+    if track.state is State.RESTING and track.rest is not None:
+        return rest_scores(track.rest, same[track.name])
+    assert track.pose is not None
+    assert track.looks is not None
+    return thing_scores(scene, track.pose, track.looks)
+
+
+def _taken(tracks: Sequence[ThingTrack], scene: Scene) -> Mask:
+    """(h, w) bool: where things are seen."""
+    out = np.zeros(scene.size[::-1], dtype=bool)
+    for t in tracks:
+        if t.visible is not None:
+            left, top, right, bottom = t.visible.window
+            out[top:bottom, left:right] |= t.visible.mask
+    return out
+
+
+def _points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:
+    """(N, 2) float32: points of a thing that can be followed."""
+    left, top, right, bottom = blob.window
+    inner = cv2.erode(blob.mask.view(np.uint8), np.ones((3, 3), np.uint8))
+    grey = np.ascontiguousarray(scene.grey[top:bottom, left:right])
+    found = cv2.goodFeaturesToTrack(grey, POINTS, 0.02, 3, mask=inner)
+    if found is None:
+        return np.zeros((0, 2), dtype=np.float32)
+    return np.asarray(found.reshape(-1, 2) + np.array([left, top]), dtype=np.float32)
