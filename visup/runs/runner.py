@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +20,6 @@ from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.runs.taught_actors import told_of_taught_actors
 from visup.runs.wiring import build_agent, final_verdict, open_video
 from visup.sinks import Sinks
 
@@ -166,7 +165,7 @@ class _Run:
         stack.callback(self._agent.close)
         # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
         actors = self._agent.mind.actors
-        self._notes = told_of_taught_actors(settings.actors, actors)
+        self._notes = _told_of_actors(settings.actors, actors)
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
         self._recorder = (
@@ -277,6 +276,16 @@ def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str]
             notice(text)
 
     return tell
+
+
+def _told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
+    """A sentence on each actor that is what was taught, other than its task declares."""
+    return tuple(
+        f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
+        "models that its task names."
+        for actor in actors
+        if actor not in given
+    )
 
 
 class _SeverityMonitor:

@@ -25,10 +25,14 @@ from visup.rules.reasoners import default_reasoners
 from visup.runs.plugins import user_behaviours
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
-from visup.runs.taught_actors import with_taught_actors
 from visup.runs.zones import load_zones
 from visup.tasks import load_tasks
-from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
+from visup.tasks.grammar.structure import (
+    declared_sizes,
+    task_actors,
+    undrawn_zones,
+    with_taught_actors,
+)
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 if TYPE_CHECKING:
@@ -81,7 +85,8 @@ def build_agent(
     _check_zones(tasks, {z.name for z in zones})
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    actors = with_taught_actors(tasks, settings.actors, database)
+    known, taught = _names(database)
+    actors = with_taught_actors(tasks, settings.actors, known, taught)
     behaviours = [*_behaviours(settings, database, declared_sizes(tasks, actors)), *also]
     contracts = [b.contract for b in behaviours]
     return Agent(
@@ -90,9 +95,16 @@ def build_agent(
         actors=actors,
         zones=zones,
         observers=observers,
-        models=database.names() if database is not None else (),
+        models=known,
         limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
+
+
+def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:
+    """All models that there are, and those that were taught."""
+    if database is None:
+        return (), frozenset()
+    return database.names(), frozenset(view.name for view in database.taught)
 
 
 def reasoning_agent(

@@ -10,8 +10,8 @@ import visup
 from tests.teaching.clips import corners, frame, write_clip
 from visup.percepts.shape.building.database_builder import silhouette_views
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.runs.taught_actors import with_taught_actors
 from visup.tasks import load_tasks
+from visup.tasks.grammar.structure import with_taught_actors
 
 TASK = """{declared}
 <inspect> ::= <approach>
@@ -55,8 +55,9 @@ def test_an_actor_is_what_was_taught_unless_somebody_says_otherwise(
 ) -> None:
     path = tmp_path / "inspect.task"
     path.write_text(TASK.format(declared=declared))
-    assert with_taught_actors(load_tasks(str(path)), given, database) == expected
-    assert with_taught_actors(load_tasks(str(path)), given, None) == given
+    tasks, taught = load_tasks(str(path)), {v.name for v in database.taught}
+    assert with_taught_actors(tasks, given, database.names(), taught) == expected
+    assert with_taught_actors(tasks, given, (), ()) == given
 
 
 def test_it_is_told_and_recorded(database: ModelDatabase, tmp_path: Path) -> None:
