@@ -132,6 +132,22 @@ def is_actor(facts: Snapshot) -> Codes:
     return facts.among(bound)
 
 
+def is_bystander(facts: Snapshot) -> Codes:
+    """Whether a task lets an object be, and none has it for an actor."""
+    tasks = facts.mind.tasks
+    acting = {b.object_id for task in tasks for b in task.bindings}
+    return facts.among({i for task in tasks for i in task.bystanders} - acting)
+
+
+def one_machine(facts: Snapshot) -> Codes:
+    """Whether two objects are parts of one machine, as a task tells its parts."""
+    codes, row = facts.pairs(NO), facts.row
+    for parts in (m for task in facts.mind.tasks for m in task.machines):
+        rows = [row[i] for i in parts if i in row]
+        codes[np.ix_(rows, rows)] = YES
+    return codes
+
+
 def is_named(facts: Snapshot, name: str) -> Codes:
     """Whether an object is believed to be that model or actor; unknown while not identified."""
 
@@ -256,6 +272,8 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         ),
         "unexpected": PredicateDefinition(_ONE, unexpected, "no active task explains the object"),
         "actor": PredicateDefinition(_ONE, is_actor, "the object plays an actor of an active task"),
+        "bystander": PredicateDefinition(_ONE, is_bystander, "a task lets the object be"),
+        "one_machine": PredicateDefinition(_TWO, one_machine, "they are parts of one machine"),
         "named": PredicateDefinition(
             ("object", "name"), is_named, "the object is believed to be that"
         ),
