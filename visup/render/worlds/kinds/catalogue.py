@@ -10,10 +10,12 @@ import numpy as np
 
 from visup.agent.model.errors import SettingsError
 from visup.render.worlds.kinds import (
+    bench,
     boats,
     charge,
     conveyor,
     crane,
+    fetch,
     handover,
     inspect,
     pick,
@@ -33,6 +35,8 @@ KINDS: Mapping[str, WorldKind] = {
         WorldKind("handover", handover.OUTCOMES, handover.build),
         WorldKind("walker", walker.OUTCOMES, walker.build),
         WorldKind("conveyor", conveyor.OUTCOMES, conveyor.build),
+        WorldKind("fetch", fetch.OUTCOMES, fetch.build),
+        WorldKind("bench", bench.OUTCOMES, bench.build),
     )
 }
 

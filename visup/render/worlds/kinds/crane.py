@@ -78,6 +78,8 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     things = [
         Thing("container", box(size, (0, 0, size[2] / 2), colour), load, CONTAINER, surface),
         Thing("spreader", _spreader(rng, size), hook, SPREADER, plain),
+        # The rope that it hangs from is nobody's actor: ever more of it comes into view.
+        Thing("rope", cone((0, 0, 0.6), (0, 0, 9), 0.035, None, BLACK), hook, 0, plain),
         Thing("truck", truck, still(0, 0, 0, float(rng.uniform(-0.25, 0.25))), TRUCK, plain),
         *_surroundings(rng, frames),
     ]
@@ -155,7 +157,7 @@ def _truck(rng: np.random.Generator, colour: Colour) -> Solid:
 
 
 def _spreader(rng: np.random.Generator, size: Doubles) -> Solid:
-    """A frame with its ropes, whose lower side lies on the container; origin there."""
+    """A frame with its slings, whose lower side lies on the container; origin there."""
     colour = pick_colour(rng)
     frame = box((size[0] * 0.9, size[1] * 0.7, 0.12), (0, 0, 0.06), colour)
     block = box((0.5, 0.35, 0.3), (0, 0, 0.5), STEEL)
@@ -164,7 +166,7 @@ def _spreader(rng: np.random.Generator, size: Doubles) -> Solid:
         for x in (-1, 1)
         for y in (-1, 1)
     ]
-    return join(frame, block, cone((0, 0, 0.6), (0, 0, 9), 0.035, None, BLACK), *slings)
+    return join(frame, block, *slings)
 
 
 def _surroundings(rng: np.random.Generator, frames: int) -> list[Thing]:

@@ -15,7 +15,9 @@ from visup.render.worlds.world import FPS, Course, StageSpan, Thing, Viewpoint, 
 STYLES = ("fixed", "fixed", "shaking", "panning", "zooming")
 """Ways to hold the camera, two of five on a tripod."""
 
-TOLERANCE_S = 0.7
+STRANGERS = ("bystander", "other")
+"""Things that move and have no part in the work."""
+
 LONGEST_S = 15.0
 
 
@@ -69,6 +71,9 @@ def finished(rng: np.random.Generator, kind: str, script: Script) -> World:
     """The world of a script, with light, sky and the flaws of a camera."""
     light = random_light(rng, np.asarray(script.view.position))
     name, text = script.task
+    if any(thing.name in STRANGERS for thing in script.things):
+        # Who knows that others come by says so; whoever does not is right to be alarmed.
+        text += "bystanders ignored\n"
     return World(
         "",
         kind,

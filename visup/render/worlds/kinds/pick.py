@@ -186,7 +186,7 @@ def part_poses(
     # The hand turns while it swings round; what it set down stands upright all the same.
     if outcome != "drop":
         return poses, times.end
-    since = times.carry + float(rng.uniform(0.12, 0.3)) * (times.place - times.carry)
+    since = times.carry + float(rng.uniform(0.08, 0.2)) * (times.place - times.carry)
     held = carried(rest, hand, frame_at(times.lift), frames)
     tumble = rng.uniform(-0.6, 0.6, 3) * [0.15, 0.15, 1]
     return dropped(held, frame_at(since), 0.0, tumble)[0], since

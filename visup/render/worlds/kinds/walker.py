@@ -20,7 +20,7 @@ from visup.render.worlds.kinds.kind import (
 from visup.render.worlds.machines import BLACK, STEEL
 from visup.render.worlds.motion import along, bend, clock, cruised, eased, posed, still
 from visup.render.worlds.scenery import floor, hall, pick_colour, seed_of
-from visup.render.worlds.viewpoint import disturbed, projected, shows, steady
+from visup.render.worlds.viewpoint import projected, shows, steady
 from visup.render.worlds.world import (
     FPS,
     SIZE,
@@ -35,15 +35,19 @@ from visup.render.worlds.world import (
 OUTCOMES = ("ok", "crosses", "turns_back", "in_progress")
 WALKER, BYSTANDER = 2, 7
 HOLD_S = 1
+FLOOR_FROM = 5.0
+"""Metres from the corner that floors are measured from to the middle of the scene, both ways."""
+
 Doubles = NDArray[np.float64]
 
 TASK = """\
 # visit.task: somebody walks to the mark and stays there, and never sets foot on the danger area.
+ground is {ground}
 zone mark   is {mark}
 zone danger is {danger}
 
 <visit>  ::= <walk> <arrive>
-<walk>   ::= moving(walker)
+<walk>   ::= moving(walker) ends when inside(walker, mark)
 <arrive> ::= inside(walker, mark) for {hold} s
 
 never inside(walker, danger)
@@ -83,8 +87,9 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     if outcome == "in_progress":
         truth, frames = cut_short(truth, end), frames_until(end)
     text = TASK.format(
-        mark=_zone(view, layout.mark, layout.half),
-        danger=_zone(view, layout.danger, layout.danger_half),
+        ground=_ground(view, layout),
+        mark=_zone(layout.mark, layout.half),
+        danger=_zone(layout.danger, layout.danger_half),
         hold=HOLD_S,
     )
     things = [*walker, *_surroundings(rng, layout, len(way))]
@@ -104,8 +109,8 @@ def _layout(rng: np.random.Generator, frames: int) -> tuple[WalkLayout, Viewpoin
         layout = WalkLayout(start, mark, danger, float(halves[0]), float(halves[1]))
         aim = np.array([0.0, 0.0, 0.4])
         place = from_around(rng, aim, float(rng.uniform(8.0, 9.5)), (38, 68))
-        # Zones are drawn in the picture: the camera may tremble, but not turn away.
-        view = disturbed(steady(place, aim, float(rng.uniform(38, 44)), frames), rng, "fixed")
+        # The floor is measured once: the camera stands still.
+        view = steady(place, aim, float(rng.uniform(38, 44)), frames)
         corners = np.concatenate(
             [_corners(mark, layout.half), _corners(danger, layout.danger_half)]
         )
@@ -121,10 +126,24 @@ def _corners(middle: Doubles, half: float) -> Doubles:
     return np.column_stack([middle + square, np.zeros(4)])
 
 
-def _zone(view: Viewpoint, middle: Doubles, half: float) -> str:
-    """The corners of a square on the floor as a task file writes them, in pixels."""
-    pixels = np.clip(np.rint(projected(view, _corners(middle, half), SIZE)), 0, np.array(SIZE) - 1)
-    return " ".join(f"({int(x)}, {int(y)})" for x, y in pixels)
+def _zone(middle: Doubles, half: float) -> str:
+    """The corners of a square on the floor as a task file writes them, in metres."""
+    return " ".join(_metres(corner) for corner in _corners(middle, half))
+
+
+def _metres(point: Doubles) -> str:
+    """A point of the floor as a task file writes it, seen from a corner of it."""
+    return f"({point[0] + FLOOR_FROM:.2f} m, {point[1] + FLOOR_FROM:.2f} m)"
+
+
+def _ground(view: Viewpoint, layout: WalkLayout) -> str:
+    """Where the corners of the mark and of the danger area are in the picture, and on the floor."""
+    corners = np.concatenate(
+        [_corners(layout.mark, layout.half), _corners(layout.danger, layout.danger_half)]
+    )
+    pixels = np.rint(projected(view, corners, SIZE)).astype(int)
+    pairs = zip(pixels, corners, strict=True)
+    return ", ".join(f"({x}, {y}) = {_metres(corner)}" for (x, y), corner in pairs)
 
 
 def _walk(
