@@ -14,6 +14,7 @@ from visup.agent import HealthStatus, ObjectBelief, Presence, Region
 from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
 from visup.rules.formula.units import ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
 from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates import certainty
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
@@ -41,8 +42,6 @@ IMPLIED = MappingProxyType(
 """Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
 
 STILL_SPEED = RelationSettings().still_speed
-KEEP_OUT = "keep_out"
-"""Zones whose names begin so are forbidden to all."""
 PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
 SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
@@ -241,7 +240,7 @@ def _presence(wanted: Presence) -> Callable[[Snapshot], Codes]:
 
 def in_forbidden_zone(facts: Snapshot) -> Codes:
     """Whether some part of an object is in a zone that is forbidden to all."""
-    zones = [z.name for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
+    zones = [z.name for z in facts.mind.zones if z.name.startswith(certainty.KEEP_OUT)]
     if not zones:
         return facts.among(())
     codes: Codes = np.max([_zone("reaching")(facts, name) for name in zones], axis=0)
@@ -277,6 +276,12 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "named": PredicateDefinition(
             ("object", "name"), is_named, "the object is believed to be that"
         ),
+        "standalone": PredicateDefinition(
+            _ONE, certainty.standalone, "it is surely a thing of its own, no part of a larger one"
+        ),
+        "identified": PredicateDefinition(
+            _ONE, certainty.identified, "it is likelier a model known than none of them"
+        ),
         "seen": PredicateDefinition(_ONE, _presence(Presence.SEEN), "the object is seen"),
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
         "lost": PredicateDefinition(_ONE, lost, "it is out of sight and nothing tells why"),
@@ -291,7 +296,12 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
             )
         },
         "in_forbidden_zone": PredicateDefinition(
-            _ONE, in_forbidden_zone, f"some part is in a zone whose name begins with {KEEP_OUT}"
+            _ONE,
+            in_forbidden_zone,
+            f"some part is in a zone whose name begins with {certainty.KEEP_OUT}",
+        ),
+        "at_home": PredicateDefinition(
+            _ONE, certainty.at_home, "it was in such a zone when the video began"
         ),
         "first_contact": PredicateDefinition(
             _TWO, first_contact, "the second is what the first would meet first"
