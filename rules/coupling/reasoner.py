@@ -94,7 +94,7 @@ class CouplingSettings:
     odds: float = 5.0
     anew_s: float = 2.5
     approach_s: float = 6.0
-    part_s: float = 0.5
+    part_s: float = 0.35
     contact: ContactSettings = field(default_factory=ContactSettings)
 
 
@@ -261,13 +261,15 @@ class CouplingReasoner:
         watched = track is not None and track.path_end == mind.time
         yield Condition("both are seen near each other", watched)
         text = "log odds that they touch and are at rest"
-        yield at_least(text, evidence.rest_odds, s.odds)
+        together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
+        # That they move together was judged over a while of its own.
+        yield at_least(text, evidence.rest_odds, (0.4 if together else 1.0) * s.odds)
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
         moving = common_speed(mind, seen.pair) > least
-        if not moving and evidence.rest_since is not None:
+        if not (moving or together) and evidence.rest_since is not None:
             lasted = mind.time - evidence.rest_since
             yield at_least("at rest for", lasted, s.rest_s, " s", slack=1e-6)
-        if seen.host is not None or mind.truth("moving_together", *seen.pair) is Truth.TRUE:
+        if seen.host is not None or together:
             return
         if moving:
             return  # at rest to each other, and on the move: as one

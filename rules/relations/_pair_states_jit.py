@@ -30,6 +30,10 @@ COPIED = (
 """Rows of the table, and the rows of states that they are taken from."""
 
 
+SWAY = 0.12
+"""Two that move as one do so up to this share of their speed."""
+
+
 class MotionLimits(NamedTuple):
     """Thresholds of trend, touch and moving together.
 
@@ -249,10 +253,16 @@ def _length(vectors: Floats, i: int, j: int) -> float:
 
 
 @compiled
+def _speed(vectors: Floats, i: int) -> float:
+    return float(np.sqrt(vectors[i, 0] * vectors[i, 0] + vectors[i, 1] * vectors[i, 1]))
+
+
+@compiled
 def _together(
     relative: float,
     halves: tuple[float, float],
     slower: float,
+    lately: float,
     before: int,
     limits: tuple[float, ...],
 ) -> int:
@@ -262,9 +272,12 @@ def _together(
     moment, is not taken for one that rests.
     """
     still, half, wide, goes_on = limits
+    held = before == 1
+    # What moves fast sways, and what it did before it moved says nothing.
+    if lately > 4.0 * still and halves[1] < max(half, SWAY * (wide if held else 1.0) * lately):
+        return 1
     if np.isnan(relative):
         return UNKNOWN
-    held = before == 1
     if not slower > 2.0 * still * (goes_on if held else 1.0):
         return 0
     share = wide if held else 1.0
@@ -298,7 +311,8 @@ def classify_motion(
                 tables[PairQuantity.RELATIVE_SPEED, i, j],
                 min(now.speed[i], now.speed[j]),
             )
-            codes[2, k] = _together(relative, halves, slower, state[2, k], limits.rest)
+            lately = min(_speed(now.motion[2], i), _speed(now.motion[2], j))
+            codes[2, k] = _together(relative, halves, slower, lately, state[2, k], limits.rest)
             if now.marks[k] & COUPLED and touching == 1 and found == DIVERGING:
                 # One body that turns changes its outline; it parts when its parts no longer touch.
                 found = KEEPING

@@ -137,7 +137,7 @@ _TABLE = (
     ActionDefinition(
         "decoupled",
         holds=("decoupled",),
-        hold_s=0.5,
+        hold_s=0.2,
         entry=("decoupled", "diverging"),
         progress=("diverging",),
         expects=("diverging", "touching"),

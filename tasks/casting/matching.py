@@ -183,6 +183,20 @@ def unexplained(
     return tuple(o.id for o, is_free in zip(strange, free, strict=True) if is_free)
 
 
+def scenery(
+    mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
+) -> tuple[int, ...]:
+    """Objects that nobody knows and that were in view from the start, by id: part of the scene."""
+    bound = {b.object_id for b in bindings}
+    return tuple(
+        o.id
+        for o in mind.present()
+        if o.id not in bound
+        and o.strength < settings.familiar
+        and o.first_seen <= settings.scenery_s
+    )
+
+
 def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:
     """How well some actors are matched, 0 to 1: the mean strength, 0 for an unbound one."""
     by_actor = {b.actor: b.strength for b in bindings if b.object_id is not None}

@@ -30,6 +30,8 @@ class TaskMemory:
         gain: The evidence that it is, of each second, as it was seen last.
         inferred: Seconds of the step in which it was last inferred whether it is.
         looks: What was seen while an actor is looked for, to be gone through again once it is found.
+        akin: Objects that nobody knows and that were there from the start: the rest of a machine of which
+            a part alone is known is not unexpected.
         violated: What must never be of one body and was, by which the task has failed; or empty.
     """
 
@@ -48,3 +50,4 @@ class TaskMemory:
     inferred: float = 0.0
     looks: tuple[PastLook, ...] = ()
     violated: str = ""
+    akin: tuple[int, ...] = ()

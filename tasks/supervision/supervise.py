@@ -29,7 +29,13 @@ from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.casting.fitness import Role, fits
-from visup.tasks.casting.matching import bystanders, machines, match, unexplained
+from visup.tasks.casting.matching import (
+    bystanders,
+    machines,
+    match,
+    scenery,
+    unexplained,
+)
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.belief import (
     failed_belief,
@@ -210,7 +216,8 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     if start is not None and posterior is not None:
         gain = model.gain(posterior.likeliest, snapshot.observe)
     broken = broken_since(model, snapshot, memory)
-    strange = _strange(model, snapshot, memory)
+    akin = tuple(sorted({*memory.akin, *scenery(mind, bindings, settings)}))
+    strange = tuple(s for s in _strange(model, snapshot, memory) if s[0] not in akin)
     interrupted, strangers = memory.interrupted, memory.strangers
     let_be = bystanders(model.task, mind, bindings, settings)
     if ({b.object_id for b in bindings} | set(let_be)) & set(strangers):
@@ -241,6 +248,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         memory.inferred,
         remembered(memory.looks, mind, start, since) if _awaited(model, bindings) else (),
         violated,
+        akin,
     )
 
 

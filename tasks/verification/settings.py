@@ -27,6 +27,8 @@ class TaskSettings:
             as long to count as recovered.
         regret_s: A task that is done may be undone by contrary evidence for so long.
         unexplained_s: An object that no actor explains must be there so long to be named.
+        scenery_s: What nobody knows and was in view so soon after the start belongs to the scene, as the
+            rest of a machine does of which a part alone is known.
         familiar: An object whose best identity has at least this share is taken to be identified.
         acquainted_s: Seconds for which an object must have been in the scene before it is taken for something
             other than an actor that is still looked for.
@@ -47,6 +49,7 @@ class TaskSettings:
     failed_s: float = 8.0
     regret_s: float = 10.0
     unexplained_s: float = 0.0
+    scenery_s: float = 1.5
     familiar: float = 0.35
     acquainted_s: float = 4.0
     most_courses: int = 24
