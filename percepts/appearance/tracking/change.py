@@ -35,8 +35,12 @@ class ChangeMap:
             scene: The frame.
             camera: (2, 3) similarity of the picture since the frame before.
         """
+        early = scene.time - self._time < APART_S - 1e-6
+        if early and camera is STILL and self._was is not None:
+            return
         width, height = (max(1, n // COARSER) for n in scene.size)
-        grey = cv2.resize(scene.grey, (width, height), interpolation=cv2.INTER_AREA)
+        whole = scene.grey[: height * COARSER, : width * COARSER]
+        grey = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
         now = np.asarray(grey, dtype=np.uint8)
         if self._was is None or self._when is None or self._was.shape != now.shape:
             self._when = np.full(now.shape, NEVER)
@@ -47,7 +51,7 @@ class ChangeMap:
             small[:, 2] /= COARSER
             # What comes into view is new, but has not changed.
             self._was = _warped(self._was, small, now)
-        if scene.time - self._time < APART_S - 1e-6:
+        if early:
             return
         off = cv2.absdiff(now, self._was)
         strong = cv2.morphologyEx((off > LEAST).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2)))

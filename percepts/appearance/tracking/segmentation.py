@@ -103,7 +103,7 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
         size: (width, height) of the picture.
 
     Returns:
-        For each thing what it shows, None where nothing is left.
+        For each thing what it shows, specks and all; None where nothing is left.
     """
     best = np.zeros(size[::-1], dtype=np.float32)
     for claim in claims:
@@ -118,11 +118,11 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
             continue
         left, top, right, bottom = claim[0]
         mask = (claim[1] > 0) & (claim[1] >= best[top:bottom, left:right])
-        out.append(_cleaned(Blob(claim[0], mask)))
+        out.append(Blob(claim[0], mask) if mask.any() else None)
     return out
 
 
-def _cleaned(blob: Blob) -> Blob | None:
+def cleaned(blob: Blob) -> Blob | None:
     """Without specks."""
     mask = blob.mask.view(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)

@@ -37,6 +37,7 @@ from visup.percepts.appearance.tracking.points import (
 from visup.percepts.appearance.tracking.recalling import recalled
 from visup.percepts.appearance.tracking.segmentation import (
     Claim,
+    cleaned,
     compete,
     rest_scores,
     thing_scores,
@@ -184,11 +185,14 @@ class ThingTracker:
         pose, it, rest = track.pose, track.looks, track.rest
         if claim is None or blob is None or pose is None or it is None:
             return replace(track, visible=None)
-        if blob.area < LEAST_SEEN * it.area * pose.scale**2:
+        resting = track.state is State.RESTING
+        if resting and rest is not None and np.array_equal(blob.mask, rest.blob.mask):
+            return track if track.visible is rest.blob else replace(track, visible=rest.blob)
+        blob = cleaned(blob)
+        if blob is None or blob.area < LEAST_SEEN * it.area * pose.scale**2:
             return replace(track, visible=None)
-        if track.state is State.RESTING:
-            as_it_was = rest is not None and np.array_equal(blob.mask, rest.blob.mask)
-            return replace(track, visible=rest.blob if rest and as_it_was else blob)
+        if resting:
+            return replace(track, visible=blob)
         track = replace(track, visible=blob)
         if self._count % 2:
             track = learned(track, scene, claim, blob, self.views[track.number].appearance)
