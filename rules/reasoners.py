@@ -25,6 +25,7 @@ from visup.rules.presence import (
 )
 from visup.rules.relations import RelationReasoner, RelationSettings, ZoneReasoner, ZoneSettings
 from visup.rules.safety.reasoner import RuleReasoner
+from visup.rules.traits.reasoner import TraitReasoner, TraitSettings
 from visup.rules.wording import RelationEventReasoner, RelationEventSettings
 
 
@@ -39,6 +40,7 @@ class ReasonerSettings:
     presence: PresenceSettings = field(default_factory=PresenceSettings)
     depth: DepthSettings = field(default_factory=DepthSettings)
     relations: RelationSettings = field(default_factory=RelationSettings)
+    traits: TraitSettings = field(default_factory=TraitSettings)
     zones: ZoneSettings = field(default_factory=ZoneSettings)
     coupling: CouplingSettings = field(default_factory=CouplingSettings)
     narrative: RelationEventSettings = field(default_factory=RelationEventSettings)
@@ -50,7 +52,8 @@ class ReasonerSet:
 
     Attributes:
         update: Percepts enter the mind.
-        cogitate: Presence, votes, questions, poses, depth, relations, zones, couplings, narrative, rules.
+        cogitate: Presence, votes, questions, poses, depth, relations, traits, zones, couplings, narrative,
+            rules.
     """
 
     update: tuple[Reasoner, ...]
@@ -58,13 +61,17 @@ class ReasonerSet:
 
 
 def default_reasoners(
-    settings: ReasonerSettings | None = None, rules: tuple[Rule, ...] | None = None
+    settings: ReasonerSettings | None = None,
+    rules: tuple[Rule, ...] | None = None,
+    *,
+    traits: bool = False,
 ) -> ReasonerSet:
     """The reasoners that ship with visup.
 
     Args:
         settings: Their settings; the defaults when left out.
         rules: Rules to watch; those of `safety.rules` when left out.
+        traits: Whether colours, sizes and first places of objects are remembered.
 
     Returns:
         The reasoners of the update and cogitate phases. Each is a pure function of mind and
@@ -80,6 +87,7 @@ def default_reasoners(
             PoseReasoner(s.pose),
             DepthReasoner(s.depth),
             RelationReasoner(s.relations),
+            *((TraitReasoner(s.traits),) if traits else ()),
             ZoneReasoner(s.zones),
             CouplingReasoner(replace(s.coupling, relations=s.relations)),
             RelationEventReasoner(s.narrative),

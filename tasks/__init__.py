@@ -2,9 +2,9 @@
 
 The rooms, in reading order: `grammar/` (text to tree), `diagnostics/` and `checks/` (every error of
 a file at once), `actions/` (what each action means in terms of relations), `automaton/` (where one
-can be in a task), `verification/` (whether what is seen confirms a step), `supervision/` (the
-reasoner: which actor is whom, how far the task is, what goes wrong), `tools/` (formatter, diagram,
-simulation, editor support), `shipped/` (the tasks that ship with visup).
+can be in a task), `verification/` (whether what is seen confirms a step), `casting/` (which object
+plays which actor), `supervision/` (the reasoner: how far the task is, what goes wrong), `tools/`
+(formatter, diagram, simulation, editor support), `shipped/` (the tasks that ship with visup).
 """
 
 from visup.tasks.checks.load import load_task, load_tasks, parse_task, shipped_tasks

@@ -69,6 +69,7 @@ class Agent:
         zones: Parts of the scene that rules can name.
         observers: Told of each step.
         models: Names of models that the operator may answer with, besides those spoken of.
+        cast: Actors of the tasks with the models that they may be; the operator may answer with them too.
         limits: What behaviours are held to.
         mind: The mental model now.
     """
@@ -79,6 +80,7 @@ class Agent:
     observers: Sequence[Observer] = ()
     zones: Sequence[Zone] = ()
     models: Sequence[str] = ()
+    cast: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
     mind: Mind = field(init=False)
     directives: tuple[Directive, ...] = field(default=(), init=False)
@@ -234,7 +236,9 @@ class Agent:
         Raises:
             SettingsError: There is no such object, or nobody knows such a name.
         """
-        self._answers[object_id] = resolve_answer(self.mind, object_id, name, self.models)
+        self._answers[object_id] = resolve_answer(
+            self.mind, object_id, name, self.models, self.cast
+        )
 
     def save(self) -> Mapping[str, Any]:
         """All that this agent has become, to be frozen by `visup.agent.storage.checkpoint`.

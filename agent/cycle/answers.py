@@ -12,21 +12,32 @@ from visup.agent.model.events import Event
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
+Cast = Mapping[str, tuple[str, ...]]
+"""Actor -> the models that it may be."""
+
+NOBODY_PLAYS: Cast = MappingProxyType({})
 NOBODY = ("unknown", UNKNOWN_OBJECT)
 """Answers that say that an object is none of the models."""
 
 
-def resolve_answer(mind: Mind, object_id: int, name: str, models: Iterable[str] = ()) -> str:
-    """The model that an answer means.
+def resolve_answer(
+    mind: Mind,
+    object_id: int,
+    name: str,
+    models: Iterable[str] = (),
+    cast: Cast = NOBODY_PLAYS,
+) -> str:
+    """The model, or the actor, that an answer means.
 
     Args:
         mind: The mind.
         object_id: Whom the answer is about.
         name: A model, an actor that stands for one, or 'unknown'.
         models: Models that are known besides those that anybody has spoken of.
+        cast: Actors of tasks, with the models that they may be.
 
     Returns:
-        The model's name, or 'unknown object'.
+        As of `resolve_model`.
 
     Raises:
         SettingsError: Nobody knows such an object or such a name.
@@ -37,19 +48,28 @@ def resolve_answer(mind: Mind, object_id: int, name: str, models: Iterable[str] 
         raise SettingsError(f"there is no object {object_id}", expected=f"one of: {known}")
     own = [c.name for c in belief.candidates]
     own += [n for q in mind.questions if q.object_id == object_id for n in q.names]
-    return resolve_model(mind, name, models, own)
+    return resolve_model(mind, name, models, own, cast)
 
 
 def resolve_model(
-    mind: Mind, name: str, models: Iterable[str] = (), own: Sequence[str] = ()
+    mind: Mind,
+    name: str,
+    models: Iterable[str] = (),
+    own: Sequence[str] = (),
+    cast: Cast = NOBODY_PLAYS,
 ) -> str:
-    """The model that a name means.
+    """The model, or the actor, that a name means.
 
     Args:
         mind: The mind, which knows the actors and what was spoken of.
         name: A model, an actor, or 'unknown'.
         models: Further models that are known.
         own: Models that the object may be, most likely first, for actors that stand for several.
+        cast: Actors of tasks, with the models that they may be.
+
+    Returns:
+        The model's name, or 'unknown object'. The actor's own where its models do not tell it: it
+        has none, or shares them with another.
 
     Raises:
         SettingsError: Nobody knows such a name.
@@ -58,7 +78,8 @@ def resolve_model(
     if said in NOBODY:
         return UNKNOWN_OBJECT
     meant = {_plain(m): m for m in _models(mind) | set(models)}
-    meant |= {_plain(actor): _model(found, own) for actor, found in mind.actors.items() if found}
+    played = {**cast, **{a: found for a, found in mind.actors.items() if found}}
+    meant |= {_plain(a): a if _shared(a, played) else _model(played[a], own) for a in played}
     if _plain(said) in meant:
         return meant[_plain(said)]
     raise SettingsError(
@@ -106,6 +127,12 @@ def _models(mind: Mind) -> set[str]:
 def _model(models: Sequence[str], own: Sequence[str]) -> str:
     """Which of an actor's models is meant: the likeliest of the object's names, else the first."""
     return next((n for n in own if n in models), models[0])
+
+
+def _shared(actor: str, cast: Cast) -> bool:
+    """Whether an actor's models do not tell it from others."""
+    own = set(cast[actor])
+    return not own or any(own & set(found) for a, found in cast.items() if a != actor)
 
 
 def _plain(name: str) -> str:

@@ -37,11 +37,13 @@ class Zone:
         name: What rules call it.
         polygon: Corners (x, y), pixels of the image, at least three, in order.
         depth: (nearest, farthest) relative depth, or None when the zone is drawn in the image alone.
+        on_floor: Whether it lies on the floor: a body is in it where it stands, not where its outline is.
     """
 
     name: str
     polygon: tuple[tuple[float, float], ...]
     depth: tuple[float, float] | None = None
+    on_floor: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +120,10 @@ class Mind:
     def coupled(self, a: int, b: int) -> bool:
         """Whether two objects are believed to be rigidly connected."""
         return any(c.objects == (min(a, b), max(a, b)) for c in self.couplings)
+
+    def one_machine(self, a: int, b: int) -> bool:
+        """Whether two objects are parts of one machine, as a task tells its parts."""
+        return any(a in parts and b in parts for task in self.tasks for parts in task.machines)
 
     def relation(self, name: str, *objects: int) -> Relation | None:
         """The relation of that name between exactly these objects, or None when it is not judged.

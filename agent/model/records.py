@@ -135,6 +135,8 @@ class Hypothesis:
         rotation: In-plane rotation from view to region, radians, or None.
         scale: Region pixels per unit of the model (metres where the model has metres), or None.
         direction: Unit vector from the object to the viewer in the model's frame, or None.
+        fitted: Whether direction and rotation were fitted to the picture; else they are those of a stored
+            view, some ten degrees away.
     """
 
     region_id: int
@@ -144,6 +146,7 @@ class Hypothesis:
     rotation: float | None = None
     scale: float | None = None
     direction: tuple[float, float, float] | None = None
+    fitted: bool = False
 
 
 @dataclass(frozen=True, slots=True)

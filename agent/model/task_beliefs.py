@@ -103,6 +103,8 @@ class TaskBelief:
         bindings: Which object plays which actor.
         expected: What the current stage asks for.
         unexplained: Ids of objects that no actor of the task explains.
+        bystanders: Ids of objects that the task lets be.
+        machines: Ids of objects that are one machine, for each machine of which parts are found.
         confidence: 0 to 1.
         evidence: One sentence: why the verdict is what it is.
         prospects: Stages that may begin next, the likeliest first; what is left of 1 is for the
@@ -123,3 +125,5 @@ class TaskBelief:
     prospects: tuple[Prospect, ...] = ()
     success: float | None = None
     active: float = 1.0
+    bystanders: tuple[int, ...] = ()
+    machines: tuple[tuple[int, ...], ...] = ()

@@ -79,11 +79,11 @@ class HealthBehaviour:
 
     def _judge(self, frame: Frame) -> Health:
         picture = measure_quality(frame.image)
-        same, near = self._repeats.compare(frame.image, picture.small)
+        repeat = self._repeats.compare(frame.image, picture.small)
         # An image that is all dark repeats itself too, and no frame is missing for that.
-        repeated = None if self._harmed else near
-        missing = self._arrivals.arrive(frame.index, frame.time, repeated)
-        frozen = self._frozen(frame.time, same)
+        told = None if self._harmed else repeat
+        missing = self._arrivals.arrive(frame.index, frame.time, told)
+        frozen = self._frozen(frame.time, repeat.same)
         health = _of_picture(picture, self._usual, self._settings)
         self._harmed = health is not OK
         noise_alone = False

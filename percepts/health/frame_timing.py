@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from visup.percepts.health.repeated_frames import Repeat
+
 WINDOW_S = 1.0
 MOST = 128
 ENOUGH = 6  # intervals before anything is said of what is usual
@@ -21,7 +23,9 @@ class Arrival:
         step: Frames since the one before, by number.
         wait: Seconds since the one before.
         repeated: Its image is that of the one before.
-        stale: How many frames before this one only repeated another, if this one is new.
+        stale: How many frames before this one only repeated another while what moves went on, if this
+            one is new.
+        sure: What moves is clearly further than one usual step after them.
     """
 
     time: float
@@ -29,6 +33,7 @@ class Arrival:
     wait: float
     repeated: bool
     stale: int
+    sure: bool
 
 
 class ArrivalMonitor:
@@ -50,14 +55,14 @@ class ArrivalMonitor:
         self._run_s = 0.0
         self._last: tuple[int, float] | None = None
 
-    def arrive(self, index: int, time: float, repeated: bool | None) -> int:
+    def arrive(self, index: int, time: float, repeat: Repeat | None) -> int:
         """Take in a frame.
 
         Args:
             index: Its number.
             time: Seconds.
-            repeated: Whether its image is that of the frame before; None when a fault of the
-                image leaves that untold.
+            repeat: What its image is to those before; None when a fault of the image leaves that
+                untold.
 
         Returns:
             How many frames are missing of late, when that is too many; else 0.
@@ -65,8 +70,10 @@ class ArrivalMonitor:
         last, self._last = self._last, (index, time)
         if last is None:
             return 0
-        stale = self._stale(repeated, time - last[1])
-        new = Arrival(time, index - last[0], time - last[1], repeated is True, stale)
+        stale = self._stale(repeat, time - last[1])
+        sure = stale > 0 and repeat is not None and repeat.catches_up
+        repeated = repeat is not None and repeat.near
+        new = Arrival(time, index - last[0], time - last[1], repeated, stale, sure)
         self._recent.append(new)
         past = []
         while time - self._recent[0].time >= WINDOW_S:
@@ -81,14 +88,14 @@ class ArrivalMonitor:
             self._repeats.append(new.repeated)
         return missing
 
-    def _stale(self, repeated: bool | None, wait: float) -> int:
-        """Length of the run of repeats that ends with this frame."""
-        if repeated is None:
+    def _stale(self, repeat: Repeat | None, wait: float) -> int:
+        """Length of the run of repeats that ends with this frame, if something went on meanwhile."""
+        if repeat is None:
             self._run, self._run_s = 0, 0.0
             return 0
         run, lasted = self._run, self._run_s
-        self._run, self._run_s = (run + 1, lasted + wait) if repeated else (0, 0.0)
-        return 0 if repeated or lasted >= self._frozen_s else run
+        self._run, self._run_s = (run + 1, lasted + wait) if repeat.near else (0, 0.0)
+        return run if repeat.resumes and lasted < self._frozen_s else 0
 
     def _missing(self) -> int:
         if len(self._waits) < ENOUGH:
@@ -98,8 +105,8 @@ class ArrivalMonitor:
         # Many cameras repeat frames always, for want of light or to fill a rate.
         habit = float(np.mean(self._repeats)) > 0.04
         gaps = [max(a.step / step, a.wait / wait) - 1.0 for a in self._recent]
-        total = sum(g for g in gaps if g > 0.6)
-        stale = 0 if habit else sum(a.stale for a in self._recent)
+        total = sum(g for g in gaps if g > 0.6) - self._early(wait, step)
+        stale = 0 if habit else self._stale_of_late()
         due = WINDOW_S / wait
         if max(gaps, default=0.0) > self._gap - 0.4:
             return round(total)
@@ -107,3 +114,14 @@ class ArrivalMonitor:
         sure = total >= max(3.0, self._lost * due)
         told = sure or total + stale >= max(3.0, 2.0 * self._lost * due)
         return round(total + stale) if told else 0
+
+    def _early(self, wait: float, step: float) -> float:
+        """Frames that came before their time: those that came late are not missing for them."""
+        shares = [a.wait / wait for a in self._recent if a.step <= step]
+        return sum(1.0 - share for share in shares if share < 0.4)
+
+    def _stale_of_late(self) -> int:
+        """Frames that others stand in place of; a single pause must be caught up with to be one."""
+        runs = [a for a in self._recent if a.stale]
+        believed = len(runs) > 1 or any(a.sure for a in runs)
+        return sum(a.stale for a in runs) if believed else 0

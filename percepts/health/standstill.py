@@ -23,6 +23,7 @@ AFTER_S = 0.42  # how long what is new must have stood
 KEPT_S = 1.0
 MOST = 48  # looks that are kept, whatever the frame rate
 FEWEST = 3  # looks before the change
+SETTLED = 1.0  # grey levels that what stands may differ by in all, beyond noise
 JUMP = 1.0  # grey levels; keyframes of codecs stir a dark scene by less
 
 
@@ -122,10 +123,12 @@ class StandstillDetector:
         if len(before) < FEWEST:
             return None
         calm = np.median([k.change for k in after[1:]], axis=0)
+        # What passes is calm before and after; what halted or was covered looks the same ever since.
+        passed = per_cell(cv2.absdiff(now.small, after[1].small)) >= still + SETTLED
         least = np.min([k.slow for k in before], axis=0)
         most = np.max([k.change for k in before], axis=0)
         texture = np.min([k.texture for k in before], axis=0)
-        stands = calm < still
+        stands = (calm < still) & ~passed
         noise = min(still, float(np.quantile(least, 0.1)))
         lively = least > 0.4 + 2.0 * noise
         stopped = lively & stands & (now.slow < 0.25 * least)
@@ -165,7 +168,7 @@ def _persists(halt: Standstill, small: Floats, still: float) -> bool:
     if halt.small.shape != small.shape:
         return False
     apart = per_cell(cv2.absdiff(small, halt.small))[halt.cells]
-    return float(np.mean(apart < still + 1.0)) > (0.9 if halt.whole else 0.6)
+    return float(np.mean(apart < still + SETTLED)) > (0.9 if halt.whole else 0.6)
 
 
 def _all_stopped(lively: Mask, stopped: Mask) -> bool:

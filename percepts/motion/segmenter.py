@@ -41,6 +41,7 @@ from visup.percepts.motion.layers.dense_labelling import (
     label_cells,
 )
 from visup.percepts.motion.layers.layer_discovery import affine_rate
+from visup.percepts.motion.output.cast_shadows import CastShadowFilter
 from visup.percepts.motion.output.region_report import (
     apply_ignore,
     looked_at,
@@ -99,6 +100,7 @@ class MotionSegmenter:
         self._camera: dict[int, AffineRate] = {}
         self._camera_fixed_until: float | None = None
         self._static = StaticCameraSegmenter()
+        self._shadows = CastShadowFilter()
         self._count = self._last_key = 0
 
     @property
@@ -152,6 +154,7 @@ class MotionSegmenter:
         regions = report_regions(tracks, scene, self._size, self.settings, self._beside)
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
+        regions = self._shadows.step(frame, scene, regions, static=self._static.active)
         return select_regions(regions, directives)
 
     def _begin(self, image: WorkImage) -> None:

@@ -188,7 +188,8 @@ class CouplingReasoner:
         table = table.with_block(_coupled_cells(observed, coupled, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
-        return Outcome(mind, tuple(events))
+        # That parts of one machine hang together is no news.
+        return Outcome(mind, tuple(e for e in events if not mind.one_machine(*e.objects)))
 
     def _look(
         self, before: CouplingEvidence, seen: PairObservation, mind: Mind

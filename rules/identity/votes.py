@@ -238,6 +238,12 @@ def unknown_probability(tally: VoteCounts, settings: VoteSettings, stranger: flo
     return 1.0 / (1.0 + odds)
 
 
+def answered_model(mind: Mind, answer: str) -> str:
+    """The model that an answer means: the first of an actor's, where the answer names an actor."""
+    bindings = (b for task in mind.tasks for b in task.bindings if b.actor == answer)
+    return next((b.models[0] for b in bindings if b.models), answer)
+
+
 def confirmed_candidate(name: str, tally: VoteCounts) -> Candidate:
     """The only candidate, once the operator has said what an object is."""
     return Candidate(name, dict(tally).get(name, 0.0), 1.0, 1.0)
@@ -335,9 +341,9 @@ class IdentityReasoner:
         if answer == UNKNOWN_OBJECT:
             return replace(belief, candidates=(), unknown=1.0)
         if answer is not None:
-            return replace(
-                belief, candidates=(confirmed_candidate(answer, votes.counts),), unknown=0.0
-            )
+            name = answered_model(mind, answer)
+            said = (confirmed_candidate(name, votes.counts),)
+            return replace(belief, candidates=said, unknown=0.0)
         return replace(
             belief,
             candidates=candidates(votes.counts, s, votes.none),

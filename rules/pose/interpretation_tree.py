@@ -94,7 +94,9 @@ class TreeLevel:
         orientation: (H, 3, 3) model to camera; NaN where the direction is not known.
         rolled: (H,) bool: whether the turn in the plane is known.
         cost: (H,) of choosing each, not yet weighted.
-        between: (H, 3, 3) orientation that neighbouring hypotheses tell together with each.
+        between: (H, 3, 3) orientation that neighbouring hypotheses tell together with each; its own of one
+            that was fitted to the picture.
+        fitted: (H,) bool: whether each was.
     """
 
     time: float
@@ -103,6 +105,7 @@ class TreeLevel:
     rolled: NDArray[np.bool_]
     cost: Floats
     between: Floats
+    fitted: NDArray[np.bool_]
 
 
 _NO_LEVEL = TreeLevel(
@@ -112,6 +115,7 @@ _NO_LEVEL = TreeLevel(
     np.zeros(0, bool),
     np.zeros(0),
     np.zeros((0, 3, 3)),
+    np.zeros(0, bool),
 )
 
 
@@ -201,14 +205,19 @@ def _level(hypotheses: Sequence[Hypothesis], time: float, settings: TreeSettings
         np.array([h.rotation is not None for h in hypotheses]),
         (similarity.max() - similarity) / settings.similarity_sigma,
         orientation,
+        np.array([h.fitted for h in hypotheses]),
     )
 
 
 def _part(whole: TreeLevel, at: slice, settings: TreeSettings) -> TreeLevel:
     """The hypotheses of one model."""
     orientation, cost = whole.orientation[at], whole.cost[at]
+    fitted = whole.fitted[at]
     between = _between(orientation, -cost * settings.similarity_sigma, settings)
-    return TreeLevel(whole.time, whole.views[at], orientation, whole.rolled[at], cost, between)
+    between = np.where(fitted[:, None, None], orientation, between)
+    return TreeLevel(
+        whole.time, whole.views[at], orientation, whole.rolled[at], cost, between, fitted
+    )
 
 
 def _between(orientation: Floats, similarity: Floats, settings: TreeSettings) -> Floats:

@@ -39,12 +39,20 @@ from visup.rules.pose.interpretation_tree import (
     rival_gap,
     similarity_lead,
 )
-from visup.rules.pose.rotations import Floats
+from visup.rules.pose.rotations import Floats, sight_rotation
 from visup.rules.presence.association import hypotheses_by_object
 from visup.rules.presence.reasoner import visible_share
 
+USUAL_FOCAL = 1.2
+"""Focal length of a usual lens, in widths of the picture; how far an object's way across the image
+turns it is wrong in the proportion to the true one."""
+
 LookSignature = tuple[tuple[str, int, float, float | None], ...]
 """What was said at a look: (name, view, similarity, rotation) of each hypothesis."""
+
+
+FITTED = SpinSettings(swing_deg=2.5, roll_deg=2.5, view_deg=0.5, view_share=0.02, view_most_deg=1.0)
+"""How spin is measured from orientations that are exact to some two degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +61,9 @@ class PoseSettings:
 
     Attributes:
         tree: Costs and bounds of the interpretation trees.
-        spin: How spin is measured.
+        spin: How spin is measured from stored views.
+        fitted_spin: The same from orientations that were fitted to the picture, which are exact to two
+            degrees and follow the object without steps.
         every_s: Looks at one object are at least so far apart.
         most_looks: Objects whose trees grow in one step at most; those that have waited longest come
             first. The budget of the most expensive part of reasoning: it counts work, not time, so that what
@@ -76,6 +86,7 @@ class PoseSettings:
 
     tree: TreeSettings = field(default_factory=TreeSettings)
     spin: SpinSettings = field(default_factory=SpinSettings)
+    fitted_spin: SpinSettings = field(default_factory=lambda: FITTED)
     every_s: float = 0.2
     most_looks: int = 4
     refit_s: float = 1.0
@@ -101,6 +112,7 @@ class PoseTrack:
         said: What was said then; when the same is said again nobody looked anew.
         trees: Model name -> its tree.
         levels: Model name -> its level, for each of the last looks.
+        sights: For each of them, (3, 3): from a camera that looks at the object to the camera itself.
         strain: Model name -> cost of its cheapest path, forgotten over time.
         untold: The same of a model that was never hypothesised.
         support: Model name -> how far its strain lets it be the object, 0 to 1.
@@ -117,6 +129,7 @@ class PoseTrack:
     said: LookSignature = ()
     trees: Mapping[str, InterpretationTree] = field(default_factory=lambda: MappingProxyType({}))
     levels: tuple[Mapping[str, TreeLevel], ...] = ()
+    sights: tuple[Floats, ...] = ()
     strain: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     untold: float = 0.0
     support: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
@@ -127,6 +140,21 @@ class PoseTrack:
     rate: AngularVelocity | None = None
     rated: float = -np.inf
     pose: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """What was said of an object at one look.
+
+    Attributes:
+        time: Seconds.
+        said: Hypotheses of views.
+        sight: (3, 3) from a camera that looks at the object to the camera itself.
+    """
+
+    time: float
+    said: Sequence[Hypothesis]
+    sight: Floats
 
 
 POSES: MemoryKey[Mapping[int, PoseTrack]] = MemoryKey("rules.pose", MappingProxyType({}))
@@ -170,7 +198,8 @@ class PoseReasoner:
         for object_id, belief in mind.objects.items():
             track = known.get(object_id, NO_TRACK)
             if object_id in due:
-                track = self._looked(track, said[object_id], belief.name, mind.time)
+                look = Look(mind.time, said[object_id], _sight(mind, belief))
+                track = self._looked(track, look, belief.name)
             if track.trees:
                 kept[object_id] = track
             pose = self._now(track, belief.name, mind.time)
@@ -201,21 +230,19 @@ class PoseReasoner:
         seen = belief.presence is Presence.SEEN
         return seen and visible_share(mind, belief.id) >= self.settings.least_visible
 
-    def _looked(
-        self, track: PoseTrack, hypotheses: Sequence[Hypothesis], name: str, now: float
-    ) -> PoseTrack:
+    def _looked(self, track: PoseTrack, look: Look, name: str) -> PoseTrack:
         """The track after a look."""
-        said = _look_signature(hypotheses)
-        levels = levels_of(hypotheses, now, self.settings.tree)
         track = self._settled(track, name)
-        waited = now - track.time
-        track = self._rated(self._grown(replace(track, said=said), levels, now), name, now)
+        waited = look.time - track.time
+        grown = self._grown(replace(track, said=_look_signature(look.said)), look)
+        track = self._rated(grown, name, look.time)
         track = self._led(track, name, waited)
         return replace(track, pose=self._pose(track, name))
 
-    def _grown(self, track: PoseTrack, levels: dict[str, TreeLevel], now: float) -> PoseTrack:
+    def _grown(self, track: PoseTrack, look: Look) -> PoseTrack:
         """The trees with one more level, and what their models have cost."""
-        s = self.settings
+        s, now = self.settings, look.time
+        levels = levels_of(look.said, now, s.tree)
         turning = _spin_prior(track.rate, s)
         fade = exp(-min(now - track.time, 1e6) / s.memory_s)
         untold = track.untold * fade + look_weight(now - track.time, s.tree) * s.tree.wrong
@@ -235,6 +262,7 @@ class PoseReasoner:
             time=now,
             trees=MappingProxyType({n: trees[n] for n in likeliest}),
             levels=(*track.levels, MappingProxyType(levels))[-s.tree.lag :],
+            sights=(*track.sights, look.sight)[-s.tree.lag :],
             strain=MappingProxyType({n: strain[n] for n in likeliest}),
             untold=untold,
             support=MappingProxyType({n: self._support(strain[n] - least) for n in likeliest}),
@@ -259,7 +287,7 @@ class PoseReasoner:
         if track.settled and then - track.settled[-1][0] < s.settle_s - 1e-9:
             return track
         oldest = then - s.spin.window_s
-        settled = (*track.settled, (then, seen))
+        settled = (*track.settled, (then, track.sights[0] @ seen))
         forgotten = settled[0][0] < oldest
         return replace(track, settled=settled[1:] if forgotten else settled)
 
@@ -267,10 +295,11 @@ class PoseReasoner:
         if now - track.rated < self.settings.refit_s - 1e-9 or name not in track.trees:
             return track
         turns = _orientation_series(track, name, self.settings.tree.lag)
+        level = track.levels[-1].get(name)
+        fitted = level is not None and bool(level.fitted.any())
+        how = self.settings.fitted_spin if fitted else self.settings.spin
         return replace(
-            track,
-            rate=estimate_angular_velocity(turns, now, track.rate, self.settings.spin),
-            rated=now,
+            track, rate=estimate_angular_velocity(turns, now, track.rate, how), rated=now
         )
 
     def _led(self, track: PoseTrack, name: str, waited: float) -> PoseTrack:
@@ -321,6 +350,13 @@ class PoseReasoner:
         return exp(-max(0.0, age) / self.settings.stale_s)
 
 
+def _sight(mind: Mind, belief: ObjectBelief) -> Floats:
+    """From a camera that looks at the object to the camera itself."""
+    width, height = mind.frame_size
+    x, y = belief.region.centroid
+    return sight_rotation((x - width / 2, y - height / 2), USUAL_FOCAL * width)
+
+
 def _look_signature(hypotheses: Sequence[Hypothesis]) -> LookSignature:
     return tuple((h.name, h.view, h.similarity, h.rotation) for h in hypotheses)
 
@@ -345,8 +381,8 @@ def _orientation_series(track: PoseTrack, name: str, lag: int) -> OrientationSer
     tree = track.trees[name]
     path = tree.path[tree.best, lag - len(track.levels) :]
     recent = [
-        (levels[name].time, seen)
-        for levels, number in zip(track.levels, path.tolist(), strict=True)
+        (levels[name].time, sight @ seen)
+        for levels, sight, number in zip(track.levels, track.sights, path.tolist(), strict=True)
         if (seen := _orientation(levels.get(name), number)) is not None
     ]
     every = [*track.settled, *recent]

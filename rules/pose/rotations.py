@@ -69,6 +69,27 @@ def nearest_rotations(matrices: Floats) -> Floats:
     return np.asarray((u * sign[..., None, :]) @ v)
 
 
+def sight_rotation(place: tuple[float, float], focal_px: float) -> Floats:
+    """The rotation from a camera that looks at a place in the image to the camera itself, (3, 3).
+
+    Orientations are told as if the camera looked at the object, and an object that goes across the
+    image without turning is seen from another side: by this much.
+
+    Args:
+        place: (x, y) from the centre of the image, pixels.
+        focal_px: Focal length, pixels.
+
+    Example:
+        >>> ahead = sight_rotation((100.0, 0.0), 100.0) @ np.array([0.0, 0.0, 1.0])
+        >>> ahead.round(3).tolist()
+        [0.707, 0.0, 0.707]
+    """
+    x, y = place
+    off = float(np.hypot(x, y))
+    turn = np.arctan2(off, focal_px) / max(off, _SMALL)
+    return rotation_matrices(np.array([-y * turn, x * turn, 0.0]))
+
+
 def _series(vectors: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """sin(a)/a and (1 - cos(a))/a^2, each (..., 1, 1); the cross product matrix and its square."""
     k = np.zeros((*vectors.shape, 3))

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from visup.agent import Mind
 
-REMEMBERED = frozenset({"expected", "engaged", "unexpected", "actor", "named"})
+REMEMBERED = frozenset({"expected", "engaged", "unexpected", "actor", "named", "identified"})
 """Words about beliefs that outlive what they came from."""
 
 _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(

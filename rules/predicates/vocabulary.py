@@ -14,6 +14,7 @@ from visup.agent import HealthStatus, ObjectBelief, Presence, Region
 from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
 from visup.rules.formula.units import ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
 from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates import certainty
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
@@ -41,8 +42,6 @@ IMPLIED = MappingProxyType(
 """Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
 
 STILL_SPEED = RelationSettings().still_speed
-KEEP_OUT = "keep_out"
-"""Zones whose names begin so are forbidden to all."""
 PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
 SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
@@ -130,6 +129,22 @@ def is_actor(facts: Snapshot) -> Codes:
     """Whether an object plays an actor of an active task."""
     bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
     return facts.among(bound)
+
+
+def is_bystander(facts: Snapshot) -> Codes:
+    """Whether a task lets an object be, and none has it for an actor."""
+    tasks = facts.mind.tasks
+    acting = {b.object_id for task in tasks for b in task.bindings}
+    return facts.among({i for task in tasks for i in task.bystanders} - acting)
+
+
+def one_machine(facts: Snapshot) -> Codes:
+    """Whether two objects are parts of one machine, as a task tells its parts."""
+    codes, row = facts.pairs(NO), facts.row
+    for parts in (m for task in facts.mind.tasks for m in task.machines):
+        rows = [row[i] for i in parts if i in row]
+        codes[np.ix_(rows, rows)] = YES
+    return codes
 
 
 def is_named(facts: Snapshot, name: str) -> Codes:
@@ -225,7 +240,7 @@ def _presence(wanted: Presence) -> Callable[[Snapshot], Codes]:
 
 def in_forbidden_zone(facts: Snapshot) -> Codes:
     """Whether some part of an object is in a zone that is forbidden to all."""
-    zones = [z.name for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
+    zones = [z.name for z in facts.mind.zones if z.name.startswith(certainty.KEEP_OUT)]
     if not zones:
         return facts.among(())
     codes: Codes = np.max([_zone("reaching")(facts, name) for name in zones], axis=0)
@@ -256,8 +271,16 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         ),
         "unexpected": PredicateDefinition(_ONE, unexpected, "no active task explains the object"),
         "actor": PredicateDefinition(_ONE, is_actor, "the object plays an actor of an active task"),
+        "bystander": PredicateDefinition(_ONE, is_bystander, "a task lets the object be"),
+        "one_machine": PredicateDefinition(_TWO, one_machine, "they are parts of one machine"),
         "named": PredicateDefinition(
             ("object", "name"), is_named, "the object is believed to be that"
+        ),
+        "standalone": PredicateDefinition(
+            _ONE, certainty.standalone, "it is surely a thing of its own, no part of a larger one"
+        ),
+        "identified": PredicateDefinition(
+            _ONE, certainty.identified, "it is likelier a model known than none of them"
         ),
         "seen": PredicateDefinition(_ONE, _presence(Presence.SEEN), "the object is seen"),
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
@@ -273,7 +296,12 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
             )
         },
         "in_forbidden_zone": PredicateDefinition(
-            _ONE, in_forbidden_zone, f"some part is in a zone whose name begins with {KEEP_OUT}"
+            _ONE,
+            in_forbidden_zone,
+            f"some part is in a zone whose name begins with {certainty.KEEP_OUT}",
+        ),
+        "at_home": PredicateDefinition(
+            _ONE, certainty.at_home, "it was in such a zone when the video began"
         ),
         "first_contact": PredicateDefinition(
             _TWO, first_contact, "the second is what the first would meet first"

@@ -26,7 +26,9 @@ class ObjectSettings:
         most_owners: Bound on remembered region ids.
         forget_unconfirmed_s: A new region unseen for this long was nothing.
         forget_left_s: An object that left is remembered for this long.
-        forget_hidden_s: A hidden object is remembered for this long.
+        forget_hidden_s: A hidden object is remembered for this long when it is known what it is or an
+            actor's part is its own.
+        forget_nameless_s: Any other hidden object is remembered for this long.
         percept_age_s: Percepts of plug-ins' own kinds fade after this.
     """
 
@@ -35,6 +37,9 @@ class ObjectSettings:
     forget_unconfirmed_s: float = 0.5
     forget_left_s: float = 30.0
     forget_hidden_s: float = 300.0
+    # Longer than an occlusion in passing takes (2.7 and 4.5 s in the missions); with minutes, roads fill
+    # the mind with all that ever passed behind something.
+    forget_nameless_s: float = 10.0
     percept_age_s: float = 2.0
 
 
@@ -84,19 +89,29 @@ class ObjectReasoner:
         return MappingProxyType({**fresh, **{k: tuple(ps) for k, ps in new.items()}})
 
     def _forget(self, mind: Mind) -> Mind:
-        gone = {i for i, b in mind.objects.items() if self._stale(b, mind.time)}
+        parts = {b.object_id for task in mind.tasks for b in task.bindings}
+        gone = {i for i, b in mind.objects.items() if self._stale(b, mind, i in parts)}
         left = [b for i, b in mind.objects.items() if i not in gone]
         left.sort(key=lambda b: (b.confirmed, b.last_seen, b.id))
         gone |= {b.id for b in left[: max(0, len(left) - self.settings.most_objects)]}
         return delete_objects(mind, frozenset(gone))
 
-    def _stale(self, belief: ObjectBelief, now: float) -> bool:
-        unseen = now - belief.last_seen
+    def _stale(self, belief: ObjectBelief, mind: Mind, is_actor: bool) -> bool:
+        unseen = mind.time - belief.last_seen
         if not belief.confirmed:
             return unseen > self.settings.forget_unconfirmed_s
         if belief.presence is Presence.LEFT:
             return unseen > self.settings.forget_left_s
-        return belief.presence is Presence.HIDDEN and unseen > self.settings.forget_hidden_s
+        if belief.presence is not Presence.HIDDEN:
+            return False
+        known = is_actor or belief.id in mind.answers or _is_identified(belief)
+        longest = self.settings.forget_hidden_s if known else self.settings.forget_nameless_s
+        return unseen > longest
+
+
+def _is_identified(belief: ObjectBelief) -> bool:
+    """Whether some identity is likelier than that it is none of the models known."""
+    return bool(belief.candidates) and belief.candidates[0].confidence > belief.unknown
 
 
 def _sighted(mind: Mind, object_id: int, region: Region) -> ObjectBelief:

@@ -2,9 +2,10 @@
 
 A zone is a polygon in the image, with or without a range of depth. Three questions are asked of
 each object and zone: is its centre inside, does any part of it reach into the zone, is all of it
-within. The polygon is judged with noise thresholds, hysteresis and a least duration; with a range
-of depth, an object that the image places inside but whose depth is unknown is not known to be
-inside, while one that the image places outside is outside whatever its depth.
+within. Of a zone on the floor they are asked of where the object stands. The polygon is judged with
+noise thresholds, hysteresis and a least duration; with a range of depth, an object that the image
+places inside but whose depth is unknown is not known to be inside, while one that the image places
+outside is outside whatever its depth.
 
 How to read them off a mind:
 
@@ -24,8 +25,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent import Mind, ObjectBelief, Observation, Outcome, Relation, Truth, Zone
+from visup.agent import Mind, ObjectBelief, Observation, Outcome, Region, Relation, Truth, Zone
 from visup.agent.model.memory import MemoryKey
+from visup.rules.geometry.ground import foot_points, standing_point
 from visup.rules.geometry.regions import Floats, densified, image_diagonal, outline
 from visup.rules.smoothing.ema import exponential_mean
 from visup.rules.smoothing.hysteresis import (
@@ -137,6 +139,8 @@ class ZoneReasoner:
         if mind.time - belief.last_seen > self.settings.hold_s:
             return (np.nan,) * 4
         region, polygon = belief.region, np.asarray(zone.polygon, dtype=float)
+        if zone.on_floor:
+            return *self._feet_apart(region, polygon, mind), _beyond(zone, belief)
         points = densified(outline(region), 8.0)
         points = points[:: -(-len(points) // self.settings.points)]
         distance = outside(np.vstack([[region.centroid], points]), polygon)
@@ -144,6 +148,15 @@ class ZoneReasoner:
         if least > 0.0 and _covers(belief, polygon):
             least = -least
         return float(distance[0]), least, float(distance[1:].max()), _beyond(zone, belief)
+
+    def _feet_apart(self, region: Region, polygon: Floats, mind: Mind) -> tuple[float, ...]:
+        """Outside the zone: the middle of a body's feet, the nearest, the farthest; NaN unknown."""
+        feet = foot_points(region, mind.frame_size)
+        if not len(feet):
+            return (np.nan,) * 3
+        feet = feet[:: -(-len(feet) // self.settings.points)]
+        distance = outside(np.vstack([standing_point(feet), feet]), polygon)
+        return float(distance[0]), float(distance[1:].min()), float(distance[1:].max())
 
 
 def edge_sign(apart: Floats, before: Codes, band: Floats) -> Codes:

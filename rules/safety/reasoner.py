@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from visup.agent import Mind, Observation, Outcome, TaskBelief
+from visup.agent import AlertCondition, Mind, Observation, Outcome, TaskBelief
 from visup.agent.model.memory import MemoryKey
 from visup.rules.formula.nodes import Rule
 from visup.rules.formula.units import ticks
@@ -77,7 +77,8 @@ class RuleReasoner:
         if not same or (old.now is not None and now < old.now):
             old = RuleMemory(self.rules)
         if old.now is not None and now - old.now < MIN_SPACING:
-            return Outcome(mind, conditions=tuple(h.concern for h in old.held.values()))
+            told = tuple(h.concern for h in old.held.values())
+            return Outcome(mind, conditions=once_per_machine(told, mind))
         prepared, facts = self._prepared, Snapshot(mind)
         before = prepared.fresh(len(facts.ids)) if old.after is None else old.after
         if old.after is not None and old.ids != facts.ids:
@@ -98,7 +99,31 @@ class RuleReasoner:
                 cooling,
             ),
         )
-        return Outcome(mind, conditions=tuple([h.concern for h in held.values()]))
+        told = tuple(h.concern for h in held.values())
+        return Outcome(mind, conditions=once_per_machine(told, mind))
+
+
+def once_per_machine(
+    conditions: tuple[AlertCondition, ...], mind: Mind
+) -> tuple[AlertCondition, ...]:
+    """Conditions without those that say of another part of a machine what is said of one already.
+
+    What an open alert tells stays; else the gravest stays, of several the first.
+    """
+    machine_of = {i: m[0] for task in mind.tasks for m in task.machines for i in m}
+    if not machine_of:
+        return conditions
+    open_now = {(a.kind, a.objects, a.key) for a in mind.alerts}
+    ranked = sorted(
+        conditions,
+        key=lambda c: ((c.kind, c.objects, c.key) not in open_now, -c.severity),
+    )
+    first: dict[tuple[str, tuple[int, ...]], AlertCondition] = {}
+    for c in ranked:
+        about = tuple(sorted({machine_of.get(i, i) for i in c.objects}))
+        first.setdefault((c.kind, about), c)
+    kept = {id(c) for c in first.values()}
+    return tuple(c for c in conditions if id(c) in kept)
 
 
 def rule_memory(mind: Mind) -> RuleMemory:

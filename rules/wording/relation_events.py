@@ -41,7 +41,7 @@ class RelationEventReasoner:
     """Reasoner of the cogitate phase: 'relation' events for trends that are new and last.
 
     A pair that keeps its distance is told of only when it converged or diverged before; coupled
-    pairs are left alone.
+    pairs, and parts of one machine, are left alone.
     """
 
     settings: RelationEventSettings = field(default_factory=RelationEventSettings)
@@ -74,7 +74,9 @@ class RelationEventReasoner:
         s = self.settings
         if relation.confidence < s.least_confidence or mind.time - relation.since < s.lasting_s:
             return False
-        return not (len(relation.objects) == 2 and mind.coupled(*relation.objects))
+        if len(relation.objects) != 2:
+            return True
+        return not (mind.coupled(*relation.objects) or mind.one_machine(*relation.objects))
 
 
 def _event(relation: Relation, mind: Mind, observation: Observation) -> Event:

@@ -15,24 +15,31 @@ import numpy as np
 
 from visup.agent import Truth
 from visup.rules.formula.truth import NEGATION, TRUTH_OF, truth_if
+from visup.rules.formula.units import Number
 from visup.rules.predicates.inputs_missing import inputs_missing
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.rules.relations.zones import contains, zone_truth
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
-from visup.tasks.grammar.conditions import Fact, action_of, bound_of, facts_of
-from visup.tasks.grammar.nodes import Action, Actors, Comparison, Task, walk
+from visup.tasks.actions.floor import floor_distance, floor_polygon, stands_in
+from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
+from visup.tasks.grammar.nodes import Action, Actors, Comparison, Conditioned, Task, walk
 from visup.tasks.grammar.statement import RESERVED_WORDS as RESERVED
 from visup.tasks.grammar.structure import fact_key
-from visup.tasks.grammar.units import MEASURES, value
+from visup.tasks.grammar.units import MEASURES, SIZE, dimension, value
 
-OF_TASKS = frozenset({"unexpected", "expected", "actor"})
+OF_TASKS = frozenset({"unexpected", "expected", "actor", "bystander", "one_machine"})
 """Words of rules that speak of tasks themselves: a task that asked for them would ask for itself."""
 
+BETWEEN = "between"
 DEPTHS = frozenset({"region", "hypothesis", "depth"})
 
 FactEvaluator = Callable[[Snapshot, tuple[int, ...]], Truth]
 """Whether something holds between objects, by id, in a mind as rules see it."""
+
+
+Measured = Callable[[Snapshot, tuple[int, ...]], tuple[float, float]]
+"""The interval of a quantity of objects, by their places among the facts, in the base unit."""
 
 
 def rule_actions() -> Iterator[ActionDefinition]:
@@ -96,9 +103,11 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             continue
         text = actions[name].text
         if isinstance(fact, Comparison):
-            amount = task.amount(bound_of(fact))
-            looks[key] = _comparison(name, fact.operator, value(amount))
-            text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {amount}"
+            amounts = [task.amount(a) for a in bounds_of(fact)]
+            measured = _measure(task, name, amounts[0])
+            looks[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
+            said = " and ".join(map(str, amounts))
+            text = f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
         else:
             zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
@@ -107,6 +116,11 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
         meanings[key] = replace(
             actions[name], name=key, holds=(key,), arity=len(takes), takes=takes, text=text
         )
+        if isinstance(fact, Comparison) and fact.operator == BETWEEN:
+            # To stay within a range goes on until the next thing begins, and fails outside it.
+            outside = f"outside {key}"
+            looks[outside] = _outside(looks[key])
+            meanings[key] = replace(meanings[key], lasts=True, contrary=(outside,))
     return TaskVocabulary(MappingProxyType(meanings), MappingProxyType(looks))
 
 
@@ -118,8 +132,9 @@ def _facts(task: Task) -> Iterator[Fact]:
         for course in walk(stage.body):
             if isinstance(course, Action | Comparison):
                 yield course
-            for sign in getattr(course, "signs", ()):
-                yield from facts_of(sign.condition)
+            if isinstance(course, Conditioned):
+                for sign in course.conditions:
+                    yield from facts_of(sign.condition)
     for invariant in task.invariants:
         yield from facts_of(invariant.condition)
 
@@ -139,7 +154,7 @@ def _rows(facts: Snapshot, ids: tuple[int, ...]) -> tuple[int, ...] | None:
     return tuple(facts.row[i] for i in ids) if facts.row.keys() >= set(ids) else None
 
 
-SIGNS = {"<": "below", "<=": "of at most", ">": "above", ">=": "of at least"}
+SIGNS = {BETWEEN: BETWEEN, "<": "below", "<=": "of at most", ">": "above", ">=": "of at least"}
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": lambda a, b: a < b,
     "<=": lambda a, b: a <= b,
@@ -148,23 +163,57 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 }
 
 
-def _comparison(name: str, sign: str, bound: float) -> FactEvaluator:
+def _outside(within: FactEvaluator) -> FactEvaluator:
+    return lambda facts, ids: NEGATION[within(facts, ids)]
+
+
+def _measure(task: Task, name: str, amount: Number) -> Measured:
+    """How a quantity is measured: a gap in metres on the floor, all else as rules do."""
+    if name == "gap" and dimension(amount) == SIZE:
+        distance = floor_distance(task.ground)
+
+        def on_floor(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
+            metres = distance(facts, rows)
+            return (metres, metres) if metres == metres else (-np.inf, np.inf)
+
+        return on_floor
+
+    def plain(facts: Snapshot, rows: tuple[int, ...]) -> tuple[float, float]:
+        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        return low, high
+
+    return plain
+
+
+def _comparison(
+    name: str, measured: Measured, sign: str, bound: float, most: float = 0.0
+) -> FactEvaluator:
     """A quantity against a bound: true or false when all of its interval says so."""
 
     def look(facts: Snapshot, ids: tuple[int, ...]) -> Truth:
         rows = _rows(facts, ids)
         if rows is None or inputs_missing(facts.mind, name):
             return Truth.UNKNOWN
-        low, high = (float(side[rows]) for side in QUANTITIES[name].look(facts))
+        low, high = measured(facts, rows)
+        if sign == BETWEEN:
+            return _within(low, high, bound, most)
         told = {_COMPARE[sign](low, bound), _COMPARE[sign](high, bound)}
         return Truth.UNKNOWN if len(told) > 1 else truth_if(told.pop())
 
     return look
 
 
+def _within(low: float, high: float, least: float, most: float) -> Truth:
+    """Whether an interval lies between two bounds; unknown where only part of it does."""
+    if least <= low and high <= most:
+        return Truth.TRUE
+    return Truth.FALSE if high < least or low > most else Truth.UNKNOWN
+
+
 def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
     """A zone drawn in the task is looked at as it is; one of the settings as rules judge it."""
-    corners = next(z.corners for z in task.zones if z.name == zone)
+    declared = next(z for z in task.zones if z.name == zone)
+    corners, floor = declared.corners, floor_polygon(declared, task.ground)
     polygon = np.asarray(corners, dtype=float)
     question = "reaching" if name == "outside" else name
 
@@ -172,7 +221,11 @@ def _zone_look(task: Task, name: str, zone: str) -> FactEvaluator:
         rows = _rows(facts, ids)
         if rows is None:
             return Truth.UNKNOWN
-        if corners:
+        if declared.floor:
+            told = Truth.UNKNOWN
+            if floor is not None:
+                told = stands_in(facts.beliefs[rows[0]], floor, question, facts.mind.frame_size)
+        elif corners:
             region = facts.beliefs[rows[0]].region
             centre = np.array([region.centroid])
             points = centre if name == "inside" else np.asarray(region.contour, dtype=float)

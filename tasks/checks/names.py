@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AnySet
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,11 +14,32 @@ from visup.rules.formula.units import Number, Span
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.describe import written
+from visup.tasks.actions.floor import floor_map
 from visup.tasks.diagnostics.recovery import ParsedFile
-from visup.tasks.grammar.conditions import Amount, Name, ParameterRef, action_of, bound_of, facts_of
-from visup.tasks.grammar.nodes import Actors, Conditioned, Course, Task, Timed, walk
-from visup.tasks.grammar.units import MEANT, SIZE, TIME, UNITS, dimension, units_of
+from visup.tasks.grammar.conditions import (
+    Amount,
+    Name,
+    ParameterRef,
+    action_of,
+    bounds_of,
+    facts_of,
+)
+from visup.tasks.grammar.criteria import Extent
+from visup.tasks.grammar.nodes import (
+    Actor,
+    Actors,
+    Conditioned,
+    Course,
+    Parameter,
+    Task,
+    Timed,
+    ZoneDeclaration,
+    walk,
+)
+from visup.tasks.grammar.structure import task_actors
+from visup.tasks.grammar.units import LENGTH, MEANT, SIZE, TIME, UNITS, dimension, units_of, value
 
+Declared = Actor | ZoneDeclaration | Parameter
 Asked = tuple[str, tuple[Name, ...], Span]
 """An action that a file names, its actors, and where."""
 
@@ -64,6 +85,8 @@ class NameCheck:
         """All faults of the words."""
         yield from self.amounts()
         yield from self.compared()
+        yield from self.ranges()
+        yield from self.grounds()
         yield from self.kinds()
         yield from self.declared()
         yield from self.unused()
@@ -78,9 +101,18 @@ class NameCheck:
                 yield from ((s.lasting.duration, TIME) for s in course.conditions if s.lasting)
         yield from ((i.lasting.duration, TIME) for i in self.task.invariants if i.lasting)
         yield from ((a.size, SIZE) for a in self.task.actors if a.size)
+        criteria = (c for a in (*self.task.actors, *self.task.bystanders) for c in a.criteria)
+        yield from ((c.amount, LENGTH) for c in criteria if isinstance(c, Extent))
         for comparison in self.comparisons:
             meaning = self.actions.get(action_of(comparison).name)
-            yield bound_of(comparison), meaning.measures if meaning else ""
+            wanted = meaning.measures if meaning else ""
+            for amount in bounds_of(comparison):
+                on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
+                yield amount, SIZE if on_floor else wanted
+
+    def measured(self, amount: Amount) -> str:
+        """What an amount, or its parameter, measures."""
+        return dimension(self.task.amount(amount))
 
     def amounts(self) -> Iterator[Diagnostic]:
         """Amounts of nothing, of the wrong kind, in unknown units, of unknown parameters."""
@@ -150,6 +182,16 @@ class NameCheck:
                 some = sorted(m.name for m in self.actions.values() if m.measures)
                 yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
 
+    def ranges(self) -> Iterator[Diagnostic]:
+        """Ranges in which nothing lies."""
+        for comparison in self.comparisons:
+            ends = [self.task.amount(a) for a in bounds_of(comparison)]
+            alike = len({dimension(e) for e in ends} - {""}) == 1
+            if len(ends) == 2 and alike and value(ends[0]) >= value(ends[1]):
+                what = f"nothing lies between {ends[0]} and {ends[1]}"
+                expected = "the lesser amount first, then a greater one"
+                yield self.source.fault("E238", what, comparison.span, expected)
+
     def kinds(self) -> Iterator[Diagnostic]:
         """Zones where actors belong, and the other way round."""
         zones = {z.name for z in self.task.zones}
@@ -168,10 +210,35 @@ class NameCheck:
                     what = f"`{said}` is a zone, but `{name}` takes an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
 
+    def grounds(self) -> Iterator[Diagnostic]:
+        """A ground told twice, or by points that do not tell it."""
+        floors = [*(z.floor for z in self.task.zones), *(g.floor for g in self.task.grounds)]
+        for side in (side for floor in floors for point in floor for side in point):
+            known = side.unit in UNITS  # a place may well be 0 m
+            yield from self.of_kind(side, SIZE, side) if known else self.amount(side, SIZE)
+        for ground in self.task.grounds[1:]:
+            hint = "several tasks of one file share it"
+            yield self.source.fault("E224", "`ground` is declared twice", ground.span, hint=hint)
+        for ground in self.task.grounds[:1]:
+            if floor_map(ground) is None:
+                what = "three of the points lie in a line, so they do not tell the floor"
+                expected = "four points, such as the corners of a rectangle on the floor"
+                yield self.source.fault("E136", what, ground.span, expected)
+
     def declared(self) -> Iterator[Diagnostic]:
         """Names declared twice; those of actors alone are told elsewhere."""
         first: dict[str, str] = {a.name: "an actor" for a in self.task.actors}
-        for kind, declared in (("a zone", self.task.zones), ("a parameter", self.task.parameters)):
+        bystanders = [b for b in self.task.bystanders if b.name]
+        for b in bystanders:
+            if b.name in task_actors(self.task):
+                what = f"`{b.name}` is declared as a bystander, but it takes part"
+                yield self.source.fault("E224", what, b.span, "another name")
+        kinds: tuple[tuple[str, Sequence[Declared]], ...] = (
+            ("a bystander", bystanders),
+            ("a zone", self.task.zones),
+            ("a parameter", self.task.parameters),
+        )
+        for kind, declared in kinds:
             for one in declared:
                 if one.name in first:
                     what = f"`{one.name}` is declared as {kind} and is {first[one.name]} already"

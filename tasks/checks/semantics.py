@@ -19,6 +19,7 @@ from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.courses import CourseCheck
+from visup.tasks.checks.criteria import criteria_faults
 from visup.tasks.checks.names import NameCheck
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
@@ -35,6 +36,7 @@ from visup.tasks.grammar.nodes import (
     walk,
 )
 from visup.tasks.grammar.statement import RESERVED_WORDS
+from visup.tasks.grammar.structure import machines_of
 
 MANY = 500  # so many names are not compared with one another
 ALIKE = 0.85  # two names that are so alike are taken to be meant as one
@@ -116,6 +118,7 @@ class _Semantics:
         yield from CourseCheck(
             self.parsed.task, self.source, self.actions, whole, self.grammar
         ).faults()
+        yield from criteria_faults(self.parsed.task, self.source)
         yield from NameCheck(
             self.parsed, self.source, self.actions, self.percepts, self.asked
         ).faults()
@@ -276,13 +279,15 @@ class _Semantics:
 
     def slips(self) -> Iterator[Diagnostic]:
         """Actors that are named once and look like another that is declared or named more often."""
-        counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
         task = self.parsed.task
+        machines = [a.machine for a in task.actors if a.machine is not None]
+        counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
+        counts.update(map(str, machines))
         declared = {a.name for a in task.actors} | {z.name for z in task.zones}
         sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
         if len(sure) > MANY:
             return
-        for _, actors, _ in self.asked:
+        for actors in (*(actors for _, actors, _ in self.asked), machines):
             for actor in actors:
                 name = str(actor)
                 if name in declared or counts[name] > 1:
@@ -296,6 +301,7 @@ class _Semantics:
 
     def idle_actors(self) -> Iterator[Diagnostic]:
         named = {str(a) for _, actors, _ in self.asked for a in actors}
+        named |= {m for a in named for m in machines_of(self.parsed.task, a)}
         for actor in self.parsed.task.actors:
             if actor.span.file or actor.name in named:
                 continue  # an included file may offer more than is used

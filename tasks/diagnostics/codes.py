@@ -38,6 +38,7 @@ CODES = {
     "E133": "`when` without a condition, or a sign without `when`",
     "E134": "a number of times that is not complete",
     "E135": "`any order` without its list",
+    "E136": "a floor whose points are not right",
     "E201": "an unknown action",
     "E202": "a stage that is not defined",
     "E203": "a stage defined twice",
@@ -73,5 +74,8 @@ CODES = {
     "E233": "numbers of times that contradict each other",
     "E234": "too many things in any order",
     "E235": "a condition given twice",
+    "E236": "an actor that no object can be",
+    "E237": "an actor that is a part of itself",
+    "E238": "a range in which nothing lies",
 }
 """Every code with what it stands for; a code never changes its meaning."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.tasks.diagnostics.actor_error_patterns import actor, bystanders, criteria
 from visup.tasks.diagnostics.course_error_patterns import (
     action_in_angles,
     any_order,
@@ -152,31 +153,6 @@ def _word_as_name(text: str) -> RecognisedError | None:
     return RecognisedError("E123", start, len(word), f"`{word}` is a reserved word", "another name")
 
 
-def _actor(text: str) -> RecognisedError | None:
-    m = re.match(rf"\s*(?:optional\s+)?actor\b\s*({NAME})?\s*(\S*)", text)
-    if m is None:
-        return None
-    expected = "`actor satellite is spartan or hubble`"
-    if m[1] is None or m[1] in RESERVED_WORDS:
-        start = m.end() - len(m[0].lstrip())
-        return RecognisedError("E124", start, 5, "the name of the actor is missing", expected)
-    size = re.search(r"\bsize\b(?!\s*\d+(?:\.\d+)?\s*[^\W\d])", text)
-    if size is not None:
-        what = "`size` is not followed by a number and a unit"
-        return RecognisedError("E124", size.start(), 4, what, "such as `size 1.6 m`")
-    if m[2] == "is":
-        hint = "several models are separated by `or`" if re.search(r"[,|/]|\band\b", text) else None
-        spaced = re.search(r"\bis\s+([\w.\-]+)[ ]+(?!or\b|size\b)([\w.\-]+)", text)
-        if hint is None and spaced is not None:
-            hint = f"the name of a model has no blanks, such as `{spaced[1]}_{spaced[2]}`"
-        what = f"actor `{m[1]}` is declared with something that is not a model"
-        if not text[m.end() :].strip(" "):
-            what = f"actor `{m[1]}` is declared without a model"
-        return RecognisedError("E124", m.start(1), len(m[1]), what, expected, hint)
-    what = f"`is` is missing after actor `{m[1]}`"
-    return RecognisedError("E124", m.start(1), len(m[1]), what, expected)
-
-
 def _include(text: str) -> RecognisedError | None:
     m = re.match(r"\s*(include)\b", text)
     if m is None:
@@ -191,13 +167,31 @@ def _zone(text: str) -> RecognisedError | None:
         return None
     what = "the name of the zone is missing"
     if m[2]:
-        corners = len(re.findall(r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)", text))
+        corner = r"\(\s*[\d.]+\s*(?:[^\W\d]+\s*)?,\s*[\d.]+\s*(?:[^\W\d]+\s*)?\)"
+        corners = len(re.findall(corner, text))
         what = f"zone `{m[2]}` is drawn with something that is not a corner"
         what = f"zone `{m[2]}` has fewer than three corners" if corners < 3 else what
         what = what if m[3] else f"`is` is missing after zone `{m[2]}`"
     start = m.start(2) if m[2] else m.start(1)
     expected = f"`zone {m[2] or 'berth'} is (100, 50) (300, 50) (300, 200)`, in pixels"
     return RecognisedError("E131", start, len(m[2] or m[1]), what, expected)
+
+
+def _ground(text: str) -> RecognisedError | None:
+    m = re.match(r"\s*(ground)\b\s*(is\b)?", text)
+    if m is None:
+        return None
+    pair = (
+        r"\(\s*[\d.]+\s*,\s*[\d.]+\s*\)\s*=\s*\(\s*[\d.]+\s*[^\W\d]+\s*,\s*[\d.]+\s*[^\W\d]+\s*\)"
+    )
+    points = len(re.findall(pair, text))
+    what = (
+        "`ground` is told by something that is not a point of the image and its place on the floor"
+    )
+    what = "`ground` is told by fewer than four points" if points < 4 and m[2] else what
+    what = what if m[2] else "`is` is missing after `ground`"
+    expected = "`ground is (80, 400) = (0 m, 0 m), ...`, four points or more"
+    return RecognisedError("E136", m.start(1), 6, what, expected)
 
 
 def _parameter(text: str) -> RecognisedError | None:
@@ -233,13 +227,16 @@ PATTERNS: tuple[ErrorPattern, ...] = (
     _heading,
     _include,
     _zone,
+    _ground,
     _parameter,
     signs,
     _not_in_language,
     _definer,
     _bare_head,
     _open_head,
-    _actor,
+    criteria,
+    bystanders,
+    actor,
     _not_a_name,
     _empty_stage,
     open_angle,

@@ -86,6 +86,8 @@ def _joined(one: ParsedFile, other: ParsedFile) -> ParsedFile:
         invariants=(*a.invariants, *b.invariants),
         zones=(*a.zones, *b.zones),
         parameters=(*a.parameters, *b.parameters),
+        grounds=(*a.grounds, *b.grounds),
+        bystanders=(*a.bystanders, *b.bystanders),
     )
     return ParsedFile(
         task, (*one.faults, *other.faults), one.defined | other.defined, one.used | other.used

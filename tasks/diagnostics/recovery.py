@@ -21,12 +21,13 @@ NAME = r"[^\W\d]\w*"
 HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
 OPENS = re.compile(  # a line that begins a statement, well written or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
-    r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage)\b(?![ ]*\())"
+    r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage"
+    r"|bystanders?|ground(?=[ ]+is\b))\b(?![ ]*\())"
 )
 MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
-    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional))\s*$"
+    r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
 )
 DEEPEST = 60
 LONGEST = 4000  # characters of a statement that mistakes are looked for in
@@ -168,6 +169,18 @@ SAID = {
     "STAGE": "a stage such as `<approach>`",
     "NAME": "a name",
     "MODEL": "the name of a model",
+    "COLOUR": "a colour",
+    "SHADE": "`light` or `dark`",
+    "RANK": "`largest`, `smallest`, `leftmost`, `rightmost`, `highest` or `lowest`",
+    "THE": "`the largest` and the like",
+    "THE_OTHER": "`the other`",
+    "THE_SIDE": "`the`",
+    "SIDE": "`left`, `right`, `top` or `bottom`",
+    "ANOTHER": "`another`",
+    "COMPARED": "`larger than` or `smaller than`",
+    "WHAT": "`what enters`, `what moves first` or `what rests`",
+    "PART": "`part of`",
+    "PLACE": "`at (410, 160)`",
     "NUMBER": "a number",
     "REPEAT": "`?`, `*` or `+`",
     "WHEN": "`never` or `always`",
@@ -182,6 +195,10 @@ SAID = {
     "TEXT": "a text in double quotes",
     "SIGN": "`begins when`, `ends when`, `progresses when` or `fails when`",
     "COMPARE": "`<` or `>`",
+    "BYSTANDER": "`bystander`",
+    "BYSTANDERS": "`bystanders ignored`",
+    "GROUND": "`ground`",
+    "BETWEEN": "`between`",
     "_TIMES": "`times`",
     "AT": "`at least` or `at most`",
     "ANY": "`any order`",
@@ -191,7 +208,9 @@ SAID = {
 }
 KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
-    "ends", "progresses", "fails", "when", "and", "not",
+    "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
+    "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
+    "first", "rests", "from", "part", "of",
 )  # fmt: skip
 
 

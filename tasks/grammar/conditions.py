@@ -38,6 +38,24 @@ class Name(str):
         return name
 
 
+class PartName(Name):
+    """`gripper of arm` where an actor stands: the actor `gripper`, and its machine.
+
+    Args:
+        text: The name of the part.
+        machine: The actor of which it is a part.
+        span: Where both stand.
+    """
+
+    machine: Name
+
+    def __new__(cls, text: str, machine: Name, span: Span = NOWHERE) -> PartName:
+        """A part at a place."""
+        name = cast("PartName", super().__new__(cls, text, span))
+        name.machine = machine
+        return name
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterRef:
     """`patience`: the name of a parameter where a number may stand; see `Task.amount`."""
@@ -50,6 +68,20 @@ class ParameterRef:
 
 
 Amount: TypeAlias = Number | ParameterRef
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """`20 px and 100 px`: what stands behind `between`, the ends included."""
+
+    low: Amount
+    high: Amount
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.low} and {self.high}"
+
+
 Fact: TypeAlias = Predicate | Comparison
 Condition: TypeAlias = Predicate | Comparison | Not | And | Or
 
@@ -64,9 +96,10 @@ def action_of(fact: Fact) -> Predicate | Measure:
     return cast("Measure", fact.left) if isinstance(fact, Comparison) else fact
 
 
-def bound_of(comparison: Comparison) -> Amount:
-    """What a quantity is compared with."""
-    return cast("Amount", comparison.right)
+def bounds_of(comparison: Comparison) -> tuple[Amount, ...]:
+    """What a quantity is compared with: one amount, or the two ends of a range."""
+    right = cast("Amount | Range", comparison.right)
+    return (right.low, right.high) if isinstance(right, Range) else (right,)
 
 
 def actors_of(fact: Fact) -> tuple[Name, ...]:

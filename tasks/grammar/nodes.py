@@ -9,7 +9,7 @@ Read before: `conditions.py` and `ast_courses.py`. Read next: `parser.py` (text 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from visup.rules.formula.nodes import Comparison
 from visup.rules.formula.units import NOWHERE, Number, Span, number_text
@@ -32,6 +32,7 @@ from visup.tasks.grammar.ast_courses import (
     walk,
 )
 from visup.tasks.grammar.conditions import Action, Amount, Condition, Name, ParameterRef
+from visup.tasks.grammar.criteria import Criterion, PartOf, declared_as
 
 __all__ = [
     "NOWHERE",
@@ -48,6 +49,8 @@ __all__ = [
     "Counted",
     "Course",
     "Deadline",
+    "FloorPoint",
+    "Ground",
     "Hold",
     "Include",
     "Invariant",
@@ -68,6 +71,10 @@ __all__ = [
     "children",
     "walk",
 ]
+
+
+FloorPoint: TypeAlias = tuple[Number, Number]
+"""A place on the floor: two lengths, in metres or parts of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +113,16 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """`actor satellite is spartan201_approx or hubble size 1.6 m`.
+    """`actor satellite is spartan201_approx or hubble size 1.6 m`, `actor part is the leftmost red`.
 
     Attributes:
         name: Its name in the file.
-        models: The models that it may be; empty when only its size is said, or that it is optional.
+        models: The models that it may be; empty when nothing is said of them.
         size: Its largest extent, or None.
         optional: Whether what is asked of it may be left out.
+        criteria: By what else it is told.
+        bystander: Whether it has no part in the task and is let be; without a name, all that plays no
+            actor is.
     """
 
     name: str
@@ -120,24 +130,64 @@ class Actor:
     size: Amount | None = None
     optional: bool = False
     span: Span = field(default=NOWHERE, compare=False, repr=False)
+    criteria: tuple[Criterion, ...] = ()
+    bystander: bool = False
+
+    @property
+    def machine(self) -> Name | None:
+        """The actor of which it is a part, or None."""
+        return next((c.machine for c in self.criteria if isinstance(c, PartOf)), None)
 
     def __str__(self) -> str:
-        said = [*(["optional"] if self.optional else []), "actor", self.name]
-        said += [f"is {' or '.join(self.models)}"] if self.models else []
-        return " ".join([*said, *([f"size {self.size}"] if self.size else [])])
+        if self.bystander and not self.name:
+            return "bystanders ignored"
+        said = "optional actor" if self.optional else "bystander" if self.bystander else "actor"
+        size = f"size {self.size}" if self.size else ""
+        parts = (said, self.name, declared_as(self.models, self.criteria), size)
+        return " ".join(p for p in parts if p)
 
 
 @dataclass(frozen=True, slots=True)
 class ZoneDeclaration:
-    """`zone berth is (100, 50) (300, 50) (300, 200)`: corners in pixels; none for one drawn elsewhere."""
+    """`zone berth is (100, 50) (300, 50) (300, 200)`, `zone yard is (0 m, 0 m) (2 m, 0 m) (2 m, 1 m)`.
+
+    Attributes:
+        name: Its name.
+        corners: In the image, pixels; none for a zone drawn elsewhere, or on the floor.
+        floor: Corners on the floor, of a zone in which a body is where it stands.
+    """
 
     name: str
     corners: tuple[tuple[float, float], ...] = ()
     span: Span = field(default=NOWHERE, compare=False, repr=False)
+    floor: tuple[FloorPoint, ...] = ()
 
     def __str__(self) -> str:
-        corners = " ".join(f"({number_text(x)}, {number_text(y)})" for x, y in self.corners)
+        corners = " ".join([*map(_pair, self.corners), *map(_pair, self.floor)])
         return f"zone {self.name}{' is ' + corners if corners else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """`ground is (80, 400) = (0 m, 0 m), ...`: points of the image, and where they are on the floor.
+
+    Attributes:
+        image: (x, y) of each, pixels.
+        floor: Its place on the floor.
+    """
+
+    image: tuple[tuple[float, float], ...]
+    floor: tuple[FloorPoint, ...]
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        points = zip(self.image, self.floor, strict=True)
+        return f"ground is {', '.join(f'{_pair(i)} = {_pair(f)}' for i, f in points)}"
+
+
+def _pair(point: FloorPoint | tuple[float, float]) -> str:
+    x, y = (p if isinstance(p, Number) else number_text(p) for p in point)
+    return f"({x}, {y})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +240,8 @@ class Task:
         zones: Parts of the image that it names.
         parameters: Amounts that it names.
         includes: Files that it includes; their statements stand among the others.
+        bystanders: Who has no part in it and is let be.
+        grounds: Where points of the image are on the floor; more than one is a mistake.
         file: Name of the file, for messages.
         root: The rule that is the task when the file has several; empty for its first one.
     """
@@ -202,11 +254,19 @@ class Task:
     includes: tuple[Include, ...] = ()
     file: str = field(default="<text>", compare=False)
     root: str = ""
+    grounds: tuple[Ground, ...] = ()
+    bystanders: tuple[Actor, ...] = ()
+
+    @property
+    def ground(self) -> Ground | None:
+        """Where points of the image are on the floor, or None while nobody says so."""
+        return next(iter(self.grounds), None)
 
     @property
     def declared(self) -> tuple[Actor | ZoneDeclaration | Parameter, ...]:
-        """Declarations of actors, zones and parameters."""
-        return (*self.actors, *self.zones, *self.parameters)
+        """Declarations of actors, bystanders, zones and parameters."""
+        bystanders = (b for b in self.bystanders if b.name)
+        return (*self.actors, *bystanders, *self.zones, *self.parameters)
 
     @property
     def roots(self) -> tuple[str, ...]:
@@ -224,12 +284,19 @@ class Task:
         return next((s for s in self.stages if s.name == name), None)
 
     def actor(self, name: str) -> Actor:
-        """What is declared of an actor."""
-        return next((a for a in self.actors if a.name == name), Actor(name))
+        """What is declared of an actor, or of a bystander."""
+        declared = (*self.actors, *self.bystanders)
+        return next((a for a in declared if a.name == name), Actor(name))
 
     def models(self, actor: str) -> tuple[str, ...]:
-        """Models that an actor may be: as declared, else the one of the actor's own name."""
-        return self.actor(actor).models or (actor,)
+        """Models that an actor may be: as declared, else the one of the actor's own name.
+
+        An actor that is told by its looks, its place or its conduct alone may be any model, or none:
+        it has no models.
+        """
+        declared = self.actor(actor)
+        alone = any(not isinstance(c, PartOf) for c in declared.criteria)
+        return declared.models or (() if alone else (actor,))
 
     def amount(self, amount: Amount) -> Number:
         """What an amount stands for: itself, or what its parameter is; 0 when nobody knows."""
@@ -239,5 +306,12 @@ class Task:
         return found if isinstance(found, Number) else Number(0.0)
 
     def __str__(self) -> str:
-        said = (*self.includes, *self.parameters, *self.actors, *self.zones)
+        said = (
+            *self.includes,
+            *self.parameters,
+            *self.actors,
+            *self.bystanders,
+            *self.grounds,
+            *self.zones,
+        )
         return "\n".join(map(str, (*said, *self.stages, *self.invariants)))

@@ -13,7 +13,21 @@ from lark import Lark, Token, Transformer
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure, Term
 from visup.rules.formula.units import Span
-from visup.tasks.grammar.conditions import Condition
+from visup.tasks.grammar.conditions import Condition, PartName, Range
+from visup.tasks.grammar.criteria import (
+    Another,
+    Colours,
+    Conduct,
+    Criterion,
+    Extent,
+    OtherModels,
+    PartOf,
+    Place,
+    Rank,
+    Ranked,
+    Side,
+    in_order,
+)
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -27,6 +41,8 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    FloorPoint,
+    Ground,
     Hold,
     Include,
     Invariant,
@@ -44,6 +60,7 @@ from visup.tasks.grammar.nodes import (
     Together,
     ZoneDeclaration,
 )
+from visup.tasks.grammar.parts import with_parts
 
 N = TypeVar("N")
 
@@ -99,14 +116,17 @@ def collect(statements: Several[object], file: str) -> Task:
     def of(kind: type[N]) -> tuple[N, ...]:
         return tuple(s for s in statements if isinstance(s, kind))
 
+    stages, invariants = of(Stage), of(Invariant)
     return Task(
-        stages=of(Stage),
-        actors=of(Actor),
-        invariants=of(Invariant),
+        stages=stages,
+        actors=with_parts([a for a in of(Actor) if not a.bystander], stages, invariants),
+        invariants=invariants,
         zones=of(ZoneDeclaration),
         parameters=of(Parameter),
         includes=of(Include),
         file=file,
+        grounds=of(Ground),
+        bystanders=tuple(a for a in of(Actor) if a.bystander),
     )
 
 
@@ -144,18 +164,72 @@ class _TaskBuilder(Transformer[Token, Any]):
     def actor(self, items: list[Any]) -> Actor:
         optional = items[0].type == "OPTIONAL"
         name, *rest = items[1:] if optional else items
-        models = next((i for i in rest if isinstance(i, tuple)), ())
         size = next((i for i in rest if isinstance(i, Number | ParameterRef)), None)
-        return Actor(str(name), models, size, optional, _of(name))
+        traits = [t for i in rest if isinstance(i, list) for t in i]
+        models, criteria = _who(traits)
+        return Actor(str(name), models, size, optional, _of(name), criteria)
 
-    def models(self, items: list[Token]) -> tuple[str, ...]:
-        return tuple(map(str, items))
+    # What is said of an actor: each a list of criteria, models as `OtherModels`.
+    def models(self, items: list[Token]) -> list[Criterion]:
+        return [OtherModels(tuple(map(str, items)))]
+
+    def colours(self, items: list[str]) -> list[Criterion]:
+        return [Colours(tuple(items))]
+
+    def colour(self, items: list[Token]) -> str:
+        return " ".join(map(str, items))
+
+    def rank(self, items: list[Any]) -> list[Criterion]:
+        return [*(items[2] if len(items) > 2 else []), Ranked(cast("Rank", str(items[1])))]
+
+    def another(self, items: list[Any]) -> list[Criterion]:
+        return [*(items[1] if len(items) > 1 else []), Another()]
+
+    def place(self, items: list[Any]) -> list[Criterion]:
+        return [Place(items[1])]
+
+    def extent(self, items: list[Any]) -> list[Criterion]:
+        return [Extent(cast('Literal["larger", "smaller"]', str(items[0])), items[1])]
+
+    def conduct(self, items: list[Token]) -> list[Criterion]:
+        kind = cast('Literal["enters", "moves", "rests"]', str(items[1]))
+        side = cast("Side", str(items[3])) if len(items) > 3 else ""
+        return [Conduct(kind, side)]
+
+    def part(self, items: list[Token]) -> list[Criterion]:
+        machine = Name(str(items[1]), _of(items[1]))
+        return [PartOf(machine, _of(items[0]).to(_of(items[1])))]
 
     def size(self, items: list[Amount]) -> Amount:
         return items[0]
 
     def zone(self, items: list[Any]) -> ZoneDeclaration:
-        return ZoneDeclaration(str(items[0]), tuple(items[1:]), _of(items[0]))
+        name, *corners = items
+        if corners and isinstance(corners[0][0], Number):
+            return ZoneDeclaration(str(name), (), _of(name), tuple(corners))
+        return ZoneDeclaration(str(name), tuple(corners), _of(name))
+
+    def bystander(self, items: list[Any]) -> Actor:
+        _, name, *rest = items
+        models, criteria = _who([t for i in rest for t in i])
+        return Actor(str(name), models, span=_of(name), criteria=criteria, bystander=True)
+
+    def ignored(self, items: list[Token]) -> Actor:
+        return Actor("", span=_of(items[0]), bystander=True)
+
+    def ground(self, items: list[Any]) -> Ground:
+        word, *points = items
+        image, floor = zip(*points, strict=True)
+        return Ground(image, floor, _of(word))
+
+    def point(self, items: list[Any]) -> tuple[tuple[float, float], FloorPoint]:
+        return items[0], items[1]
+
+    def floor(self, items: list[Number]) -> FloorPoint:
+        return items[0], items[1]
+
+    def length(self, items: list[Token]) -> Number:
+        return Number(float(items[0]), str(items[1]), _of(items[0]).to(_of(items[1])))
 
     def corner(self, items: list[Token]) -> tuple[float, float]:
         return float(items[0]), float(items[1])
@@ -229,12 +303,18 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def action(self, items: list[Token]) -> Action:
         name, *actors, last = items
-        return Action(str(name), _names(actors), _of(name).to(_of(last)))
+        words = tuple(a if isinstance(a, Name) else Name(str(a), _of(a)) for a in actors)
+        return Action(str(name), words, _of(name).to(_of(last)))
+
+    def part_of(self, items: list[Token]) -> Name:
+        part, machine = items
+        return PartName(str(part), Name(str(machine), _of(machine)), _of(part).to(_of(machine)))
 
     def comparison(self, items: list[Any]) -> Comparison:
         quantity = Measure(items[0].name, items[0].words, items[0].span)
-        span = quantity.span.to(items[2].span)
-        return Comparison(quantity, str(items[1]), cast("Term", items[2]), span=span)
+        span = quantity.span.to(items[-1].span)
+        right = items[2] if len(items) == 3 else Range(items[2], items[3], _all(items[2:]))
+        return Comparison(quantity, str(items[1]), cast("Term", right), span=span)
 
     def reference(self, items: list[Token]) -> Reference:
         return Reference(_bare(items[0]), _of(items[0]))
@@ -247,6 +327,13 @@ class _TaskBuilder(Transformer[Token, Any]):
 
     def not_(self, items: list[Any]) -> Not:
         return Not(items[1], _of(items[0]).to(items[1].span))
+
+
+def _who(traits: Several[Criterion]) -> tuple[tuple[str, ...], tuple[Criterion, ...]]:
+    """The models that are said first, and all other criteria in the order of their kinds."""
+    models = next((t for t in traits if isinstance(t, OtherModels)), None)
+    others = in_order(t for t in traits if t is not models)
+    return (models.names if models is not None else ()), others
 
 
 def _names(tokens: list[Token]) -> tuple[Name, ...]:

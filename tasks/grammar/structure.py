@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
 
 from visup.rules.formula.nodes import Comparison
-from visup.tasks.grammar.conditions import Fact, action_of, bound_of, facts_of
+from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
@@ -19,7 +19,7 @@ from visup.tasks.grammar.nodes import (
     Task,
     walk,
 )
-from visup.tasks.grammar.units import value
+from visup.tasks.grammar.units import SIZE, dimension, value
 
 T = TypeVar("T")
 MAX_CACHED = 64  # of so many tasks what was read off is remembered
@@ -80,17 +80,46 @@ def stage_actors(task: Task, stage: str) -> tuple[str, ...]:
 
 @cached_by_identity
 def task_actors(task: Task) -> tuple[str, ...]:
-    """All actors of a task, in the order in which its stages ask for them."""
+    """All actors of a task, in the order in which its stages ask for them; machines of parts last."""
     staged = [a for s in stage_names(task) for a in stage_actors(task, s)]
     watched = [
         a for i in task.invariants for f in facts_of(i.condition) for a in fact_key(task, f)[1]
     ]
-    return tuple(dict.fromkeys((*staged, *watched)))
+    named = tuple(dict.fromkeys((*staged, *watched)))
+    return tuple(dict.fromkeys((*named, *(m for a in named for m in machines_of(task, a)))))
+
+
+def machines_of(task: Task, actor: str) -> tuple[str, ...]:
+    """The machine of which an actor is a part, the one of which that is a part, and so on."""
+    found: dict[str, None] = {}
+    machine = task.actor(actor).machine
+    while machine is not None and machine not in found and machine != actor:
+        found[str(machine)] = None
+        machine = task.actor(machine).machine
+    return tuple(found)
 
 
 def undrawn_zones(task: Task) -> tuple[str, ...]:
     """The zones that a task names without corners: someone else must have drawn them."""
-    return tuple(z.name for z in task.zones if not z.corners)
+    return tuple(z.name for z in task.zones if not z.corners and not z.floor)
+
+
+def needs_ground(task: Task) -> bool:
+    """Whether a task speaks of places on the floor: zones in metres, gaps in metres."""
+    facts = [f for s in task.stages for f in _facts(s)]
+    facts += [f for i in task.invariants for f in facts_of(i.condition)]
+    ends = (a for f in facts if isinstance(f, Comparison) for a in bounds_of(f))
+    return any(z.floor for z in task.zones) or any(dimension(task.amount(a)) == SIZE for a in ends)
+
+
+def _facts(stage: Stage) -> Iterator[Fact]:
+    if isinstance(stage.body, Actors):
+        return
+    for node in walk(stage.body):
+        if isinstance(node, Action | Comparison):
+            yield node
+        elif isinstance(node, Conditioned):
+            yield from (f for s in node.conditions for f in facts_of(s.condition))
 
 
 def declared_sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) -> dict[str, float]:
@@ -112,6 +141,28 @@ def declared_sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) ->
     return found
 
 
+def with_taught_actors(
+    tasks: Sequence[Task],
+    given: Mapping[str, tuple[str, ...]],
+    known: Collection[str],
+    taught: Collection[str],
+) -> dict[str, tuple[str, ...]]:
+    """Actors as they were given, and those that are what was taught under their name.
+
+    Args:
+        tasks: All tasks of a run.
+        given: Actor -> models, as the user bound them; it goes before everything else.
+        known: Names of all models that there are.
+        taught: Names of those that were taught.
+    """
+    actors = dict(given)
+    for actor in dict.fromkeys(a for task in tasks for a in task_actors(task)):
+        declared = {m for task in tasks if actor in task_actors(task) for m in task.models(actor)}
+        if actor not in actors and actor in taught and not declared & set(known):
+            actors[actor] = (actor,)
+    return actors
+
+
 def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     """The key of a fact of a task, and the actors of whom it speaks.
 
@@ -122,7 +173,8 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     actors = tuple(str(a) for a in action.words if a not in zones)
     key = " ".join([action.name, *(a for a in action.words if a in zones)])
     if isinstance(fact, Comparison):
-        key = f"{key} {fact.operator} {task.amount(bound_of(fact))}"
+        amounts = " and ".join(str(task.amount(a)) for a in bounds_of(fact))
+        key = f"{key} {fact.operator} {amounts}"
     return key, actors
 
 

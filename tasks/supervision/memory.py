@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from visup.agent import TaskBelief
 from visup.tasks.supervision.hypotheses import TaskHypotheses
+from visup.tasks.supervision.replay import PastLook
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity
 
 
@@ -28,6 +29,7 @@ class TaskMemory:
         activity: Whether it is going on, where several tasks are given.
         gain: The evidence that it is, of each second, as it was seen last.
         inferred: Seconds of the step in which it was last inferred whether it is.
+        looks: What was seen while an actor is looked for, to be gone through again once it is found.
     """
 
     time: float
@@ -43,3 +45,4 @@ class TaskMemory:
     activity: TaskActivity = ALONE
     gain: float = 0.0
     inferred: float = 0.0
+    looks: tuple[PastLook, ...] = ()

@@ -28,6 +28,8 @@ from visup.tasks.actions.actions import ActionDefinition, known_actions
 from visup.tasks.actions.vocabulary import task_vocabulary
 from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.derivatives import leaves
+from visup.tasks.casting.fitness import Role, fits
+from visup.tasks.casting.matching import bystanders, machines, match, unexplained
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
 from visup.tasks.supervision.events import (
@@ -37,16 +39,15 @@ from visup.tasks.supervision.events import (
     stage_concerns,
     stage_events,
 )
-from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.invariants import (
     broken_since,
     invariant_concerns,
     invariant_events,
     patience,
 )
-from visup.tasks.supervision.matching import match, strength, unexplained
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.supervision.replay import followed, newly_found, remembered, replayed
 from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
@@ -55,7 +56,6 @@ from visup.tasks.verification.step_monitor import BAD
 MEMORY: MemoryKey[tuple[TaskMemory, ...]] = MemoryKey("tasks", ())
 OVER = (Verdict.SUCCEEDED, Verdict.FAILED)
 UNSAFE = frozenset({"unexpected_object", "collision_course", "workspace_violation"})
-LONGEST_STEP_S = 1.0  # a gap in the frames counts as no more than this
 UNREPORTED_S = 0.2  # a task that is not told about is looked at no more often than this
 
 
@@ -187,6 +187,7 @@ def _with_activity(
         posterior = None  # a rival has ended; what follows is another matter
     if posterior and any(x.payload.status in BAD for x in leaves(posterior.likeliest.state)):
         posterior = None  # if it begins yet, it begins from its beginning
+    memory = memory if posterior is memory.posterior else replace(memory, looks=())
     belief = suppressed(belief, activity)
     return replace(memory, activity=activity, belief=belief, posterior=posterior, inferred=now)
 
@@ -195,18 +196,26 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     """One step of one task: bind its actors, follow its hypotheses, judge."""
     settings, now = model.settings, mind.time
     bindings, rival, rival_since = _bind(model, memory, mind)
-    snapshot = TaskSnapshot(mind, bindings, model, dict(memory.lasting))
-    posterior, gain = _filtered(model, memory, snapshot)
+    start, since = memory.posterior, memory.lasting
+    if memory.looks and newly_found(memory.belief.bindings, bindings, mind):
+        start, since = replayed(model, memory.looks, bindings)
+    snapshot = TaskSnapshot(mind, bindings, model, dict(since))
+    posterior = followed(model, start, snapshot)
+    gain = 0.0
+    if start is not None and posterior is not None:
+        gain = model.gain(posterior.likeliest, snapshot.observe)
     broken = broken_since(model, snapshot, memory)
     strange = _strange(model, snapshot, memory)
     interrupted, strangers = memory.interrupted, memory.strangers
-    if {b.object_id for b in bindings} & set(strangers):
+    let_be = bystanders(model.task, mind, bindings, settings)
+    if ({b.object_id for b in bindings} | set(let_be)) & set(strangers):
         interrupted, strangers = "", ()
     if not interrupted:
-        interrupted, strangers = _interrupted(model, snapshot, memory, broken)
+        interrupted, strangers = _interrupted(model, snapshot, memory, broken, let_be)
     belief = task_belief(model, snapshot, posterior, interrupted)
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
-    belief = replace(belief, unexplained=lasting)
+    one = machines(model.task, bindings)
+    belief = replace(belief, unexplained=lasting, bystanders=let_be, machines=one)
     return TaskMemory(
         now,
         posterior,
@@ -221,7 +230,14 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         memory.activity,
         gain,
         memory.inferred,
+        remembered(memory.looks, mind, start, since) if _awaited(model, bindings) else (),
     )
+
+
+def _awaited(model: MonitoredPhases, bindings: Sequence[Binding]) -> bool:
+    """Whether an actor without whom the task cannot be judged is still looked for."""
+    unbound = (b.actor for b in bindings if b.object_id is None)
+    return any(not model.task.actor(a).optional for a in unbound)
 
 
 def _events(
@@ -269,7 +285,8 @@ def _bind(
     since = memory.rival_since if rival == memory.rival else mind.time
     if mind.time - since >= model.settings.switch_s:
         return found, (), mind.time
-    return tuple(_refreshed(b, mind) for b in before), rival, since
+    playing = {b.actor: b.object_id for b in before if b.object_id is not None}
+    return tuple(_refreshed(model.task, b, mind, playing) for b in before), rival, since
 
 
 def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
@@ -279,29 +296,13 @@ def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
     return belief is not None and belief.presence is not Presence.LEFT
 
 
-def _refreshed(binding: Binding, mind: Mind) -> Binding:
+def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, int]) -> Binding:
     """The same binding with the strength that it has now."""
     belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
     if belief is None:
         return replace(binding, object_id=None, strength=0.0)
-    return replace(binding, strength=strength(belief, binding.models))
-
-
-def _filtered(
-    model: MonitoredPhases, memory: TaskMemory, snapshot: TaskSnapshot
-) -> tuple[TaskHypotheses | None, float]:
-    """The hypotheses with what is seen now, and the evidence of a second that the task is going on.
-
-    The task begins once all actors of one of its first steps are found.
-    """
-    now = snapshot.mind.time
-    if memory.posterior is None:
-        found = any(snapshot.found(step.actors) for step in model.first_steps)
-        begun = model.filter.start(now)
-        return (model.filter.step(begun, snapshot.observe, 0.0) if found else None), 0.0
-    dt = min(max(0.0, now - memory.time), LONGEST_STEP_S)
-    posterior = model.filter.step(memory.posterior, snapshot.observe, dt, now)
-    return posterior, model.gain(posterior.likeliest, snapshot.observe)
+    (now,) = fits(Role(task, binding.actor, mind, playing), binding.models, [belief])
+    return replace(binding, strength=now)
 
 
 def _strange(
@@ -310,7 +311,7 @@ def _strange(
     """Objects that are unexplained now, each with the time since when."""
     before = dict(memory.strange_since)
     optional = {a.name for a in model.task.actors if a.optional}
-    now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional)
+    now = unexplained(snapshot.mind, snapshot.bindings, model.settings, optional, model.task)
     return tuple((i, before.get(i, snapshot.mind.time)) for i in now)
 
 
@@ -319,14 +320,17 @@ def _interrupted(
     snapshot: TaskSnapshot,
     memory: TaskMemory,
     broken: tuple[float | None, ...],
+    let_be: tuple[int, ...],
 ) -> tuple[str, tuple[int, ...]]:
     """Why the task is interrupted by something unsafe, or empty; and by which unexpected objects.
 
-    A task that is over is not interrupted.
+    A task that is over is not interrupted, nor is any by bystanders.
     """
     if memory.belief.verdict in OVER:
         return "", ()
     for alert in snapshot.mind.alerts:
+        if set(alert.objects) & set(let_be):
+            continue
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers

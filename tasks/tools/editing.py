@@ -20,10 +20,23 @@ from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.statement import NAME
 from visup.tasks.grammar.units import UNITS
 
-STATEMENTS = ("actor", "optional actor", "zone", "parameter", "include", "never", "always", "task")
+STATEMENTS = (
+    "actor",
+    "optional actor",
+    "bystander",
+    "bystanders ignored",
+    "ground is",
+    "zone",
+    "parameter",
+    "include",
+    "never",
+    "always",
+    "task",
+)
 WORDS = {
     "for": "must hold so long without a break: `for 5 s`",
     "within": "must be over so long after it began: `within 60 s`",
+    "between": "a quantity stays within a range: `gap(arm, satellite) between 20 px and 100 px`",
     "at least": "how often at least: `at least 2 times`",
     "at most": "how often at most: `at most 5 times`",
     "any order": "each once, one after the other: `any order (<a>, <b>)`",
@@ -31,6 +44,12 @@ WORDS = {
     "ends when": "by what it ends",
     "progresses when": "what counts as progress",
     "fails when": "what counts as failure, in place of the contrary of the action",
+    "is": "what an actor may be: `is cup`, `is red`, `is the leftmost red`, `is part of arm`",
+    "at": "the place of an actor in the image: `at (410, 160)`",
+    "another": "an actor alike, but not the same: `is another red`",
+    "what enters": "an actor by where it comes from: `is what enters from the left`",
+    "what moves first": "an actor by its conduct",
+    "what rests": "an actor by its conduct",
     "during": "for which stages an invariant is meant: `during <approach>`",
 }
 

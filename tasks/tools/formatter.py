@@ -18,7 +18,20 @@ from visup.tasks.grammar.parser import tokens
 
 WIDTH = 100
 LONGEST_HEAD = 24  # `::=` stand below each other when no head is longer than this
-STARTERS = frozenset({"TASK", "WHEN", "ACTOR", "OPTIONAL", "ZONE", "PARAMETER", "INCLUDE"})
+STARTERS = frozenset(
+    {
+        "TASK",
+        "WHEN",
+        "ACTOR",
+        "OPTIONAL",
+        "ZONE",
+        "PARAMETER",
+        "INCLUDE",
+        "GROUND",
+        "BYSTANDER",
+        "BYSTANDERS",
+    }
+)
 TIGHT_BEFORE = frozenset({"RPAR", "COMMA", "REPEAT"})
 
 

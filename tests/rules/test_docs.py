@@ -11,8 +11,9 @@ from visup.rules.formula.units import TICKS, UNITS
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.rules.monitoring.operators import MIN_SPACING, SAMPLE_HOLD
+from visup.rules.predicates.certainty import KEEP_OUT
 from visup.rules.predicates.snapshot import SIGMAS
-from visup.rules.predicates.vocabulary import IMPLIED, KEEP_OUT, PREDICATES, QUANTITIES
+from visup.rules.predicates.vocabulary import IMPLIED, PREDICATES, QUANTITIES
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.settings import PresenceSettings
 from visup.rules.reasoners import ReasonerSettings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -23,6 +23,9 @@ from visup.agent import (
     Severity,
     Truth,
 )
+from visup.rules.relations.kinematics import Kinematics
+from visup.rules.relations.reasoner import RELATIONS, RelationMemory
+from visup.rules.relations.rows import PairQuantity
 
 ARM, SATELLITE, INTRUDER = 1, 2, 3
 IDENTITIES: Mapping[int, Mapping[str, float]] = {
@@ -54,7 +57,10 @@ class Spell:
 
 @dataclass(frozen=True)
 class Script:
-    """A scene over time. What no spell names is false for any pair that both can be seen."""
+    """A scene over time. What no spell names is false for any pair that both can be seen.
+
+    `gaps` gives the pixels between the arm and the satellite at each time, NaN where nobody knows.
+    """
 
     spells: Sequence[Spell] = ()
     objects: Mapping[int, tuple[float, float]] = field(
@@ -63,6 +69,7 @@ class Script:
     hidden: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     identities: Mapping[int, Mapping[str, float]] = field(default_factory=lambda: IDENTITIES)
     alerts: Sequence[tuple[str, float, float]] = ()
+    gaps: Callable[[float], float] | None = None
     about: tuple[int, ...] = ()
     actors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     known: Sequence[str] = (
@@ -106,6 +113,8 @@ def mind_at(script: Script, time: float, index: int, before: Mind) -> Mind:
         for i, (kind, opened, closed) in enumerate(script.alerts, 1)
         if opened <= time < closed
     )
+    if script.gaps is not None:
+        before = before.remember(RELATIONS, _measured(script.gaps(time)))
     return replace(
         before,
         time=time,
@@ -115,6 +124,14 @@ def mind_at(script: Script, time: float, index: int, before: Mind) -> Mind:
         alerts=alerts,
         actors=script.actors,
     )
+
+
+def _measured(gap: float) -> RelationMemory:
+    tables = np.full((5, 2, 2), np.nan)
+    tables[PairQuantity.GAP] = [[np.nan, gap], [gap, np.nan]]
+    nothing = np.full(2, np.nan)
+    known = Kinematics((ARM, SATELLITE), tables, np.full((3, 2, 2), np.nan), nothing, nothing)
+    return RelationMemory(measured=known)
 
 
 def _relations(

@@ -5,6 +5,7 @@ import re
 import pytest
 
 from tests.paths import ROOT
+from visup.rules.traits.colours import TERMS
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.load import shipped_tasks
 from visup.tasks.diagnostics.codes import CODES
@@ -32,3 +33,8 @@ def test_the_page_lists_every_code_action_and_shipped_task() -> None:
 def test_the_page_says_rightly_what_binds_tighter() -> None:
     one = read("<t> ::= a(x) & b(x) for 5 s c(x) | d(x)")
     assert one == read("<t> ::= ((a(x) & (b(x) for 5 s)) c(x)) | d(x)")
+
+
+def test_the_page_lists_every_word_for_a_colour() -> None:
+    (said,) = re.findall(r"The words for colours are (.*?), each also with", PAGE, re.S)
+    assert set(re.split(r",\s+|\s+and\s+", said)) == set(TERMS)

@@ -6,7 +6,20 @@ from hypothesis import strategies as st
 
 from visup.rules.formula.nodes import And, Not, Or
 from visup.rules.formula.terms import Measure
-from visup.tasks.grammar.conditions import Condition
+from visup.rules.traits.colours import SHADES, TERMS
+from visup.tasks.diagnostics.actor_error_patterns import RANKS
+from visup.tasks.grammar.conditions import Condition, Range
+from visup.tasks.grammar.criteria import (
+    Another,
+    Colours,
+    Conduct,
+    Criterion,
+    Extent,
+    PartOf,
+    Place,
+    Ranked,
+    in_order,
+)
 from visup.tasks.grammar.nodes import (
     Action,
     Actor,
@@ -19,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Counted,
     Course,
     Deadline,
+    Ground,
     Hold,
     Include,
     Invariant,
@@ -43,7 +57,7 @@ names = st.from_regex(r"[a-zA-Zä_][a-z0-9_é]{0,8}", fullmatch=True).filter(
     lambda n: n not in RESERVED_WORDS
 )
 models = st.from_regex(r"[a-z0-9][a-z0-9_.\-]{0,8}", fullmatch=True).filter(
-    lambda n: n not in RESERVED_WORDS
+    lambda n: n not in (*RESERVED_WORDS, *TERMS)
 )
 amounts = st.one_of(
     st.integers(0, 10**6).map(float), st.floats(0.0, 1e9, allow_nan=False, allow_infinity=False)
@@ -56,11 +70,12 @@ holds = st.builds(Hold, amounts_said)
 clauses: st.SearchStrategy[Clause] = st.one_of(holds, st.builds(Deadline, amounts_said))
 actors = st.lists(names.map(Name), min_size=1, max_size=3).map(tuple)
 actions = st.builds(Action, names, actors)
-comparisons = st.builds(
-    Comparison,
-    st.builds(Measure, names, actors),
-    st.sampled_from(["<", "<=", ">", ">="]),
-    amounts_said,
+measures = st.builds(Measure, names, actors)
+comparisons = st.one_of(
+    st.builds(Comparison, measures, st.sampled_from(["<", "<=", ">", ">="]), amounts_said),
+    st.builds(
+        Comparison, measures, st.just("between"), st.builds(Range, amounts_said, amounts_said)
+    ),
 )
 references = st.builds(Reference, names)
 facts: st.SearchStrategy[Condition] = st.one_of(actions, comparisons)
@@ -100,14 +115,42 @@ stages = st.builds(
     Stage, names, st.one_of(courses, st.builds(Actors, actors)), texts, st.booleans()
 )
 sizes = st.none() | amounts_said
+colours = st.sampled_from([*TERMS, *(f"{s} {t}" for s in SHADES for t in TERMS)])
+places = st.builds(Place, st.tuples(amounts, amounts))
+criteria: st.SearchStrategy[Criterion] = st.one_of(
+    st.builds(Colours, st.lists(colours, min_size=1, max_size=3).map(tuple)),
+    st.builds(Ranked, st.sampled_from(RANKS)),
+    st.builds(Another),
+    st.builds(Extent, st.sampled_from(["larger", "smaller"]), amounts_said),
+    places,
+    st.builds(Conduct, st.just("enters"), st.sampled_from(["", "left", "right", "top", "bottom"])),
+    st.builds(Conduct, st.sampled_from(["moves", "rests"])),
+    st.builds(PartOf, names.map(Name)),
+)
+told = st.lists(criteria, min_size=1, max_size=4).map(in_order)
+some_models = st.lists(models, min_size=1, max_size=3).map(tuple)
 declared = st.one_of(
-    st.builds(
-        Actor, names, st.lists(models, min_size=1, max_size=3).map(tuple), sizes, st.booleans()
-    ),
+    st.builds(Actor, names, some_models, sizes, st.booleans()),
+    st.builds(Actor, names, st.just(()) | some_models, sizes, st.booleans(), criteria=told),
     st.builds(Actor, names, st.just(()), amounts_said, st.booleans()),
     st.builds(Actor, names, st.just(()), sizes, st.just(True)),
 )
 corners = st.lists(st.tuples(amounts, amounts), min_size=3, max_size=4).map(tuple)
+floors = st.tuples(
+    st.builds(Number, amounts, st.sampled_from(["m", "cm"])),
+    st.builds(Number, amounts, st.sampled_from(["m", "mm"])),
+)
+floor_zones = st.builds(
+    ZoneDeclaration, names, st.just(()), floor=st.lists(floors, min_size=3, max_size=4).map(tuple)
+)
+points = st.lists(st.tuples(st.tuples(amounts, amounts), floors), min_size=4, max_size=5)
+grounds = points.map(lambda ps: Ground(tuple(i for i, _ in ps), tuple(f for _, f in ps)))
+let_be = st.just(True)
+bystanders = st.one_of(
+    st.builds(Actor, names, some_models, criteria=st.just(()) | told, bystander=let_be),
+    st.builds(Actor, names, criteria=st.just(()) | told, bystander=let_be),
+    st.just(Actor("", bystander=True)),
+)
 tasks = st.builds(
     Task,
     st.lists(stages, min_size=1, max_size=4).map(tuple),
@@ -122,7 +165,11 @@ tasks = st.builds(
         ),
         max_size=2,
     ).map(tuple),
-    st.lists(st.builds(ZoneDeclaration, names, st.just(()) | corners), max_size=2).map(tuple),
+    st.lists(
+        st.builds(ZoneDeclaration, names, st.just(()) | corners) | floor_zones, max_size=2
+    ).map(tuple),
     st.lists(st.builds(Parameter, names, amounts_said), max_size=2).map(tuple),
     st.lists(st.builds(Include, texts), max_size=1).map(tuple),
+    grounds=st.lists(grounds, max_size=1).map(tuple),
+    bystanders=st.lists(bystanders, max_size=2).map(tuple),
 )

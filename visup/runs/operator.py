@@ -110,7 +110,7 @@ class HumanOperator:
             SettingsError: An answer that was given beforehand names what nobody knows.
         """
         for name in self.answers.values():
-            resolve_model(agent.mind, name, agent.models)
+            resolve_model(agent.mind, name, agent.models, cast=agent.cast)
         waiting = dict(self.answers)
 
         def hand() -> None:

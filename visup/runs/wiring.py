@@ -6,12 +6,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from visup.agent import Behaviour, Contract, Mind, Severity, Verdict
+from visup.agent import Behaviour, Contract, Mind, Severity, Verdict, Zone
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
+from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
@@ -25,9 +26,16 @@ from visup.rules.reasoners import default_reasoners
 from visup.runs.plugins import user_behaviours
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
-from visup.runs.zones import load_zones
+from visup.runs.zones import load_ground, load_zones
 from visup.tasks import load_tasks
-from visup.tasks.grammar.structure import declared_sizes, task_actors, undrawn_zones
+from visup.tasks.casting.fitness import asks_for_colour, asks_for_traits
+from visup.tasks.grammar.structure import (
+    declared_sizes,
+    needs_ground,
+    task_actors,
+    undrawn_zones,
+    with_taught_actors,
+)
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 if TYPE_CHECKING:
@@ -75,22 +83,34 @@ def build_agent(
         VisupError: A task, rules file, zones file, model database or behaviour is not as it should
             be, or an actor is bound that no task has or to a model that the database lacks.
     """
-    tasks = [t for name in settings.tasks for t in load_tasks(name)]
-    zones = load_zones(settings.zones) if settings.zones else ()
-    _check_zones(tasks, {z.name for z in zones})
+    tasks, zones = _tasks_and_zones(settings)
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    behaviours = [*_behaviours(settings, database, declared_sizes(tasks, settings.actors)), *also]
+    known, taught = _names(database)
+    actors = with_taught_actors(tasks, settings.actors, known, taught)
+    behaviours = [
+        *_behaviours(settings, database, declared_sizes(tasks, actors)),
+        *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
+        *also,
+    ]
     contracts = [b.contract for b in behaviours]
     return Agent(
         behaviours=behaviours,
         reasoners=_reasoners(settings, tasks, contracts),
-        actors=settings.actors,
+        actors=actors,
         zones=zones,
+        cast={**_cast(tasks), **actors},
         observers=observers,
-        models=database.names() if database is not None else (),
+        models=known,
         limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
+
+
+def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:
+    """All models that there are, and those that were taught."""
+    if database is None:
+        return (), frozenset()
+    return database.names(), frozenset(view.name for view in database.taught)
 
 
 def reasoning_agent(
@@ -109,17 +129,34 @@ def reasoning_agent(
         VisupError: A task, rules or zones file is not as it should be, or an actor is bound that no
             task has.
     """
-    tasks = [t for name in settings.tasks for t in load_tasks(name)]
-    zones = load_zones(settings.zones) if settings.zones else ()
-    _check_zones(tasks, {z.name for z in zones})
+    tasks, zones = _tasks_and_zones(settings)
     _check_actors(settings, tasks, None)
+    if behaviours and any(map(asks_for_colour, tasks)):
+        behaviours = (*behaviours, ColourBehaviour())
     return Agent(
         behaviours=behaviours,
         reasoners=_reasoners(settings, tasks, [b.contract for b in behaviours]),
         actors=settings.actors,
         zones=zones,
+        cast=_cast(tasks),
         observers=observers,
     )
+
+
+def _tasks_and_zones(settings: WatchSettings) -> tuple[list[Task], tuple[Zone, ...]]:
+    """The tasks of a run and the zones of its settings; a task without a ground has that of the zones."""
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    zones = load_zones(settings.zones) if settings.zones else ()
+    ground = load_ground(settings.zones) if settings.zones else None
+    if ground is not None:
+        tasks = [t if t.ground else replace(t, grounds=(ground,)) for t in tasks]
+    _check_zones(tasks, {z.name for z in zones})
+    return tasks, zones
+
+
+def _cast(tasks: Sequence[Task]) -> dict[str, tuple[str, ...]]:
+    """The actors of all tasks with the models that they may be: names for the operator's answers."""
+    return {a: t.models(a) for t in tasks for a in task_actors(t)}
 
 
 def final_verdict(mind: Mind) -> Verdict:
@@ -171,7 +208,8 @@ def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
 def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
 ) -> Reasoners:
-    interpreting = default_reasoners(rules=_rules(settings))
+    traits = any(map(asks_for_traits, tasks))
+    interpreting = default_reasoners(rules=_rules(settings), traits=traits)
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)
     activation = (ActivationReasoner(rules),) if rules else ()
@@ -186,6 +224,12 @@ def _reasoners(
 def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
     """A zone that nobody has drawn could never be seen to be entered or left."""
     for task in tasks:
+        if needs_ground(task) and task.ground is None:
+            raise SettingsError(
+                f"task `{task.name}` speaks of metres on the floor, but nothing says where the floor is",
+                where=task.file,
+                expected="`ground is (80, 400) = (0 m, 0 m), ...`, or a zones file with [ground]",
+            )
         for zone in undrawn_zones(task):
             if zone in drawn:
                 continue

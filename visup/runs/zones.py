@@ -11,11 +11,19 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from visup.agent import VisupError, Zone
 from visup.agent.model.errors import ErrorGroup, SettingsError
+from visup.rules.geometry.ground import Floats, projected
+from visup.tasks.actions.floor import floor_map
+from visup.tasks.grammar.nodes import Ground, Number
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
-_KEYS = ("name", "polygon", "depth")
+_KEYS = ("name", "polygon", "floor", "depth")
+_GROUND = (
+    "[ground], image = [[80, 400], ...], floor = [[0, 0], ...], four points or more, in metres"
+)
 _EXAMPLE = '[[zone]], name = "dock", polygon = [[100, 80], [300, 80], [300, 240], [100, 240]]'
 
 
@@ -26,12 +34,14 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
         SettingsError: The file cannot be read, or is no such file.
         ManyErrors: More than one zone is not as it should be.
     """
-    entries = _entries(path)
+    entries, given = _entries(path)
+    ground = _ground(given, path)
+    h = None if ground is None else floor_map(ground)
     zones: list[Zone] = []
     faults: list[VisupError] = []
     for number, entry in enumerate(entries, start=1):
         try:
-            zone = _zone(entry, f"{path}, zone {number}")
+            zone = _zone(entry, f"{path}, zone {number}", h)
             if zone.name in (z.name for z in zones):
                 raise SettingsError(
                     f"two zones are called '{zone.name}'",
@@ -48,7 +58,35 @@ def load_zones(path: Path) -> tuple[Zone, ...]:
     return tuple(zones)
 
 
-def _entries(path: Path) -> list[Any]:
+def load_ground(path: Path) -> Ground | None:
+    """Where points of the image are on the floor, or None when the file does not say so.
+
+    Raises:
+        SettingsError: The file cannot be read, or its ground is not as it should be.
+    """
+    return _ground(_entries(path)[1], path)
+
+
+def _ground(given: object, path: Path) -> Ground | None:
+    if given is None:
+        return None
+    where, table = f"{path}, ground", given if isinstance(given, dict) else {}
+    sides = [table.get(key) for key in ("image", "floor")]
+    image, floor = (
+        tuple(_pair(p) for p in side) if isinstance(side, list) else () for side in sides
+    )
+    fine = len(image) == len(floor) >= 4 and all(image) and all(floor)
+    if not fine or set(table) - {"image", "floor"}:
+        raise SettingsError("the ground is not as it should be", where=where, expected=_GROUND)
+    metres = tuple((Number(p[0], "m"), Number(p[1], "m")) for p in floor if p is not None)
+    ground = Ground(tuple(p for p in image if p is not None), metres)
+    if floor_map(ground) is None:
+        what = "three of the points lie in a line, so they do not tell the floor"
+        raise SettingsError(what, where=where, expected="such as the corners of a rectangle")
+    return ground
+
+
+def _entries(path: Path) -> tuple[list[Any], object]:
     try:
         found = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as fault:
@@ -59,17 +97,19 @@ def _entries(path: Path) -> list[Any]:
         raise SettingsError("the file is not text", where=str(path), expected="TOML") from fault
     except tomllib.TOMLDecodeError as fault:
         raise SettingsError(f"this is not TOML: {fault}", where=str(path)) from fault
-    entries = found.pop("zone", None)
+    entries, ground = found.pop("zone", None), found.pop("ground", None)
     if found:
         raise SettingsError(
             f"'{next(iter(found))}' means nothing here", where=str(path), expected="[[zone]]"
         )
+    if entries is None and ground is not None:
+        return [], ground
     if not isinstance(entries, list) or not entries:
         raise SettingsError("there is no zone in it", where=str(path), expected=_EXAMPLE)
-    return entries
+    return entries, ground
 
 
-def _zone(entry: object, where: str) -> Zone:
+def _zone(entry: object, where: str, h: Floats | None) -> Zone:
     if not isinstance(entry, dict):
         raise SettingsError("this is not a zone", where=where, expected=_EXAMPLE)
     strange = next((key for key in entry if key not in _KEYS), None)
@@ -85,10 +125,26 @@ def _zone(entry: object, where: str) -> Zone:
             expected='a word of letters, digits and _, such as name = "dock"',
         )
     where = f"{where} ('{name}')"
+    if "floor" in entry:
+        floor = _polygon(entry["floor"], where, "metres", least=1e-6)
+        return Zone(name, _seen(floor, h, where), _depth(entry.get("depth"), where), on_floor=True)
     return Zone(name, _polygon(entry.get("polygon"), where), _depth(entry.get("depth"), where))
 
 
-def _polygon(given: object, where: str) -> tuple[tuple[float, float], ...]:
+def _seen(
+    floor: tuple[tuple[float, float], ...], h: Floats | None, where: str
+) -> tuple[tuple[float, float], ...]:
+    """A polygon of the floor as it lies in the image."""
+    if h is None:
+        what = "the zone is drawn on the floor, but nothing says where the floor is"
+        raise SettingsError(what, where=where, expected=_GROUND)
+    corners = projected(floor, np.linalg.inv(h).astype(float))
+    return tuple((float(x), float(y)) for x, y in corners)
+
+
+def _polygon(
+    given: object, where: str, unit: str = "pixels", least: float = 1.0
+) -> tuple[tuple[float, float], ...]:
     corners = given if isinstance(given, list) else []
     points = tuple(_pair(c) for c in corners)
     if not all(points) or len(corners) < 3:
@@ -97,10 +153,10 @@ def _polygon(given: object, where: str) -> tuple[tuple[float, float], ...]:
             if corners and all(points)
             else "the polygon is not a list of corners",
             where=where,
-            expected="at least three corners [x, y] in pixels, in order",
+            expected=f"at least three corners [x, y] in {unit}, in order",
         )
     polygon = tuple(p for p in points if p is not None)
-    if area(polygon) < 1.0:
+    if area(polygon) < least:
         raise SettingsError(
             "the polygon encloses nothing", where=where, hint="give the corners in their order"
         )

@@ -312,4 +312,10 @@ def _transcript(events: Iterator[tuple[int, Event]], mind: Mind) -> Transcript:
 
 def replace_agent(agent: Agent, reasoners: Reasoners) -> Agent:
     """An agent that reasons with other reasoners, and perceives nothing."""
-    return Agent(reasoners=reasoners, actors=agent.actors, zones=agent.zones, models=agent.models)
+    return Agent(
+        reasoners=reasoners,
+        actors=agent.actors,
+        zones=agent.zones,
+        models=agent.models,
+        cast=agent.cast,
+    )

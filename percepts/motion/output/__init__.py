@@ -1,5 +1,6 @@
 """What is reported of tracks.
 
 `region_report.py` makes regions of tracks and obeys directives; `backward_tracking.py` finds since when a
-region has been in view, by following its points back through older images.
+region has been in view, by following its points back through older images; `cast_shadows.py` leaves out
+regions that are nothing but ground seen darker.
 """

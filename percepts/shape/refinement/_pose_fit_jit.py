@@ -51,26 +51,31 @@ def _draw(
     depth[:] = np.inf
     number[:] = -1
     for k in range(len(faces)):
-        a, b, c = points[faces[k, 0]], points[faces[k, 1]], points[faces[k, 2]]
-        double = (b[1] - c[1]) * (a[0] - c[0]) + (c[0] - b[0]) * (a[1] - c[1])
+        i, j, m = faces[k, 0], faces[k, 1], faces[k, 2]
+        ax, ay, bx, by = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
+        cx, cy = points[m, 0], points[m, 1]
+        double = (by - cy) * (ax - cx) + (cx - bx) * (ay - cy)
         if abs(double) < 1e-9:
             continue
-        x0 = max(0, int(np.ceil(min(a[0], b[0], c[0]) - 0.5)))
-        x1 = min(side - 1, int(np.floor(max(a[0], b[0], c[0]) - 0.5)))
-        y0 = max(0, int(np.ceil(min(a[1], b[1], c[1]) - 0.5)))
-        y1 = min(side - 1, int(np.floor(max(a[1], b[1], c[1]) - 0.5)))
+        x0 = max(0, int(np.ceil(min(ax, bx, cx) - 0.5)))
+        x1 = min(side - 1, int(np.floor(max(ax, bx, cx) - 0.5)))
+        y0 = max(0, int(np.ceil(min(ay, by, cy) - 0.5)))
+        y1 = min(side - 1, int(np.floor(max(ay, by, cy) - 0.5)))
+        # Shares of the corners a and b at a pixel change evenly from pixel to pixel.
+        a_right, a_down = (by - cy) / double, (cx - bx) / double
+        b_right, b_down = (cy - ay) / double, (ax - cx) / double
+        za, zb, zc = points[i, 2], points[j, 2], points[m, 2]
         for y in range(y0, y1 + 1):
+            of_a = a_right * (x0 + 0.5 - cx) + a_down * (y + 0.5 - cy)
+            of_b = b_right * (x0 + 0.5 - cx) + b_down * (y + 0.5 - cy)
             for x in range(x0, x1 + 1):
-                px, py = x + 0.5 - c[0], y + 0.5 - c[1]
-                of_a = ((b[1] - c[1]) * px + (c[0] - b[0]) * py) / double
-                of_b = ((c[1] - a[1]) * px + (a[0] - c[0]) * py) / double
-                of_c = 1.0 - of_a - of_b
-                if of_a < -1e-6 or of_b < -1e-6 or of_c < -1e-6:
-                    continue
-                z = of_a * a[2] + of_b * b[2] + of_c * c[2]
-                if z < depth[y, x]:
-                    depth[y, x] = z
-                    number[y, x] = k
+                if of_a >= -1e-6 and of_b >= -1e-6 and of_a + of_b <= 1.0 + 1e-6:
+                    z = zc + of_a * (za - zc) + of_b * (zb - zc)
+                    if z < depth[y, x]:
+                        depth[y, x] = z
+                        number[y, x] = k
+                of_a += a_right
+                of_b += b_right
 
 
 @nb.njit(cache=True)
@@ -155,39 +160,53 @@ def _shading(
 
 
 @nb.njit(cache=True)
-def fit_of(
-    mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
-    seen: tuple[NDArray[np.float64], NDArray[np.float64]],
-    turn: NDArray[np.float64],
-    distance: float,
-    scratch: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
-) -> tuple[float, float, float]:
-    """How well a drawn mesh fits: overlap of the outlines (IoU), share of the tone explained, scale."""
-    vertices, faces, normals = mesh
-    cover, tone = seen
-    points, depth, number = scratch
-    area, x, y = _moments(cover)
-    place = np.array([x, y, area**0.5])
-    for again in range(3):
-        _project(vertices, turn, distance, place, points)
-        _draw(points, faces, depth, number)
-        if again == 2:
-            break
-        drawn, left, top = _drawn_moments(number)
-        if drawn < 4.0:
-            return 0.0, 0.0, place[2]
-        grown = (area / drawn) ** 0.5
-        place[0] = x - (left - place[0]) * grown
-        place[1] = y - (top - place[1]) * grown
-        place[2] *= grown
+def _overlap(cover: NDArray[np.float64], number: NDArray[np.int32]) -> float:
+    """Intersection over union of what is covered and what is drawn."""
     both, either = 0.0, 0.0
     for row in range(cover.shape[0]):
         for column in range(cover.shape[1]):
             drawn = 1.0 if number[row, column] >= 0 else 0.0
             both += min(drawn, cover[row, column])
             either += max(drawn, cover[row, column])
-    explained = _shading(turn, normals, number, cover, tone)
-    return both / max(either, 1e-9), explained, place[2]
+    return both / max(either, 1e-9)
+
+
+@nb.njit(cache=True)
+def start_place(cover: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a drawing begins to be fitted: x, y and pixels of the radius."""
+    area, x, y = _moments(cover)
+    return np.array([x, y, area**0.5])
+
+
+@nb.njit(cache=True)
+def fit_of(
+    mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
+    seen: tuple[NDArray[np.float64], NDArray[np.float64]],
+    turn: NDArray[np.float64],
+    distance: float,
+    place: NDArray[np.float64],
+    scratch: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
+) -> tuple[float, float]:
+    """How well a drawn mesh fits: overlap of the outlines (IoU), and share of the tone explained.
+
+    `place` (x, y and pixels of the radius) is moved so that centroid and area come nearer to those seen.
+    """
+    vertices, faces, normals = mesh
+    cover, tone = seen
+    points, depth, number = scratch
+    _project(vertices, turn, distance, place, points)
+    _draw(points, faces, depth, number)
+    area, x, y = _moments(cover)
+    drawn, left, top = _drawn_moments(number)
+    if drawn < 4.0:
+        return 0.0, 0.0
+    grown = (area / drawn) ** 0.5
+    place[0] = x - (left - place[0]) * grown
+    place[1] = y - (top - place[1]) * grown
+    place[2] *= grown
+    _project(vertices, turn, distance, place, points)
+    _draw(points, faces, depth, number)
+    return _overlap(cover, number), _shading(turn, normals, number, cover, tone)
 
 
 @nb.njit(cache=True)
@@ -230,18 +249,19 @@ def climb(
         np.empty((side, side)),
         np.empty((side, side), np.int32),
     )
-    turn = start.copy()
-    overlap, explained, scale = fit_of(mesh, seen, turn, distance, scratch)
+    turn, place = start.copy(), start_place(seen[0])
+    fit_of(mesh, seen, turn, distance, place, scratch)
+    overlap, explained = fit_of(mesh, seen, turn, distance, place, scratch)
     for step in steps:
         for _ in range(3):
             moved = False
             for axis in range(3):
                 for sign in (1.0, -1.0):
-                    other = _about(axis, sign * step) @ turn
-                    o, e, r = fit_of(mesh, seen, other, distance, scratch)
+                    other, there = _about(axis, sign * step) @ turn, place.copy()
+                    o, e = fit_of(mesh, seen, other, distance, there, scratch)
                     if o + shading * e > overlap + shading * explained + 1e-6:
-                        turn, overlap, explained, scale, moved = other, o, e, r, True
+                        turn, place, overlap, explained, moved = other, there, o, e, True
                         break
             if not moved:
                 break
-    return turn, overlap, explained, scale
+    return turn, overlap, explained, place[2]

@@ -22,11 +22,12 @@ from visup.percepts.shape.refinement.region_picture import RegionPicture
 SHADING = 0.3
 """Weight of the share of shading explained beside the overlap."""
 
-COARSE = np.radians([16.0, 8.0, 4.0, 2.0])
-"""Steps of the search from the orientation of a view, radians."""
+COARSE = np.radians([16.0, 8.0, 4.0])
+"""Steps of a whole search from the orientations of views, radians; what it leads to is searched finely."""
 
-FINE = np.radians([4.0, 2.0])
-"""Steps of the search from an orientation fitted a moment ago, radians."""
+FINE = np.radians([2.0, 1.0, 0.5])
+"""Steps of the search from an orientation fitted a moment ago, radians; a coarser last one would lag
+behind what turns slowly."""
 
 USUAL_FOCAL = 1.2
 """Focal length of a usual lens, in widths of the picture (a horizontal field of view of 45 degrees)."""

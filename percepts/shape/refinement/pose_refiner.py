@@ -41,7 +41,7 @@ class RefinerSettings:
         rank: What a fit that is worth 1 less loses of its similarity.
     """
 
-    names: int = 2
+    names: int = 1
     starts: int = 8
     kept: int = 3
     renew_s: float = 3.0
@@ -155,8 +155,13 @@ class PoseRefiner:
         steps: NDArray[np.float64],
     ) -> list[PoseFit]:
         focal = USUAL_FOCAL * frame.size[0]
-        fits = fitted_poses(self.meshes[name], picture, starts, steps=steps, focal_px=focal)
-        return fits[: self.settings.kept]
+        mesh, kept = self.meshes[name], self.settings.kept
+        fits = fitted_poses(mesh, picture, starts, steps=steps, focal_px=focal)[:kept]
+        if steps is FINE:
+            return fits
+        near = [f.orientation for f in fits]
+        fine = fitted_poses(mesh, picture, near, steps=FINE, focal_px=focal)
+        return [replace(f, start=fits[f.start].start) for f in fine]
 
     def _remembered(
         self,
@@ -181,6 +186,7 @@ class PoseRefiner:
                     similarity=max(0.0, best.similarity - rank * (top - fit.worth)),
                     direction=(float(d[0]), float(d[1]), float(d[2])),
                     rotation=float(r),
+                    fitted=True,
                 ),
                 fit.area,
             )

@@ -22,6 +22,7 @@ from visup.evaluation.health.camera_faults import EXPECTED, inject
 from visup.evaluation.health.runner import evaluate_health, find_sources, plan, statuses
 from visup.percepts.health.frame_timing import ArrivalMonitor
 from visup.percepts.health.image_quality import measure_quality
+from visup.percepts.health.repeated_frames import Repeat
 
 START, LENGTH = 20, 50
 OK = HealthStatus.OK
@@ -179,7 +180,7 @@ def come(steps: Sequence[int], every: int = 1, rate: float = 25.0) -> list[int]:
     """What is missing after each frame, for given distances between frames."""
     arrivals = ArrivalMonitor(lost=0.2, gap=3, frozen_s=0.5)
     numbers = np.cumsum([0, *steps]) * every
-    return [arrivals.arrive(int(n), n / rate, repeated=False) for n in numbers]
+    return [arrivals.arrive(int(n), n / rate, Repeat()) for n in numbers]
 
 
 @given(st.integers(1, 9), st.floats(5.0, 60.0), st.integers(3, 30))
@@ -204,6 +205,44 @@ def test_missing_frames_are_those_that_did_not_come(steps: list[int]) -> None:
 def test_a_camera_that_always_repeats_frames_drops_none() -> None:
     halved = [Frame(n, n / 25, panning()[n // 2 * 2].image) for n in range(LENGTH)]
     assert set(told(halved)) == {OK}
+
+
+def bench(places: Sequence[float], noise: float = 0.0) -> list[Frame]:
+    """A still camera; one thing stands at given places, the rest rests."""
+    disc = (lambda n: (60 + places[n], 90.0), 24.0, texture(2, (320, 480), 0, 255))
+    return [s.frame for s in clip(ground(), lambda n: (20, 30), [disc], len(places), noise=noise)]
+
+
+@given(
+    st.integers(1, 9), st.sampled_from((1, 4, 8)), st.sampled_from((0.0, 1.5)), st.integers(2, 3)
+)
+@settings(max_examples=6, deadline=None)
+def test_a_mover_that_pauses_drops_no_frames(
+    rest: int, ramp: int, noise: float, pauses: int
+) -> None:
+    """With the very same image again and again while it rests, where there is no noise."""
+    paces = [2.5 * (n + 1) / (ramp + 1) for n in range(ramp)]
+    once = [2.5] * 12 + paces[::-1] + [0.0] * rest + paces
+    places = np.cumsum([*once * pauses, *[2.5] * 6])
+    assert set(told(bench(places.tolist(), noise))) == {OK}
+
+
+@given(st.integers(0, 1000), st.sampled_from((0.0, 1.5)))
+@settings(max_examples=5, deadline=None)
+def test_frames_repeated_while_something_moves_are_missing(seed: int, noise: float) -> None:
+    frames = bench([2.5 * n for n in range(LENGTH)], noise)
+    came = np.random.default_rng(seed).random(LENGTH) > 0.5
+    came[:START] = True
+    # The image of the last frame that came stands in for those that did not.
+    newest = np.maximum.accumulate(np.where(came, np.arange(LENGTH), 0))
+    stalled = [Frame(f.index, f.time, frames[k].image) for f, k in zip(frames, newest, strict=True)]
+    assert HealthStatus.DROPPED in told(stalled)
+
+
+def test_frames_that_come_too_late_and_then_too_early_are_not_missing() -> None:
+    arrivals = ArrivalMonitor(lost=0.1, gap=3, frozen_s=0.5)
+    late = [n / 25 + (0.04 if n > 20 and n % 4 == 0 else 0.0) for n in range(80)]
+    assert not any(arrivals.arrive(n, time, Repeat()) for n, time in enumerate(late))
 
 
 def test_a_campaign_is_drawn_from_its_seed() -> None:

@@ -317,7 +317,7 @@ def test_every_relation_is_a_word() -> None:
 
 
 def test_both_languages_know_the_same_units_and_print_numbers_alike() -> None:
-    from visup.tasks.grammar.conditions import bound_of
+    from visup.tasks.grammar.conditions import bounds_of
     from visup.tasks.grammar.parser import read
 
     for unit in ("ms", "s", "min", "h"):
@@ -326,4 +326,4 @@ def test_both_languages_know_the_same_units_and_print_numbers_alike() -> None:
         assert UNITS[unit] == (Number(1.0, unit).dimension, Number(1.0, unit).base)
     body = read("<t> ::= gap(a, b) < 2.5 px").stages[0].body
     assert isinstance(body, Comparison)
-    assert bound_of(body) == Number(2.5, Unit.PX)
+    assert bounds_of(body) == (Number(2.5, Unit.PX),)

@@ -131,6 +131,18 @@ EVALUATIONS = (
         folder_argument("Folder with sound video anywhere below it."),
     ),
     EvaluationCommand(
+        "alarms",
+        """Alarms on sound footage, watched without a task: how many of each kind an hour.
+
+        Below the folder stand clips, or recorded runs, which are reasoned about again in seconds.
+        """,
+        "visup.evaluation.alarms.runner:evaluate_alarms",
+        "watching",
+        ("alarms", "clips", "per_hour", "hours", "noted"),
+        (_LIMIT,),
+        folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
+    ),
+    EvaluationCommand(
         "clips",
         """Rendered clips of what footage lacks: pan, shake, zoom, stops, eclipse ...
 

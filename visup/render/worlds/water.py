@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.render.worlds.world import Daylight, Floats, Heaven, Water
 
@@ -44,14 +45,16 @@ def radiance(
     return np.asarray((1 - mirror) * deep + mirror * glow, np.float32)
 
 
-def random_waves(rng: np.random.Generator, length: float, steepness: float) -> Floats:
-    """(7, 4) waves about one direction of the wind; `length` is of the longest, metres."""
+def random_waves(rng: np.random.Generator, length: float, steepness: float) -> NDArray[np.float64]:
+    """(N, 4) waves about one direction of the wind; `length` is of the longest, metres."""
+    count = 12
     heading = rng.uniform(0, 2 * np.pi)
-    lengths = length * 0.62 ** np.arange(7)
-    angle = heading + rng.normal(0, 0.6, 7)
+    # Lengths without a common measure: waves that fit each other look woven.
+    lengths = length * np.exp(-rng.uniform(0, 2.3, count))
+    angle = heading + rng.normal(0, 0.7, count)
     number = 2 * np.pi / lengths
     speed = np.sqrt(9.81 * number)
-    steep = steepness * rng.uniform(0.6, 1.4, 7) / np.sqrt(7)
+    steep = steepness * rng.uniform(0.4, 1.4, count) / np.sqrt(count)
     return np.column_stack([number * np.cos(angle), number * np.sin(angle), speed, steep])
 
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.shape.refinement._pose_fit_jit import fit_of
+from visup.percepts.shape.refinement._pose_fit_jit import fit_of, start_place
 from visup.percepts.shape.refinement.mesh_model import (
     MOST_FACES,
     MeshModel,
@@ -40,8 +40,9 @@ def drawn(model: MeshModel, orientation: NDArray[np.float64]) -> RegionPicture:
     blank = np.zeros((SIDE, SIDE))
     disc = blank.copy()
     disc[14:38, 14:38] = 1.0
-    mesh = (model.vertices, model.faces, model.normals)
-    fit_of(mesh, (disc, blank), orientation, FAR, (*side, number))
+    mesh, place = (model.vertices, model.faces, model.normals), start_place(disc)
+    for _ in range(3):
+        fit_of(mesh, (disc, blank), orientation, FAR, place, (*side, number))
     normals = model.normals[np.maximum(number, 0)] @ orientation.T
     normals *= np.where(normals[..., 2:] > 0, -1.0, 1.0)
     light = np.clip(normals @ np.array([-0.5, -0.6, -0.6]), 0, None)

@@ -9,7 +9,18 @@ from dataclasses import replace
 import numpy as np
 
 from visup.agent.model.errors import SettingsError
-from visup.render.worlds.kinds import charge, inspect, pick
+from visup.render.worlds.kinds import (
+    bench,
+    boats,
+    charge,
+    conveyor,
+    crane,
+    fetch,
+    handover,
+    inspect,
+    pick,
+    walker,
+)
 from visup.render.worlds.kinds.kind import WorldKind
 from visup.render.worlds.world import World
 
@@ -19,6 +30,13 @@ KINDS: Mapping[str, WorldKind] = {
         WorldKind("pick", pick.OUTCOMES, pick.build),
         WorldKind("charge", charge.OUTCOMES, charge.build),
         WorldKind("inspect", inspect.OUTCOMES, inspect.build),
+        WorldKind("crane", crane.OUTCOMES, crane.build),
+        WorldKind("boats", boats.OUTCOMES, boats.build),
+        WorldKind("handover", handover.OUTCOMES, handover.build),
+        WorldKind("walker", walker.OUTCOMES, walker.build),
+        WorldKind("conveyor", conveyor.OUTCOMES, conveyor.build),
+        WorldKind("fetch", fetch.OUTCOMES, fetch.build),
+        WorldKind("bench", bench.OUTCOMES, bench.build),
     )
 }
 

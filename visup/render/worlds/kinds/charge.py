@@ -8,15 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.worlds import clutter, machines
-from visup.render.worlds.kinds.kind import cut_short, frames_until, random_view, spans
+from visup.render.worlds.kinds.kind import (
+    Script,
+    cut_short,
+    finished,
+    frames_until,
+    random_view,
+    spans,
+)
 from visup.render.worlds.motion import along, bend, clock, cruised, eased, frame_at, posed
 from visup.render.worlds.scenery import (
     hall,
     meadow,
     pick_colour,
-    random_heaven,
-    random_imager,
-    random_light,
     seed_of,
     unlike,
 )
@@ -110,7 +114,6 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     if outcome == "in_progress":
         end = float(rng.uniform(0.55, 0.85)) * (drive.near - seen) + seen
         truth, frames = cut_short(truth, end), frames_until(end)
-    light = random_light(rng, np.asarray(view.position))
     surface = Surface("grain", 0.3, float(rng.uniform(0.05, 0.2)), seed_of(rng))
     posts = _post_poses(layout, drive, outcome)
     things = [
@@ -125,12 +128,10 @@ def build(rng: np.random.Generator, outcome: str) -> World:
         *_surroundings(rng, layout, post, frames),
     ]
     name, text = _task(rng, outcome)
-    return World(
-        name="", kind="charge", things=tuple(things), viewpoint=view, light=light,
-        heaven=random_heaven(rng), imager=random_imager(rng, light), task=name,
-        task_text=text.format(hold=hold), actors={a: a for a in ("vehicle", "charger")},
-        course=truth, frames=frames, seed=seed_of(rng),
-    )  # fmt: skip
+    script = Script(
+        things, view, (name, text.format(hold=hold)), ("vehicle", "charger"), truth, frames
+    )
+    return finished(rng, "charge", script)
 
 
 def _task(rng: np.random.Generator, outcome: str) -> tuple[str, str]:
@@ -166,7 +167,7 @@ def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
         [np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)]
     )
     aim = np.array([0.0, 0.0, 0.4])
-    return random_view(rng, position + aim, aim, float(rng.uniform(36, 44)), frames)
+    return random_view(rng, position + aim, aim, frames)
 
 
 def _drive(

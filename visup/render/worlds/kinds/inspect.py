@@ -12,15 +12,12 @@ from scipy.spatial.distance import cdist
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
 from visup.render.meshes.spacecraft import mesh
 from visup.render.worlds import clutter, machines
-from visup.render.worlds.kinds.kind import cut_short, frames_until, spans
-from visup.render.worlds.motion import clock, dropped, eased, posed, still
+from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, spans
+from visup.render.worlds.motion import clock, dropped, eased, frame_at, posed, still
 from visup.render.worlds.scenery import (
     hall,
     meadow,
     pick_colour,
-    random_heaven,
-    random_imager,
-    random_light,
     seed_of,
     unlike,
 )
@@ -53,6 +50,9 @@ STATUES = (
     "espresso",
 )
 HOLD_S = 5
+CLEAR_PX = 12
+"""Pixels between both in the picture, for those flights that are clearly free of the station."""
+
 Doubles = NDArray[np.float64]
 
 TASK = """\
@@ -84,27 +84,36 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     radius = float(np.linalg.norm(station.vertices[:, :2], axis=1).max() + rng.uniform(0.9, 1.5))
     times = _times(rng, outcome)
     frames = frames_until(times.end)
-    view = _view(rng, radius, height, frames)
-    poses, hit_s = _flight(rng, (station, craft), (radius, level), times, outcome, frames)
     standing = still(0, 0, 0, float(rng.uniform(0, 6.3)))
-    gaps = _gaps(view, station, standing, craft, poses)
+    # Some pass before or behind the station in the picture, which is no touch but looks like one.
+    crossing = bool(rng.random() < 0.2)
+    for least in (55, 65, 72, 78, 82, 85):
+        view = _view(rng, (radius, height), least, frames)
+        poses, hit_s = _flight(rng, (station, craft), (radius, level), times, outcome, frames)
+        gaps = _gaps(view, station, standing, craft, poses)
+        free = gaps[: frame_at(min(hit_s - 1.5, times.end))]
+        if crossing or free.min() > CLEAR_PX:
+            break
+        radius += 0.12
     truth, limit = _course(times, outcome, gaps, hit_s)
     if outcome == "in_progress":
         end = times.arrive + float(rng.uniform(1.5, 3.5))
         truth, frames = cut_short(truth, end), frames_until(end)
-    light = random_light(rng, np.asarray(view.position))
     surface = Surface("grain", 0.4, float(rng.uniform(0.05, 0.3)), seed_of(rng))
     things = [
         Thing("station", station, standing, STATION, surface),
         Thing("inspector", craft, poses, INSPECTOR, surface),
         *_surroundings(rng, radius),
     ]
-    return World(
-        name="", kind="inspect", things=tuple(things), viewpoint=view, light=light,
-        heaven=random_heaven(rng), imager=random_imager(rng, light), task="inspect_gap",
-        task_text=TASK.format(gap=limit, hold=HOLD_S),
-        actors={a: a for a in ("inspector", "station")}, course=truth, frames=frames, seed=seed_of(rng),
-    )  # fmt: skip
+    script = Script(
+        things,
+        view,
+        ("inspect_gap", TASK.format(gap=limit, hold=HOLD_S)),
+        ("inspector", "station"),
+        truth,
+        frames,
+    )
+    return finished(rng, "inspect", script)
 
 
 def _station(rng: np.random.Generator) -> tuple[Solid, float]:
@@ -160,9 +169,12 @@ def _times(rng: np.random.Generator, outcome: str) -> InspectTimes:
     return InspectTimes(begin, arrive, leave, min(leave + float(rng.uniform(2.6, 3.4)), 15.0))
 
 
-def _view(rng: np.random.Generator, radius: float, height: float, frames: int) -> Viewpoint:
+def _view(
+    rng: np.random.Generator, sizes: tuple[float, float], least_deg: float, frames: int
+) -> Viewpoint:
     """From high up, so that going round is seen as such; no zoom, since the task counts pixels."""
-    high, side = np.radians(rng.uniform(55, 85)), rng.uniform(0, 2 * np.pi)
+    radius, height = sizes
+    high, side = np.radians(rng.uniform(least_deg, 88)), rng.uniform(0, 2 * np.pi)
     far = 3.6 * (radius + 0.5)
     way = np.array([np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)])
     aim = np.array([0.0, 0.0, 0.3 * height])

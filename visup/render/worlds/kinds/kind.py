@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from visup.render.worlds.scenery import random_heaven, random_imager, random_light, seed_of
 from visup.render.worlds.viewpoint import disturbed, steady
-from visup.render.worlds.world import FPS, Course, StageSpan, Viewpoint, World
+from visup.render.worlds.world import FPS, Course, StageSpan, Thing, Viewpoint, Water, World
 
 STYLES = ("fixed", "fixed", "shaking", "panning", "zooming")
 """Ways to hold the camera, two of five on a tripod."""
 
-TOLERANCE_S = 0.7
+STRANGERS = ("bystander", "other")
+"""Things that move and have no part in the work."""
+
 LONGEST_S = 15.0
 
 
@@ -34,15 +37,80 @@ class WorldKind:
 
 
 def random_view(
-    rng: np.random.Generator,
-    position: ArrayLike,
-    aim: ArrayLike,
-    fov_vertical_deg: float,
-    frames: int,
+    rng: np.random.Generator, position: ArrayLike, aim: ArrayLike, frames: int
 ) -> Viewpoint:
-    """A camera held in one of the ways of `STYLES`."""
-    style = str(rng.choice(STYLES))
-    return disturbed(steady(position, aim, fov_vertical_deg, frames), rng, style)
+    """A camera of random field of view at a place, held in one of the ways of `STYLES`."""
+    fov = float(rng.uniform(35, 43))
+    return disturbed(steady(position, aim, fov, frames), rng, str(rng.choice(STYLES)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Script:
+    """What a kind scripts; the rest of a world is drawn when it is finished.
+
+    Attributes:
+        things: What stands and moves in it.
+        view: The camera.
+        task: Name of the task file and its text.
+        actors: Of the task, named as their things are.
+        course: What is true.
+        frames: How many there are.
+        water: If there is any.
+    """
+
+    things: Sequence[Thing]
+    view: Viewpoint
+    task: tuple[str, str]
+    actors: tuple[str, ...]
+    course: Course
+    frames: int
+    water: Water | None = None
+
+
+def finished(rng: np.random.Generator, kind: str, script: Script) -> World:
+    """The world of a script, with light, sky and the flaws of a camera."""
+    light = random_light(rng, np.asarray(script.view.position))
+    name, text = script.task
+    if any(thing.name in STRANGERS for thing in script.things):
+        # Who knows that others come by says so; whoever does not is right to be alarmed.
+        text += "bystanders ignored\n"
+    return World(
+        "",
+        kind,
+        tuple(script.things),
+        script.view,
+        light,
+        random_heaven(rng),
+        random_imager(rng, light),
+        name,
+        text,
+        {a: a for a in script.actors},
+        script.course,
+        script.frames,
+        script.water,
+        seed_of(rng),
+    )
+
+
+def from_around(
+    rng: np.random.Generator,
+    aim: ArrayLike,
+    far: float,
+    high_deg: tuple[float, float],
+    side: float = 0.6,
+) -> NDArray[np.float64]:
+    """(3,) a place for a camera: on the side of -y, so far from what it looks at.
+
+    Args:
+        rng: Draws where.
+        aim: (3,) what it looks at, metres.
+        far: Metres.
+        high_deg: Least and most elevation.
+        side: Most radians to either side.
+    """
+    turn, high = rng.uniform(-side, side), np.radians(rng.uniform(*high_deg))
+    way = [np.sin(turn) * np.cos(high), -np.cos(turn) * np.cos(high), np.sin(high)]
+    return np.asarray(aim, float) + far * np.array(way)
 
 
 def cut_short(course: Course, end_s: float) -> Course:

@@ -11,7 +11,7 @@ from visup.agent.model.errors import SettingsError
 from visup.render.meshes.solids import Colour, Solid, box, join, lathe
 from visup.render.worlds import clutter
 from visup.render.worlds.kinds import pick_tasks
-from visup.render.worlds.kinds.kind import cut_short, frames_until, random_view
+from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, random_view
 from visup.render.worlds.motion import carried, clock, dropped, eased, frame_at, posed, still
 from visup.render.worlds.robot import (
     RobotCourse,
@@ -22,9 +22,6 @@ from visup.render.worlds.robot import (
 )
 from visup.render.worlds.scenery import (
     pick_colour,
-    random_heaven,
-    random_imager,
-    random_light,
     seed_of,
     tabletop,
     unlike,
@@ -109,13 +106,8 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     if outcome == "in_progress":
         end = float(rng.uniform(times.lift + 0.8, times.place - 0.4))
         truth, frames = cut_short(truth, end), frames_until(end)
-    light = random_light(rng, np.asarray(view.position))
-    return World(
-        name="", kind="pick", things=tuple(things), viewpoint=view, light=light,
-        heaven=random_heaven(rng), imager=random_imager(rng, light), task=name, task_text=text,
-        actors={a: a for a in ("gripper", "part", "fixture")}, course=truth, frames=frames,
-        seed=seed_of(rng),
-    )  # fmt: skip
+    script = Script(things, view, (name, text), ("gripper", "part", "fixture"), truth, frames)
+    return finished(rng, "pick", script)
 
 
 def random_times(rng: np.random.Generator, outcome: str) -> PickTimes:
@@ -194,7 +186,7 @@ def part_poses(
     # The hand turns while it swings round; what it set down stands upright all the same.
     if outcome != "drop":
         return poses, times.end
-    since = times.carry + float(rng.uniform(0.12, 0.3)) * (times.place - times.carry)
+    since = times.carry + float(rng.uniform(0.08, 0.2)) * (times.place - times.carry)
     held = carried(rest, hand, frame_at(times.lift), frames)
     tumble = rng.uniform(-0.6, 0.6, 3) * [0.15, 0.15, 1]
     return dropped(held, frame_at(since), 0.0, tumble)[0], since
@@ -288,7 +280,7 @@ def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
         [np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)]
     )
     aim = np.array([0.0, 0.0, 0.08])
-    return random_view(rng, position + aim, aim, float(rng.uniform(34, 40)), frames)
+    return random_view(rng, position + aim, aim, frames)
 
 
 def _surroundings(

@@ -77,7 +77,10 @@ def _stages(times: PickTimes, outcome: str, drop_s: float, short: bool) -> tuple
     rows.append(("grasp", t.close, t.lift))
     fails = outcome == "drop"
     if short:
-        rows.append(("carry", t.lift, drop_s, "failing") if fails else ("carry", t.lift, t.place))
+        # Without a stage for the lift the grasp goes on until the part begins to near the fixture.
+        on = t.lift + 0.7 * (t.carry - t.lift)
+        rows[-1] = ("grasp", t.close, on)
+        rows.append(("carry", on, drop_s, "failing") if fails else ("carry", on, t.place))
     else:
         rows.append(("lift", t.lift, t.carry))
         rows.append(("carry", t.carry, drop_s, "failing") if fails else ("carry", t.carry, t.place))

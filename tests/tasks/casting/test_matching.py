@@ -14,7 +14,7 @@ from scipy.optimize import linear_sum_assignment
 from tests.tasks.scripted import belief
 from visup.agent import Binding, Mind, Presence
 from visup.tasks import load_task, parse_task
-from visup.tasks.supervision.matching import (
+from visup.tasks.casting.matching import (
     best_matching,
     match,
     match_strength,

@@ -1,20 +1,22 @@
 """Who plays which actor: weighted matching of actors and believed objects (paper, section 6).
 
 Several identities are believed of each object, each with a strength. The weight of a pair is how
-strongly the object is believed to be one of the models that the actor stands for; the matching
-with the greatest total weight is taken, each object playing one actor at most.
+strongly the object is believed to be one of the models that the actor stands for, or how well it fits
+what else the task says of the actor (`fitness.py`); the matching with the greatest total weight is
+taken, each object playing one actor at most. Machines are matched before their parts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from visup.agent import Binding, Mind, ObjectBelief, Presence
+from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.grammar.nodes import Task
-from visup.tasks.grammar.structure import stage_actors, stage_names, task_actors
+from visup.tasks.grammar.structure import machines_of, stage_actors, stage_names, task_actors
 from visup.tasks.verification.settings import DEFAULT_SETTINGS, TaskSettings
 
 CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two actors want one object
@@ -23,15 +25,6 @@ CURRENT_BONUS = 1.1  # the actors of the stage under way come first when two act
 def models_of(task: Task, actor: str, mind: Mind) -> tuple[str, ...]:
     """Model names that an actor stands for: the user's word, else the task's, else its own name."""
     return tuple(mind.actors.get(actor, ())) or task.models(actor)
-
-
-def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
-    """How strongly an object is believed to be one of some models, 0 to 1."""
-    total = 0.0
-    for candidate in belief.candidates:  # plain loops: this is asked many times in each step
-        if candidate.name in models:
-            total += candidate.share
-    return min(1.0, total)
 
 
 def match(
@@ -55,21 +48,29 @@ def match(
         One binding for each actor, in the order in which the task names them.
     """
     actors = task_actors(task)
-    models = [models_of(task, a, mind) for a in actors]
+    models = {a: models_of(task, a, mind) for a in actors}
     held = {b.actor: b.object_id for b in before if b.object_id is not None}
     objects = [b for _, b in sorted(mind.objects.items()) if _eligible(b, held)]
-    if not actors or not objects:
-        return tuple(Binding(a, m) for a, m in zip(actors, models, strict=True))
-    pure = [[strength(o, m) for o in objects] for m in models]
-    weight = [
-        _weights(row, objects, held.get(actor), actor in current, settings)
-        for row, actor in zip(pure, actors, strict=True)
-    ]
-    chosen = best_matching(weight)
-    return tuple(
-        Binding(a, m, objects[chosen[i]].id, pure[i][chosen[i]]) if i in chosen else Binding(a, m)
-        for i, (a, m) in enumerate(zip(actors, models, strict=True))
-    )
+    found: dict[str, tuple[int, float]] = {}
+    if objects:
+        for group in _machines_first(task, actors):
+            free = [o for o in objects if o.id not in {i for i, _ in found.values()}]
+            playing = {**held, **{a: i for a, (i, _) in found.items()}}
+            pure = [fits(Role(task, a, mind, playing), models[a], free) for a in group]
+            weight = [
+                _weights(row, free, held.get(a), a in current, settings)
+                for row, a in zip(pure, group, strict=True)
+            ]
+            chosen = best_matching(weight).items()
+            found |= {group[i]: (free[j].id, pure[i][j]) for i, j in chosen}
+    return tuple(Binding(a, models[a], *found.get(a, (None, 0.0))) for a in actors)
+
+
+def _machines_first(task: Task, actors: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Actors in groups that are matched one after the other: parts after their machines."""
+    depth = {a: len(machines_of(task, a)) for a in actors}
+    for least in sorted(set(depth.values())):
+        yield tuple(a for a in actors if depth[a] == least)
 
 
 def best_matching(weight: Sequence[Sequence[float]]) -> dict[int, int]:
@@ -112,11 +113,43 @@ def _held_weight(weight: float, belief: ObjectBelief, settings: TaskSettings) ->
     return weight + settings.keep_bonus
 
 
+def bystanders(
+    task: Task,
+    mind: Mind,
+    bindings: Sequence[Binding],
+    settings: TaskSettings = DEFAULT_SETTINGS,
+) -> tuple[int, ...]:
+    """Objects that the task lets be, by id: they play no actor, and are what it calls bystanders."""
+    if not task.bystanders:
+        return ()
+    playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
+    others = [o for o in mind.present() if o.id not in playing.values()]
+    if any(not b.name for b in task.bystanders):
+        return tuple(o.id for o in others)
+    rows = [
+        fits(Role(task, b.name, mind, {}), task.models(b.name), others) for b in task.bystanders
+    ]
+    best = [max(row[j] for row in rows) for j in range(len(others))]
+    return tuple(o.id for o, fit in zip(others, best, strict=True) if fit >= settings.familiar)
+
+
+def machines(task: Task, bindings: Sequence[Binding]) -> tuple[tuple[int, ...], ...]:
+    """The objects that are one machine with its parts, for each machine of which parts are found."""
+    playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
+    groups: dict[str, set[int]] = {}
+    for actor, object_id in playing.items():
+        whole = (*machines_of(task, actor), actor)
+        outermost = next((m for m in reversed(whole[:-1])), actor)
+        groups.setdefault(outermost, set()).add(object_id)
+    return tuple(tuple(sorted(g)) for g in groups.values() if len(g) > 1)
+
+
 def unexplained(
     mind: Mind,
     bindings: Sequence[Binding],
     settings: TaskSettings = DEFAULT_SETTINGS,
     optional: Collection[str] = (),
+    task: Task | None = None,
 ) -> tuple[int, ...]:
     """Objects in view that no actor explains, by id; nobody waits for `optional` actors.
 
@@ -125,17 +158,29 @@ def unexplained(
     rests on a few seconds only; only one that is clearly something else is unexplained.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
+    if task is not None:
+        bound.update(bystanders(task, mind, bindings, settings))
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]
+    if task is not None and task.bystanders:
+        # Who it is shows after a while only, and till then it may be one of them.
+        others = [o for o in others if mind.time - o.first_seen >= settings.acquainted_s]
     if all(b.object_id is not None for b in bindings if b.actor not in optional):
         return tuple(o.id for o in others)
     known = {m for b in bindings for m in b.models}
-    return tuple(
-        o.id
+    strange = [
+        o
         for o in others
         if o.strength >= settings.familiar
         and o.name not in known
         and mind.time - o.first_seen >= settings.acquainted_s
-    )
+    ]
+    if task is None or not strange:
+        return tuple(o.id for o in strange)
+    playing = {b.actor: b.object_id for b in bindings if b.object_id is not None}
+    awaited = [b.actor for b in bindings if b.object_id is None and not b.models]
+    rows = [fits(Role(task, a, mind, playing), (), strange) for a in awaited]
+    free = [all(row[j] < settings.bind_at for row in rows) for j in range(len(strange))]
+    return tuple(o.id for o, is_free in zip(strange, free, strict=True) if is_free)
 
 
 def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:

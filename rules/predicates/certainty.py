@@ -1,0 +1,75 @@
+"""How sure it is that an object is a thing of its own, and that it is known what it is.
+
+A camera that sees motion cuts machines into pieces and takes shadows along. What is small, hardly seen, or
+close beside something larger may be a part of that; alarms that call for a person, or end a task, ask
+for more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from visup.agent import ObjectBelief
+from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates._snapshot_jit import GAP
+from visup.rules.predicates.snapshot import Codes, Snapshot, code
+from visup.rules.presence.fragments import FragmentSettings
+from visup.rules.presence.object_tracks import presence_memory
+from visup.rules.presence.settings import PresenceSettings
+
+PART = FragmentSettings()
+LEAST_SHARE = 2 * PresenceSettings().least_share
+"""Share of the image that a thing of its own fills, unless it is far away or a speck."""
+LEAST_CONFIDENCE = 0.5
+START_S = PresenceSettings().start_s
+KEEP_OUT = "keep_out"
+"""Zones whose names begin so are forbidden to all."""
+
+
+def standalone(facts: Snapshot) -> Codes:
+    """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones."""
+    beliefs = facts.beliefs
+    if not beliefs:
+        return facts.among(())
+    width, height = facts.mind.frame_size
+    area = np.array([b.region.area for b in beliefs], dtype=float)
+    sure = np.array([b.region.confidence for b in beliefs]) >= LEAST_CONFIDENCE
+    sure &= area >= LEAST_SHARE * width * height
+    far = np.maximum(
+        PART.apart * image_diagonal(facts.mind.frame_size), PART.apart_size * np.sqrt(area)
+    )
+    gap = facts.of_pairs(GAP)
+    beside = np.isfinite(gap[1]) & (gap[0] <= far[:, None])
+    larger = area[:, None] <= PART.part * area[None]
+    alone = sure & ~(beside & larger).any(axis=1)
+    return facts.among({b.id for b, yes in zip(beliefs, alone.tolist(), strict=True) if yes})
+
+
+def identified(facts: Snapshot) -> Codes:
+    """Whether an object is likelier one of the models known than none of them, or has been named."""
+
+    def look(b: ObjectBelief) -> int:
+        likely = bool(b.candidates) and b.candidates[0].confidence > b.unknown
+        return code(likely or b.id in facts.mind.answers)
+
+    return facts.each(look)
+
+
+def at_home(facts: Snapshot) -> Codes:
+    """Whether an object was in a forbidden zone when the video began: that zone is its own."""
+    zones = [z.polygon for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
+    memory = presence_memory(facts.mind)
+    if not zones or memory.start is None:
+        return facts.among(())
+    early = [b for b in facts.beliefs if b.first_seen - memory.start <= START_S]
+    boxes = {b.id: memory.of[b.id].first_box for b in early if b.id in memory.of}
+    return facts.among({i for i, box in boxes.items() if any(_begins_in(box, z) for z in zones)})
+
+
+def _begins_in(box: tuple[int, int, int, int], polygon: Sequence[tuple[float, float]]) -> bool:
+    x, y, w, h = box
+    corners = np.asarray(polygon, dtype=np.float32).reshape(-1, 1, 2)
+    return cv2.pointPolygonTest(corners, (x + w / 2, y + h / 2), measureDist=False) >= 0

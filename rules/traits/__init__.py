@@ -1,0 +1,5 @@
+"""Traits: by what people tell things apart that have no model, such as colour, size and first place.
+
+Read in this order: `colours.py` (what the words for colours mean), `reasoner.py` (what is remembered of
+each object). `tasks/casting/fitness.py` asks whether an object meets what a task says of an actor.
+"""

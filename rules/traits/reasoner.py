@@ -1,0 +1,222 @@
+"""What is remembered of each object by which people tell it: colours, size, first place, first motion.
+
+The reasoner works only where somebody asks: an agent whose tasks tell no actor so has none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import exp
+from types import MappingProxyType
+
+from visup.agent import Mind, ObjectBelief, Observation, Outcome, Presence, Region
+from visup.agent.model.fast_replace import replace
+from visup.agent.model.memory import MemoryKey
+from visup.rules.geometry.regions import Box, image_diagonal
+from visup.rules.relations.kinematics import RelationSettings
+from visup.rules.relations.reasoner import kinematics
+
+Palette = tuple[tuple[float, float, float, float], ...]
+"""(L*, a*, b*, share) of each colour, the greatest share first."""
+
+SIDES = ("left", "top", "right", "bottom")
+
+
+@dataclass(frozen=True, slots=True)
+class TraitSettings:
+    """How traits are remembered.
+
+    Attributes:
+        tau_s: Time constant over which colours and sizes are averaged.
+        border: Within so much of the image's side an outline first seen may have come over it.
+        inwards: How far it must have come since, image diagonals, to have entered over that side.
+        start_s: What is in view so soon did not enter.
+        in_view_s: What had been in view so long before it was seen to move did not enter either.
+        moving_s: How long it must move to have moved.
+        entries: Colours that are remembered of an object.
+    """
+
+    tau_s: float = 2.0
+    border: float = 0.1
+    inwards: float = 0.02
+    start_s: float = 1.0
+    in_view_s: float = 1.0
+    moving_s: float = 0.3
+    entries: int = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """What is remembered of one object.
+
+    Attributes:
+        palette: Its colours; empty while nobody has seen them.
+        extent: Its largest extent, pixels; NaN before it was seen whole.
+        first_box: Its box when first seen, pixels.
+        first_at: (x, y) of its centroid then, pixels.
+        came: Whether it may have entered; what was there before did not.
+        side: The side of the image over which it entered, or empty.
+        moving_since: Since when it moves, seconds; None while it does not.
+        moved: When it was first seen to move, seconds; None while it was not.
+        resting_since: Since when it rests, seconds; None while it moves.
+    """
+
+    palette: Palette = ()
+    extent: float = math.nan
+    first_box: Box = (0, 0, 0, 0)
+    first_at: tuple[float, float] = (0.0, 0.0)
+    came: bool = False
+    side: str = ""
+    moving_since: float | None = None
+    moved: float | None = None
+    resting_since: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TraitMemory:
+    """What is remembered of all objects.
+
+    Attributes:
+        start: Seconds of the first step.
+        time: Seconds of the last step.
+        of: Object id -> its traits.
+        seen_at: Seconds of the newest colours that were taken in.
+    """
+
+    start: float = 0.0
+    time: float = 0.0
+    of: Mapping[int, Traits] = field(default_factory=lambda: MappingProxyType({}))
+    seen_at: float = -math.inf
+
+
+TRAITS: MemoryKey[TraitMemory | None] = MemoryKey("rules.traits", None)
+NOTHING = Traits()
+
+
+def traits_of(mind: Mind, object_id: int) -> Traits | None:
+    """What is remembered of an object, or None when nothing is."""
+    memory = mind.recall(TRAITS)
+    return memory.of.get(object_id) if memory is not None else None
+
+
+@dataclass(frozen=True, slots=True)
+class TraitReasoner:
+    """Reasoner of the cogitate phase, after the relations: keeps the traits of all objects."""
+
+    settings: TraitSettings = field(default_factory=TraitSettings)
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Take in one step; see `Reasoner`."""
+        old = mind.recall(TRAITS) or TraitMemory(mind.time, mind.time)
+        keep = exp(-max(0.0, mind.time - old.time) / self.settings.tau_s)
+        palettes = _palettes(mind, observation)
+        moving = _moving(mind)
+        of = {}
+        for object_id, belief in sorted(mind.objects.items()):
+            known = old.of.get(object_id) or self._first(belief, old.start)
+            if belief.presence is Presence.SEEN and belief.last_seen == mind.time:
+                known = self._seen(known, belief, mind, keep)
+                known = self._moved(known, moving.get(object_id), mind.time)
+            if object_id in palettes:
+                merged = blended(known.palette, palettes[object_id], self._share(old, mind))
+                known = replace(known, palette=merged[: self.settings.entries])
+            of[object_id] = known
+        seen_at = mind.time if palettes else old.seen_at
+        memory = TraitMemory(old.start, mind.time, MappingProxyType(of), seen_at)
+        return Outcome(mind.remember(TRAITS, memory))
+
+    def _share(self, old: TraitMemory, mind: Mind) -> float:
+        """Weight of new colours against what is remembered."""
+        return 1.0 - exp(-min(1e3, mind.time - old.seen_at) / self.settings.tau_s)
+
+    def _first(self, belief: ObjectBelief, start: float) -> Traits:
+        region, s = belief.region, self.settings
+        since = region.visible_since
+        there = since is not None and belief.first_seen - since >= s.in_view_s
+        came = belief.first_seen - start > s.start_s and not there
+        return Traits(first_box=region.bbox, first_at=region.centroid, came=came)
+
+    def _seen(self, known: Traits, belief: ObjectBelief, mind: Mind, keep: float) -> Traits:
+        region = belief.region
+        extent = known.extent
+        if not region.cut:
+            now = largest_extent(region)
+            extent = now if extent != extent else keep * extent + (1.0 - keep) * now
+        side = known.side
+        if not side and known.came:
+            side = self._side(known, region, mind.frame_size)
+        return replace(known, extent=extent, side=side)
+
+    def _side(self, known: Traits, region: Region, size: tuple[int, int]) -> str:
+        """The side over which an object has come, once it has come on from there."""
+        (width, height), (x, y, w, h) = size, known.first_box
+        dx, dy = (region.centroid[k] - known.first_at[k] for k in (0, 1))
+        least = self.settings.inwards * image_diagonal(size)
+        off = (x / width, y / height, 1 - (x + w) / width, 1 - (y + h) / height)
+        come = (dx, dy, -dx, -dy)
+        near = (k for k in range(4) if off[k] <= self.settings.border and come[k] >= least)
+        best = min(near, key=lambda k: (off[k], -come[k]), default=None)
+        return "" if best is None else SIDES[best]
+
+    def _moved(self, known: Traits, moving: bool | None, now: float) -> Traits:
+        if moving is None:
+            return known
+        if not moving:
+            stopped = now if known.resting_since is None else known.resting_since
+            return replace(known, moving_since=None, resting_since=stopped)
+        since = now if known.moving_since is None else known.moving_since
+        long = now - since >= self.settings.moving_s
+        moved = since if known.moved is None and long else known.moved
+        rests = None if long else known.resting_since
+        return replace(known, moving_since=since, moved=moved, resting_since=rests)
+
+
+def blended(before: Palette, new: Palette, weight: float) -> Palette:
+    """Two palettes of the same bins as one, the new one with that weight; of nothing and one, that one.
+
+    Example:
+        >>> blended(((50.0, 0.0, 0.0, 1.0),), ((50.0, 0.0, 0.0, 0.5), (20.0, 0.0, 0.0, 0.5)), 0.5)
+        ((50.0, 0.0, 0.0, 0.75), (20.0, 0.0, 0.0, 0.25))
+    """
+    if not before:
+        return new
+    shares = {entry[:3]: (1.0 - weight) * entry[3] for entry in before}
+    for entry in new:
+        shares[entry[:3]] = shares.get(entry[:3], 0.0) + weight * entry[3]
+    ranked = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
+    return tuple((*colour, round(share, 9)) for colour, share in ranked)
+
+
+def largest_extent(region: Region) -> float:
+    """Largest extent of a region, pixels: over its outline, in steps of 15 degrees."""
+    points = region.contour
+    if len(points) < 2:
+        return math.hypot(region.bbox[2], region.bbox[3])
+    most = 0.0
+    for turn in range(0, 180, 15):
+        along = points @ (math.cos(math.radians(turn)), math.sin(math.radians(turn)))
+        most = max(most, float(along.max() - along.min()))
+    return most + 1.0  # outlines go through the centres of pixels
+
+
+def _palettes(mind: Mind, observation: Observation) -> dict[int, Palette]:
+    """The colours that were perceived in this step, by object."""
+    regions = {b.region.id: i for i, b in mind.objects.items() if b.last_seen == mind.time}
+    found = {}
+    for value in observation.of("colour"):
+        object_id = regions.get(int(value["region_id"]))
+        if object_id is not None:
+            found[object_id] = tuple(
+                (float(x), float(a), float(b), float(share)) for x, a, b, share in value["palette"]
+            )
+    return found
+
+
+def _moving(mind: Mind) -> dict[int, bool]:
+    """Object -> whether it moves in the image, where that is known."""
+    still = RelationSettings().still_speed * image_diagonal(mind.frame_size)
+    measured = kinematics(mind)
+    speeds = zip(measured.ids, measured.speed.tolist(), strict=True)
+    return {i: v > still for i, v in speeds if v == v}  # NaN is not equal to itself

@@ -1,0 +1,254 @@
+"""How well objects fit what a task says of an actor: its models, and the criteria beside them.
+
+What is said of an actor is joined by `and`, so an object fits as well as it fits the worst of it. Orders
+(`the leftmost`) are looked at last, among the objects that fit all else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import assert_never
+
+from visup.agent import Mind, ObjectBelief
+from visup.rules.geometry.regions import image_diagonal
+from visup.rules.relations.reasoner import kinematics
+from visup.rules.traits.colours import colour_share
+from visup.rules.traits.reasoner import NOTHING, Traits, traits_of
+from visup.tasks.grammar.criteria import (
+    Another,
+    Colours,
+    Conduct,
+    Criterion,
+    Extent,
+    OtherModels,
+    PartOf,
+    Place,
+    Ranked,
+)
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.grammar.structure import task_actors
+from visup.tasks.grammar.units import value
+
+COLOURED = (0.2, 0.6)
+"""Shares of an object's pixels at which a colour begins to be its colour, and surely is: what is held,
+its shadow and highlights take part of most outlines."""
+
+PLACED = (0.01, 0.08)
+"""How far from an outline a place may lie to be its place, image diagonals: surely, and at all."""
+
+HANGS = (0.006, 0.02)
+"""How far from its machine a part may be to hang together with it, image diagonals: surely, at all."""
+
+SIZE_SHARE = 0.1
+"""A size within so much of what it is compared with may be either."""
+
+CONTENDS = 0.3
+"""What fits all else less than this takes no part in an order."""
+
+LATE_S = 5.0
+"""An actor that was first by its place is not taken over by what came so much later than its object."""
+
+NOT_FIRST = 0.95
+"""What `another` weighs: the actor without it comes first where there is only one object for both."""
+
+REST_S = 1.0
+"""What rests has rested for so long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """An actor that is looked for.
+
+    Attributes:
+        task: The task.
+        actor: The actor.
+        mind: What is believed.
+        playing: Actor -> the object that plays it so far: this one's own, those of machines.
+    """
+
+    task: Task
+    actor: str
+    mind: Mind
+    playing: Mapping[str, int]
+
+
+def fits(role: Role, models: Sequence[str], objects: Sequence[ObjectBelief]) -> list[float]:
+    """How well each object fits what is said of an actor, 0 to 1.
+
+    Args:
+        role: The actor.
+        models: The models that it may be; empty for one that is told by criteria alone.
+        objects: The objects.
+    """
+    criteria = role.task.actor(role.actor).criteria
+    looked = [strength(o, models) if models else 1.0 for o in objects]
+    if not criteria:
+        return _answered(looked, role, objects)
+    known = [traits_of(role.mind, o.id) or NOTHING for o in objects]
+    plain = [c for c in criteria if not isinstance(c, Ranked)]
+    fit = [
+        min([looks, *(_meets(c, role, o, t) for c in plain)])
+        for looks, o, t in zip(looked, objects, known, strict=True)
+    ]
+    for criterion in criteria:
+        if isinstance(criterion, Ranked):
+            fit = _ranked(criterion, fit, objects, known, role.playing.get(role.actor))
+        elif isinstance(criterion, Conduct) and criterion.kind == "moves":
+            fit = _first_to_move(fit, known)
+    return _answered(fit, role, objects)
+
+
+def _answered(fit: list[float], role: Role, objects: Sequence[ObjectBelief]) -> list[float]:
+    """What the operator has said goes before: an object that is an actor is that one and no other."""
+    answers = role.mind.answers
+    if not answers:
+        return fit
+    actors = task_actors(role.task)
+    said = {o.id: answers[o.id] for o in objects if answers.get(o.id) in actors}
+    return [
+        float(said[o.id] == role.actor) if o.id in said else f
+        for o, f in zip(objects, fit, strict=True)
+    ]
+
+
+def strength(belief: ObjectBelief, models: Sequence[str]) -> float:
+    """How strongly an object is believed to be one of some models, 0 to 1."""
+    total = 0.0
+    for candidate in belief.candidates:  # plain loops: this is asked many times in each step
+        if candidate.name in models:
+            total += candidate.share
+    return min(1.0, total)
+
+
+def asks_for_traits(task: Task) -> bool:
+    """Whether a task tells some actor by more than its models and its machine."""
+    criteria = (c for a in (*task.actors, *task.bystanders) for c in a.criteria)
+    return any(not isinstance(c, PartOf | Another | OtherModels) for c in criteria)
+
+
+def asks_for_colour(task: Task) -> bool:
+    """Whether a task tells some actor by its colour."""
+    declared = (*task.actors, *task.bystanders)
+    return any(isinstance(c, Colours) for a in declared for c in a.criteria)
+
+
+def _meets(criterion: Criterion, role: Role, belief: ObjectBelief, traits: Traits) -> float:
+    """How well an object meets one criterion, 0 to 1; an order is not judged here."""
+    match criterion:
+        case Colours(names=names):
+            shares = (colour_share(name, traits.palette) for name in names)
+            return _rise(max(shares), *COLOURED)
+        case Extent():
+            return _sized(criterion, value(role.task.amount(criterion.amount)), traits)
+        case Place(at=at):
+            return _placed(traits, at, role.mind)
+        case Conduct():
+            # What it did when it was chosen chose it; what it does afterwards is for the stages.
+            chosen = role.playing.get(role.actor) == belief.id
+            return float(chosen or _behaves(criterion, traits, role.mind))
+        case PartOf(machine=machine):
+            return _hangs_together(belief.id, role.playing.get(str(machine)), role.mind)
+        case Another():
+            return NOT_FIRST
+        case Ranked() | OtherModels():
+            return 1.0
+        case _:
+            assert_never(criterion)
+
+
+def _sized(criterion: Extent, bound: float, traits: Traits) -> float:
+    if traits.extent != traits.extent:  # NaN: it was never seen whole
+        return 0.0
+    larger = _rise(traits.extent, bound * (1 - SIZE_SHARE), bound * (1 + SIZE_SHARE))
+    return larger if criterion.compared == "larger" else 1.0 - larger
+
+
+def _behaves(criterion: Conduct, traits: Traits, mind: Mind) -> bool:
+    if criterion.kind == "enters":
+        return traits.side == criterion.side if criterion.side else bool(traits.side)
+    if criterion.kind == "moves":
+        return traits.moved is not None
+    since = traits.resting_since
+    return since is not None and mind.time - since >= REST_S
+
+
+_ORDERS: Mapping[str, Callable[[Traits], float]] = {
+    "largest": lambda t: -t.extent,
+    "smallest": lambda t: t.extent,
+    "leftmost": lambda t: t.first_at[0],
+    "rightmost": lambda t: -t.first_at[0],
+    "highest": lambda t: t.first_at[1],
+    "lowest": lambda t: -t.first_at[1],
+}
+
+
+def _ranked(
+    criterion: Ranked,
+    fit: Sequence[float],
+    objects: Sequence[ObjectBelief],
+    known: Sequence[Traits],
+    held: int | None,
+) -> list[float]:
+    """What fits, and is first in an order; all else fits no more.
+
+    By place objects are ordered as they were first seen, since afterwards they change places; what comes
+    much later than the object that plays the actor already takes no part.
+    """
+    by_size = criterion.rank in ("largest", "smallest")
+    until = next((o.first_seen + LATE_S for o in objects if o.id == held and not by_size), None)
+    order = _ORDERS[criterion.rank]
+    contending = [
+        (order(t), o.id)
+        for f, o, t in zip(fit, objects, known, strict=True)
+        if f >= CONTENDS and (until is None or o.first_seen <= until) and order(t) == order(t)
+    ]
+    first = min(contending, default=(0.0, None))[1]
+    return [f if o.id == first else 0.0 for f, o in zip(fit, objects, strict=True)]
+
+
+def _first_to_move(fit: Sequence[float], known: Sequence[Traits]) -> list[float]:
+    """Of what fits, only that which moved first."""
+    moved = (t.moved for f, t in zip(fit, known, strict=True) if f > 0.0 and t.moved is not None)
+    first = min(moved, default=None)
+    return [f if t.moved == first else 0.0 for f, t in zip(fit, known, strict=True)]
+
+
+def _hangs_together(object_id: int, machine: int | None, mind: Mind) -> float:
+    """How well an object hangs together with a machine that is found; nobody can tell while it is not."""
+    if machine is None or machine == object_id:
+        return 0.0
+    measured = kinematics(mind)
+    if object_id not in measured.ids or machine not in measured.ids:
+        return 0.0
+    i, j = measured.ids.index(object_id), measured.ids.index(machine)
+    gap = float(measured.gap[i, j])
+    return _near(gap, *HANGS, mind) if gap == gap else 0.0
+
+
+def _placed(traits: Traits, at: tuple[float, float], mind: Mind) -> float:
+    """How well a place was an object's when it was first seen; of two there, the nearer centre counts."""
+    if traits is NOTHING:
+        return 0.0
+    dx, dy = traits.first_at[0] - at[0], traits.first_at[1] - at[1]
+    off_centre = math.hypot(dx, dy) / image_diagonal(mind.frame_size)
+    return _near(_off_box(traits.first_box, at), *PLACED, mind) * (1.0 - min(0.1, off_centre))
+
+
+def _off_box(box: tuple[int, int, int, int], at: tuple[float, float]) -> float:
+    """Distance of a place to a box, pixels; 0 inside it."""
+    x, y, w, h = box
+    dx = max(x - at[0], at[0] - (x + w - 1), 0.0)
+    dy = max(y - at[1], at[1] - (y + h - 1), 0.0)
+    return math.hypot(dx, dy)
+
+
+def _near(distance: float, surely: float, at_all: float, mind: Mind) -> float:
+    diagonal = image_diagonal(mind.frame_size)
+    return 1.0 - _rise(distance, surely * diagonal, at_all * diagonal)
+
+
+def _rise(number: float, low: float, high: float) -> float:
+    """0 up to `low`, 1 from `high` on, straight in between."""
+    return min(1.0, max(0.0, (number - low) / (high - low))) if high > low else float(number >= low)

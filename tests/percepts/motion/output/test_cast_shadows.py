@@ -1,0 +1,63 @@
+"""Regions that are ground seen darker are shadows; what hides the ground is none, however dark."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.percepts.motion.clips import texture
+from visup.percepts.motion.output.cast_shadows import shadow_evidence
+
+SHAPE = (60, 80)
+WHERE = cv2.ellipse(np.zeros(SHAPE, np.uint8), (40, 30), (30, 20), 0, 0, 360, 1, -1) > 0
+TINT = np.array([0.7, 0.9, 1.1], np.float32)
+
+
+def ground(seed: int, low: int = 90, high: int = 200) -> np.ndarray:
+    grain = cv2.GaussianBlur(texture(seed, SHAPE, low, high).astype(np.float32), (0, 0), 1.0)
+    return np.asarray(grain[..., None] * TINT)
+
+
+def noisy(image: np.ndarray, seed: int, sigma: float = 2.0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return np.asarray(image + rng.normal(0, sigma, image.shape), np.float32)
+
+
+@given(st.floats(0.4, 0.85), st.integers(0, 50))
+@settings(max_examples=30, deadline=None)
+def test_darker_ground_is_shadow(dim: float, seed: int) -> None:
+    bare = ground(seed)
+    now = np.where(WHERE[..., None], dim * bare, bare)
+    assert shadow_evidence(noisy(now, seed), noisy(bare, seed + 1), WHERE) > 0
+
+
+@given(st.floats(0.3, 1.2), st.integers(0, 50))
+@settings(max_examples=30, deadline=None)
+def test_another_texture_of_the_same_colour_is_none(dim: float, seed: int) -> None:
+    bare, body = ground(seed), dim * ground(seed + 1000)
+    now = np.where(WHERE[..., None], body, bare)
+    assert shadow_evidence(noisy(now, seed), noisy(bare, seed + 1), WHERE) <= 0
+
+
+@pytest.mark.parametrize("colour", [(30, 60, 200), (200, 80, 20), (10, 10, 10), (250, 250, 250)])
+def test_another_colour_is_none(colour: tuple[int, int, int]) -> None:
+    bare = ground(3)
+    now = np.where(WHERE[..., None], np.array(colour, np.float32), bare)
+    assert shadow_evidence(noisy(now, 1), noisy(bare, 2), WHERE) < 0
+
+
+def test_nothing_is_said_of_ground_that_was_never_seen_or_has_not_changed() -> None:
+    bare = ground(5)
+    assert shadow_evidence(noisy(bare, 1), noisy(bare, 2), WHERE) == 0
+    assert shadow_evidence(noisy(0.5 * bare, 1), np.full_like(bare, np.nan), WHERE) == 0
+
+
+def test_even_darkening_of_plain_ground_tells_less() -> None:
+    bare = np.broadcast_to(150 * TINT, (*SHAPE, 3)).astype(np.float32)
+    now = np.where(WHERE[..., None], 0.6 * bare, bare)
+    plain = shadow_evidence(noisy(now, 1, 0.5), noisy(bare, 2, 0.5), WHERE)
+    textured = shadow_evidence(noisy(0.6 * ground(1), 1), noisy(ground(1), 2), WHERE)
+    assert 0 < plain < textured

@@ -1,0 +1,78 @@
+"""What is surely a thing of its own, known, or where it belongs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.rules.runs import reason
+from tests.rules.scenes import box_region, seen
+from visup.agent import Candidate, Mind
+from visup.agent.model.mind import Zone
+from visup.rules.formula.truth import YES
+from visup.rules.predicates.certainty import at_home, identified, standalone
+from visup.rules.predicates.snapshot import Codes, Snapshot
+
+Rect = tuple[float, float, float, float]
+
+
+def mind_of(*boxes: Rect, frames: int = 40) -> Mind:
+    """The mind after some boxes rested for a while."""
+    regions = [box_region(n + 1, box) for n, box in enumerate(boxes)]
+    return reason(seen(i, regions) for i in range(frames))[-1].mind
+
+
+def yes(mind: Mind, codes: Codes) -> set[int]:
+    return {i for i, c in zip(Snapshot(mind).ids, codes.tolist(), strict=True) if c == YES}
+
+
+def alone(mind: Mind) -> set[int]:
+    return yes(mind, standalone(Snapshot(mind)))
+
+
+@given(st.floats(60.0, 150.0), st.sampled_from(("left", "above")))
+def test_what_stands_clear_is_a_thing_of_its_own(gap: float, side: str) -> None:
+    other = (
+        (200.0 - gap - 40, 300.0, 40.0, 40.0) if side == "left" else (250.0, 300 - gap - 40, 40, 40)
+    )
+    assert alone(mind_of((200, 300, 150, 120), other, frames=20)) == {1, 2}
+
+
+def test_what_is_small_beside_something_large_may_be_a_part_of_it() -> None:
+    beside = mind_of((200, 300, 150, 120), (352, 330, 40, 40))
+    assert 2 not in alone(beside)
+    assert 1 in alone(beside)
+
+
+def test_bodies_of_a_size_are_no_parts_of_each_other() -> None:
+    assert alone(mind_of((200, 200, 100, 80), (303, 200, 100, 80))) == {1, 2}
+
+
+def test_specks_are_doubtful() -> None:
+    assert alone(mind_of((200, 200, 100, 80), (400, 100, 12, 12))) == {1}
+
+
+@pytest.mark.parametrize(("confidence", "known"), [(0.8, True), (0.3, False)])
+def test_identified_is_what_is_likelier_a_model_than_none(confidence: float, known: bool) -> None:
+    mind = mind_of((200, 200, 100, 80))
+    belief = mind.objects[1]
+    assert yes(mind, identified(Snapshot(mind))) == set()
+    candidates = (Candidate("arm", 3.0, 1.0, confidence),)
+    mind = mind.with_objects(replace(belief, candidates=candidates, unknown=1 - confidence))
+    assert (yes(mind, identified(Snapshot(mind))) == {1}) == known
+
+
+@pytest.mark.parametrize(
+    ("name", "corner", "home"),
+    [("keep_out", 150, {1}), ("bay", 150, set()), ("keep_out_2", 400, set())],
+)
+def test_a_machine_is_at_home_where_it_was_from_the_start(
+    name: str, corner: int, home: set[int]
+) -> None:
+    mind = mind_of((200, 200, 100, 80))
+    polygon = ((corner, 150), (corner + 200, 150), (corner + 200, 350), (corner, 350))
+    mind = replace(mind, zones=(Zone(name, polygon),))
+    assert yes(mind, at_home(Snapshot(mind))) == home

@@ -1,0 +1,64 @@
+"""To stay within a range: it lasts, begins inside, fails outside; what is not seen breaks nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import nan, sin
+
+import pytest
+
+from tests.tasks.scripted import Played, Script, Spell, play
+from visup.agent import Status, Verdict
+from visup.tasks import parse_task
+from visup.tasks.supervision.supervise import finish, task_reasoner
+
+TASK = """<keep> ::= <near> <stay>
+<near> ::= converging(arm, satellite)
+<stay> ::= gap(arm, satellite) between 20 px and 100 px for 10 s"""
+ALONE = TASK.splitlines()[2]
+NEAR = (Spell("converging", 0.0, 4.0), Spell("diverging", 8.0, 30.0))
+
+
+def lived(gaps: Callable[[float], float], task: str = TASK, until: float = 25.0) -> Played:
+    return play(task_reasoner([parse_task(task)]), Script(NEAR, gaps=gaps), until, fps=5.0)
+
+
+@pytest.mark.parametrize(
+    ("task", "gaps", "verdict"),
+    [
+        (TASK, lambda t: max(60.0, 180 - 30 * t) + 30 * max(0.0, t - 8), Verdict.FAILED),
+        (ALONE, lambda t: 60.0 + 15 * sin(2 * t), Verdict.SUCCEEDED),
+        (ALONE, lambda t: 60.0 + 30 * max(0.0, t - 8), Verdict.FAILED),
+        (ALONE, lambda t: 60.0 - 10 * max(0.0, t - 5), Verdict.FAILED),
+        (ALONE, lambda t: 60.0 if t < 6 else nan, Verdict.IN_PROGRESS),
+        (ALONE, lambda t: 60.0 if not 5 < t < 5.3 else 101.0, Verdict.SUCCEEDED),
+    ],
+)
+def test_a_range_is_kept_or_left(
+    task: str, gaps: Callable[[float], float], verdict: Verdict
+) -> None:
+    assert finish(lived(gaps, task).last.tasks[0]) is verdict
+
+
+def test_what_bobs_within_the_range_keeps_it() -> None:
+    played = play(
+        task_reasoner([parse_task(TASK)]),
+        Script(NEAR[:1], gaps=lambda t: max(60.0, 180 - 30 * t) + 15 * sin(2 * t)),
+        25.0,
+        fps=5.0,
+    )
+    assert finish(played.last.tasks[0]) is Verdict.SUCCEEDED
+
+
+def test_a_range_begins_when_the_gap_comes_into_it() -> None:
+    played = lived(lambda t: max(60.0, 180 - 30 * t))
+    begun = next(e for e in played.events if e.data.get("stage") == "stay")
+    assert begun.time == pytest.approx(80 / 30, abs=0.7)
+
+
+def test_a_comparison_in_a_sign_alone_is_looked_at() -> None:
+    task = "<near> ::= converging(arm, satellite) ends when gap(arm, satellite) < 90 px"
+    played = lived(lambda t: 180 - 30 * min(t, 4.0), task, 8.0)
+    (stage,) = played.last.tasks[0].stages
+    assert stage.status is Status.DONE
+    assert finish(played.last.tasks[0]) is Verdict.SUCCEEDED

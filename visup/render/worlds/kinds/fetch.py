@@ -1,0 +1,217 @@
+"""`fetch`: a tug drives to a cart, couples to it and hauls it to another place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.render.meshes.solids import Colour, Solid, box, cone, join
+from visup.render.worlds import clutter, machines
+from visup.render.worlds.kinds.kind import (
+    Script,
+    cut_short,
+    finished,
+    frames_until,
+    from_around,
+    random_view,
+    spans,
+)
+from visup.render.worlds.motion import along, bend, clock, cruised, frame_at, posed
+from visup.render.worlds.scenery import hall, meadow, pick_colour, seed_of, unlike
+from visup.render.worlds.viewpoint import shows
+from visup.render.worlds.world import (
+    SIZE,
+    Contact,
+    Course,
+    Motion,
+    Poses,
+    Surface,
+    Thing,
+    Viewpoint,
+    World,
+)
+
+OUTCOMES = ("ok", "never", "loses", "in_progress")
+TUG, CART, BYSTANDER, DECOY = 2, 3, 7, 6
+Doubles = NDArray[np.float64]
+
+TASK = """\
+# fetch.task: the tug drives to the cart, couples to it and hauls it away.
+<fetch>    ::= <approach> <coupling> <haul>
+
+<approach> ::= converging(tug, cart)
+<coupling> ::= touching(tug, cart)
+<haul>     ::= moving_together(tug, cart) & moving(cart) for 2 s
+               fails when apart(tug, cart)
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FetchLayout:
+    """Where the cart stands and how it is taken, metres.
+
+    Attributes:
+        cart: (x, y) of the cart's middle.
+        ahead: (2,) unit, the heading in which the tug meets it.
+        start: (x, y) of the tug's middle at first.
+        meet: (x, y) of its middle when it touches the cart.
+        goal: (2,) by which the cart is hauled, backwards.
+    """
+
+    cart: Doubles
+    ahead: Doubles
+    start: Doubles
+    meet: Doubles
+    goal: Doubles
+
+
+@dataclass(frozen=True, slots=True)
+class FetchTimes:
+    """When the tug sets out, meets the cart, leaves with it, loses it, stops, and the clip ends; seconds."""
+
+    begin: float
+    meet: float
+    haul: float
+    loses: float
+    stop: float
+    end: float
+
+
+def build(rng: np.random.Generator, outcome: str) -> World:
+    """A world in which a cart is fetched; `outcome` is one of `OUTCOMES`."""
+    colour = pick_colour(rng, bool(rng.random() < 0.7))
+    tug, length = machines.vehicle(rng, colour)
+    cart_length = float(rng.uniform(0.7, 1.0))
+    cart = _cart(rng, cart_length, unlike(rng, [colour]))
+    times = _times(rng, outcome)
+    frames = frames_until(times.end)
+    layout, view = _layout(rng, (length + cart_length) / 2, frames)
+    at, heading = _drive(layout, times, frames)
+    pulled = _cart_poses(layout, times, at, outcome, frames)
+    surface = Surface("grain", 0.3, float(rng.uniform(0.05, 0.2)), seed_of(rng))
+    things = [
+        Thing("tug", tug, posed(np.column_stack([at, np.zeros(frames)]), heading), TUG, surface),
+        Thing("cart", cart, pulled, CART, surface),
+        *_surroundings(rng, layout, cart, frames),
+    ]
+    truth = _course(outcome, times)
+    if outcome == "in_progress":
+        end = float(rng.uniform(times.begin + 1.5, times.meet - 0.3))
+        truth, frames = cut_short(truth, end), frames_until(end)
+    script = Script(things, view, ("fetch", TASK), ("tug", "cart"), truth, frames)
+    return finished(rng, "fetch", script)
+
+
+def _times(rng: np.random.Generator, outcome: str) -> FetchTimes:
+    begin = float(rng.uniform(0.4, 1.2))
+    meet = begin + float(rng.uniform(3.2, 4.4))
+    haul = meet + float(rng.uniform(0.9, 1.4))
+    stop = haul + float(rng.uniform(4.0, 5.0))
+    loses = haul + float(rng.uniform(1.0, 1.5)) if outcome == "loses" else stop + 9
+    return FetchTimes(begin, meet, haul, loses, stop, stop + float(rng.uniform(0.6, 1.5)))
+
+
+def _layout(rng: np.random.Generator, reach: float, frames: int) -> tuple[FetchLayout, Viewpoint]:
+    """The cart in the picture, and where it is hauled to."""
+    for _ in range(2000):
+        side = float(rng.choice([-1, 1]))
+        cart = np.array([side * rng.uniform(0.9, 1.8), rng.uniform(-0.7, 1.0)])
+        angle = rng.uniform(-0.4, 0.4) + (0 if side > 0 else np.pi)
+        ahead = np.array([np.cos(angle), np.sin(angle)])
+        meet = cart - reach * ahead
+        start = np.array([-side * rng.uniform(1.4, 2.6), rng.uniform(-1.2, 1.2)])
+        goal = -ahead * rng.uniform(1.5, 2.1) + np.array([0, rng.uniform(-0.5, 0.5)])
+        aim = np.array([0.0, 0.0, 0.3])
+        place = from_around(rng, aim, float(rng.uniform(4.8, 6.2)), (20, 50))
+        view = random_view(rng, place, aim, frames)
+        points = [
+            [*cart, 0],
+            [*(cart + ahead * 0.5), 0.6],
+            [*meet, 0],
+            [*(meet + goal), 0],
+            [*start, 0.3],
+        ]
+        if shows(view, points, SIZE, 0.1):
+            break
+    return FetchLayout(cart, ahead, start, meet, goal), view
+
+
+def _drive(layout: FetchLayout, times: FetchTimes, frames: int) -> tuple[Doubles, Doubles]:
+    """(F, 2) places and (F,) headings of the tug: forward to the cart, backward from it."""
+    t = clock(frames)
+    straight = layout.meet - 0.6 * layout.ahead
+    curve = bend(layout.start, straight - 0.9 * layout.ahead, straight)
+    at, heading = along(np.concatenate([curve, [layout.meet]]), cruised(t, times.begin, times.meet))
+    back = cruised(t, times.haul, times.stop)
+    return at + np.outer(back, layout.goal), heading
+
+
+def _cart_poses(
+    layout: FetchLayout, times: FetchTimes, at: Doubles, outcome: str, frames: int
+) -> Poses:
+    """(F, 4, 4) of the cart: it stands, follows, and stands where it is lost."""
+    yaw = float(np.arctan2(layout.ahead[1], layout.ahead[0]))
+    first, last = frame_at(times.haul), min(frame_at(times.loses), frames)
+    shift = np.zeros((frames, 2))
+    if outcome != "never":
+        shift[first:last] = at[first:last] - at[first]
+        shift[last:] = shift[last - 1]
+        if last < frames:
+            # It rolls on for a moment.
+            speed = shift[last - 1] - shift[last - 2]
+            shift[last:] += np.outer(6 * (1 - np.exp(-np.arange(frames - last) / 6)), speed)
+    return posed(np.column_stack([layout.cart + shift, np.zeros(frames)]), yaw)
+
+
+def _cart(rng: np.random.Generator, length: float, colour: Colour) -> Solid:
+    """A cart with a load."""
+    wide, r = length * 0.62, 0.09
+    bed = box((length, wide, 0.1), (0, 0, 0.26), colour)
+    load = pick_colour(rng, bool(rng.random() < 0.5))
+    style = rng.integers(3)
+    if style == 0:
+        cargo = box((0.6 * length, 0.8 * wide, 0.3), (0.05 * length, 0, 0.46), load)
+    elif style == 1:
+        cargo = cone((0, 0, 0.31), (0, 0, 0.75), 0.36 * wide, None, load)
+    else:
+        low = box((0.8 * length, 0.85 * wide, 0.2), (0, 0, 0.41), load)
+        cargo = join(low, box((0.4 * length, 0.5 * wide, 0.2), (-0.1 * length, 0, 0.6), colour))
+    return join(bed, machines.wheels(length, wide, r), cargo)
+
+
+def _surroundings(
+    rng: np.random.Generator, layout: FetchLayout, cart: Solid, frames: int
+) -> list[Thing]:
+    found = list(hall(rng, float(rng.uniform(2.8, 5.0))) if rng.random() < 0.6 else meadow(rng))
+    free = clutter.corridor(layout.start, layout.meet, 1.8)
+    free += clutter.corridor(layout.cart + layout.ahead, layout.meet + 1.5 * layout.goal, 2.2)
+    if rng.random() < 0.3:
+        x, y = rng.uniform([-2.5, 0.8], [2.5, 2.0])
+        if all(np.hypot(x - a, y - b) > r + 0.7 for a, b, r in free):
+            found.append(
+                Thing("decoy", cart, posed([x, y, 0.0], float(rng.uniform(0, 6.3))), DECOY)
+            )
+            free.append((float(x), float(y), 0.8))
+    found += clutter.scattered(rng, int(rng.integers(0, 5)), 0.2, (-3.5, 3.5, -2.5, 2.2), free)
+    if rng.random() < 0.2:
+        found += clutter.passer_by(rng, frames, (-4.5, 2.1), (4.5, 2.1), BYSTANDER)
+    return found
+
+
+def _course(outcome: str, times: FetchTimes) -> Course:
+    """What is true of it."""
+    t = times
+    moves: tuple[Motion, ...] = (Motion("tug", t.begin, t.meet), Motion("tug", t.haul, t.stop))
+    stages = spans(("approach", t.begin, t.meet), ("coupling", t.meet, t.haul))
+    if outcome == "never":
+        touch = (Contact("tug", "cart", t.meet, t.haul),)
+        stages += spans(("haul", t.haul, t.stop, "failing"))
+        return Course(outcome, "failed", stages, (), touch, moves)
+    moves += (Motion("cart", t.haul, min(t.stop, t.loses + 0.4)),)
+    touch = (Contact("tug", "cart", t.meet, min(t.end, t.loses)),)
+    if outcome == "loses":
+        stages += spans(("haul", t.haul, t.loses, "failing"))
+        return Course(outcome, "failed", stages, (), touch, moves)
+    return Course(outcome, "succeeded", stages + spans(("haul", t.haul, t.stop)), (), touch, moves)
