@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from visup.render.worlds.scenery import random_imager, random_light, seed_of
+from visup.render.worlds.things.scenery import random_imager, random_light, seed_of
 from visup.render.worlds.viewpoint import steady
 from visup.render.worlds.world import World
 
