@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from visup.runs.settings import WatchSettings as Settings
     from visup.stepping import Stepper
     from visup.tasks import Task, load_task
-    from visup.teaching import teach
+    from visup.teaching import learn, teach
     from visup.version import __version__
 
 __all__ = [
@@ -72,6 +72,7 @@ __all__ = [
     "Verdict",
     "VisupError",
     "__version__",
+    "learn",
     "load_task",
     "open_run",
     "teach",
@@ -91,7 +92,7 @@ _HOMES = {
     "visup.runs.settings": ("WatchSettings as Settings",),
     "visup.stepping": ("Stepper",),
     "visup.tasks": ("Task", "load_task"),
-    "visup.teaching": ("teach",),
+    "visup.teaching": ("learn", "teach"),
     "visup.version": ("__version__",),
 }
 _HOME_OF = {

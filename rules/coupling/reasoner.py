@@ -14,51 +14,51 @@ be apart in space: with the depth of one of the two unknown this is not told apa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
 from visup.agent import (
-    Column,
     Coupling,
     Event,
     Mind,
     Observation,
     Outcome,
-    Presence,
-    Region,
-    RelationTable,
     Truth,
 )
 from visup.agent.model.fast_replace import replace
-from visup.agent.model.memory import MemoryKey
-from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
+from visup.rules.coupling.contact import ContactSettings, OutlineContact, updated_contact
+from visup.rules.coupling.evidence import (
+    CONFIDENCE,
+    COUPLING,
+    NO,
+    NO_EVIDENCE,
+    YES,
+    CouplingEvidence,
+    Pair,
+    PairObservation,
+    common_speed,
+    coupling_cells,
+    observed_pairs,
+    pair_regions,
+    regions_apart,
+    relation_table,
+)
 from visup.rules.coupling.relative_motion import (
     RelativeTrack,
+    RelativeVelocity,
     begin_relative_track,
     relative_velocity,
     update_relative_track,
 )
 from visup.rules.geometry.regions import image_diagonal
-from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics
 from visup.rules.wording.conditions import Condition, DecisionLog, at_least, decide
 from visup.rules.wording.sentences import sentence
-
-CONFIDENCE = 0.9
-"""How sure couplings are: outlines at rest to each other may still be apart in depth."""
-
-COLUMNS = ColumnLayout((Column(("", "coupled"), (0, 0), 0),))
-
-YES, MAYBE, NO = 1, 0, -1
-"""Codes of truths."""
-
-Pair = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +72,15 @@ class CouplingSettings:
             count as one.
         path_s: How far back their relative path is kept.
         moving: Usual relative speed of bodies that are not at rest, image diagonals per second.
+        still_share: Relative speed that still is rest, as a share of the speed at which both move: what is
+            carried sways and turns, and errors of velocities grow with these; and
+        moving_share: usual relative speed of bodies that move each by itself, as such a share.
+        rest_s: For how long they must be at rest, where they do not move: what turns back rests, too.
         odds: Logarithm of the odds of rest from which on it is believed.
         anew_s: Outlines that are compared are no older than this.
         approach_s: How long ago bodies may have come together for their rest to count.
         part_s: How long they must be apart before they are decoupled.
+        contact: When outlines that meet are in contact.
     """
 
     relations: RelationSettings = field(default_factory=RelationSettings)
@@ -83,55 +88,14 @@ class CouplingSettings:
     window_s: float = 0.3
     path_s: float = 1.2
     moving: float = 0.0125
+    still_share: float = 0.12
+    moving_share: float = 0.6
+    rest_s: float = 0.8
     odds: float = 5.0
     anew_s: float = 2.5
     approach_s: float = 6.0
     part_s: float = 0.5
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CouplingEvidence:
-    """What is remembered of one pair: seconds since when each holds, or None.
-
-    Attributes:
-        converged_at: When they last were converging, not touching yet.
-        rest_odds: Logarithm of the odds, from 0 on, that they touch and are at rest.
-        apart_since: Since when they are apart.
-        relative_track: How they have moved relative to each other since they are near.
-    """
-
-    converged_at: float | None = None
-    rest_odds: float = 0.0
-    apart_since: float | None = None
-    relative_track: RelativeTrack | None = None
-
-
-COUPLING: MemoryKey[Mapping[Pair, CouplingEvidence]] = MemoryKey(
-    "rules.coupling", MappingProxyType({})
-)
-
-
-NO_EVIDENCE = CouplingEvidence()
-
-
-class PairObservation(NamedTuple):
-    """Two objects as they are seen now; lives only while the reasoner runs.
-
-    Attributes:
-        pair: Their ids.
-        touching: Code of a truth, and
-        converging: the same, and
-        diverging: the same.
-        gap: Of their outlines, pixels; NaN unknown.
-        host: Id of the one in whose region both are merged, or None.
-    """
-
-    pair: Pair
-    touching: int
-    converging: int
-    diverging: int
-    gap: float
-    host: int | None
+    contact: ContactSettings = field(default_factory=ContactSettings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,8 +127,8 @@ class CouplingReasoner:
     def _judged(self, mind: Mind, observation: Observation, log: DecisionLog | None) -> Outcome:
         old = mind.recall(COUPLING)
         coupled = {c.objects: c for c in mind.couplings}
-        table = _table(mind)
-        observed = _observed_pairs(table, mind)
+        table = relation_table(mind)
+        observed = observed_pairs(table, mind)
         kept: dict[Pair, CouplingEvidence] = {}
         events: list[Event] = []
         for seen in observed:
@@ -185,7 +149,7 @@ class CouplingReasoner:
                 evidence = replace(evidence, apart_since=None)
             kept[pair] = evidence
         alive = tuple(c for pair, c in sorted(coupled.items()) if pair in kept)
-        table = table.with_block(_coupled_cells(observed, coupled, mind))
+        table = table.with_block(coupling_cells(observed, coupled, kept, mind))
         memory = MappingProxyType(kept)
         mind = mind.remember(COUPLING, memory, couplings=alive, relations=table)
         # That parts of one machine hang together is no news.
@@ -195,20 +159,32 @@ class CouplingReasoner:
         self, before: CouplingEvidence, seen: PairObservation, mind: Mind
     ) -> CouplingEvidence:
         converging = seen.converging == YES and seen.touching != YES
-        far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
-        apart = seen.touching == NO and far
         track = self._follow(before.relative_track, seen, mind)
-        odds = before.rest_odds
+        odds, contact, found = before.rest_odds, before.contact, None
+        if track is not None and track is not before.relative_track:
+            found = relative_velocity(track, mind.time, self.settings.window_s)
         if track is None or seen.touching != YES:
             odds = 0.0
-        elif track is not before.relative_track:
-            odds = self._rest(odds, before.relative_track, track, mind)
+        elif found is not None:
+            odds = self._rest(odds, before.relative_track, found, seen, mind)
+        if seen.touching == YES:
+            contact = self._contact(before, found, seen, mind)
+        elif seen.touching == NO:
+            contact = None
+        far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
+        apart = (seen.touching == NO and far) or self._leaves(contact, seen, mind)
         same = track is before.relative_track and odds == before.rest_odds and not converging
+        same = same and contact is before.contact
         if same and apart == (before.apart_since is not None):
             return before  # as nearly always: most pairs are far from each other
         converged = mind.time if converging else before.converged_at
         return CouplingEvidence(
-            converged, odds, _since(before.apart_since, apart, mind.time), track
+            converged,
+            odds,
+            _since(before.rest_since, odds > 0.0, mind.time),
+            _since(before.apart_since, apart, mind.time),
+            track,
+            contact,
         )
 
     def _follow(
@@ -223,7 +199,7 @@ class CouplingReasoner:
             and not seen.gap <= s.near * image_diagonal(mind.frame_size)
         ):
             return None
-        regions = _regions(seen, mind)
+        regions = pair_regions(seen, mind)
         if regions is None:
             old = before is None or mind.time - before.path_end > s.path_s / 2
             return None if old else before
@@ -231,24 +207,51 @@ class CouplingReasoner:
             return None
         if before is None and merged:
             # Not seen side by side before: one is followed as it was last seen, the other with it.
-            return begin_relative_track(_apart(seen.pair, mind), mind.time, mind.frame_size)
+            return begin_relative_track(regions_apart(seen.pair, mind), mind.time, mind.frame_size)
         return update_relative_track(
             before, regions, mind.time, mind.frame_size, lasts_s=s.path_s, anew_s=s.anew_s
         )
 
     def _rest(
-        self, odds: float, before: RelativeTrack | None, track: RelativeTrack, mind: Mind
+        self,
+        odds: float,
+        before: RelativeTrack | None,
+        found: RelativeVelocity,
+        seen: PairObservation,
+        mind: Mind,
     ) -> float:
         """The odds of rest after another sight of both."""
         s, waited = self.settings, mind.time - (before.path_end if before else mind.time)
-        found = relative_velocity(track, mind.time, s.window_s)
-        if found is None:
-            return odds
         diagonal = image_diagonal(mind.frame_size)
-        told = found.rest_odds(s.relations.still_speed * diagonal, s.moving * diagonal)
+        both = common_speed(mind, seen.pair)
+        still = max(s.relations.still_speed * diagonal, s.still_share * both)
+        told = found.rest_odds(still, max(s.moving * diagonal, s.moving_share * both))
         told *= min(1.0, waited / found.span)
         # Odds beyond the bound would only delay that the opposite is believed.
         return min(max(0.0, odds + told), 2 * s.odds)
+
+    def _contact(
+        self,
+        before: CouplingEvidence,
+        found: RelativeVelocity | None,
+        seen: PairObservation,
+        mind: Mind,
+    ) -> OutlineContact:
+        """Two whose outlines meet: whether one goes past the other."""
+        s, track = self.settings.contact, before.relative_track
+        limit = s.passing * image_diagonal(mind.frame_size)
+        limit = max(limit, s.passing_share * common_speed(mind, seen.pair))
+        speed = None if found is None else float(np.hypot(*found.velocity))
+        dt = mind.time - track.path_end if track is not None else 0.0
+        return updated_contact(before.contact, speed, limit, (mind.time, dt), s)
+
+    def _leaves(self, contact: OutlineContact | None, seen: PairObservation, mind: Mind) -> bool:
+        """Whether one of two whose outlines still meet moves on, while the other rests."""
+        if contact is None or not contact.passing:
+            return False
+        least = self.settings.relations.still_speed * image_diagonal(mind.frame_size)
+        now = kinematics(mind)
+        return any(now.one("speed", i) < least for i in seen.pair)
 
     def _coupling(
         self, evidence: CouplingEvidence, seen: PairObservation, mind: Mind
@@ -259,8 +262,15 @@ class CouplingReasoner:
         yield Condition("both are seen near each other", watched)
         text = "log odds that they touch and are at rest"
         yield at_least(text, evidence.rest_odds, s.odds)
+        least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
+        moving = common_speed(mind, seen.pair) > least
+        if not moving and evidence.rest_since is not None:
+            lasted = mind.time - evidence.rest_since
+            yield at_least("at rest for", lasted, s.rest_s, " s", slack=1e-6)
         if seen.host is not None or mind.truth("moving_together", *seen.pair) is Truth.TRUE:
             return
+        if moving:
+            return  # at rest to each other, and on the move: as one
         at = evidence.converged_at
         if at is None:
             yield Condition("they have come together, move together, or share a region", False)
@@ -283,63 +293,6 @@ def _both_present(pair: Pair, mind: Mind) -> bool:
 
 def _coupling_is(coupled: bool, wanted: bool) -> Condition:
     return Condition("they are coupled" if wanted else "they are not coupled", coupled is wanted)
-
-
-def _observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:
-    """All pairs of present objects as they are seen now."""
-    ids, now = table.ids, kinematics(mind)
-    hosts = {(min(pair), max(pair)): pair[1] for pair in merged_pairs(mind)}
-    gaps = now.gap.tolist() if now.ids == ids else None
-    told = zip(*map(table.codes, ("touching", "converging", "diverging")), strict=True)
-    observed = []
-    for i, a in enumerate(ids):
-        for j in range(i + 1, len(ids)):
-            b = ids[j]
-            gap = gaps[i][j] if gaps else now.pair("gap", a, b)
-            touching, closing, parting = next(told)
-            host = hosts.get((a, b))
-            observed.append(PairObservation((a, b), touching, closing, parting, gap, host))
-    return observed
-
-
-def _table(mind: Mind) -> RelationTable:
-    """The relations of all present objects."""
-    ids, table = tuple([b.id for b in mind.present()]), mind.relations
-    if isinstance(table, RelationTable) and table.ids == ids:
-        return table
-    return RelationTable(ids, extra=tuple(table))
-
-
-def _coupled_cells(
-    observed: Sequence[PairObservation], coupled: Mapping[Pair, Coupling], mind: Mind
-) -> RelationBlock:
-    """The relation of being coupled."""
-    hidden = {i for i, b in mind.objects.items() if b.presence is not Presence.SEEN}
-    state, since = [0] * len(observed), [mind.time] * len(observed)
-    for k, seen in enumerate(observed):
-        if seen.pair in coupled:
-            state[k], since[k] = 1, coupled[seen.pair].since
-        elif seen.touching == MAYBE or (hidden and not hidden.isdisjoint(seen.pair)):
-            state[k] = UNKNOWN_CODE
-    sure = np.full((1, len(observed)), CONFIDENCE)
-    return RelationBlock(COLUMNS, np.array([state], dtype=np.int8), np.array([since]), sure)
-
-
-def _regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | None:
-    """The regions in which the two are seen now, twice the same one when they are merged."""
-    if seen.host is not None:
-        host = mind.objects[seen.host]
-        return (host.region, host.region) if host.last_seen == mind.time else None
-    first, second = (mind.objects[i] for i in seen.pair)
-    if first.last_seen < mind.time or second.last_seen < mind.time:
-        return None
-    return first.region, second.region
-
-
-def _apart(pair: Pair, mind: Mind) -> tuple[Region, Region]:
-    """The regions of two that are merged: what was last seen of the one, and the merged one."""
-    first, second = (mind.objects[i].region for i in pair)
-    return first, second
 
 
 def _since(before: float | None, holds: bool, now: float) -> float | None:

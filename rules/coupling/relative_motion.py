@@ -31,6 +31,10 @@ from visup.rules.geometry.regions import Floats
 ICP_REACH = 12.0
 """How far a point may be from the outline on which it is laid, pixels."""
 
+NEAR_REACH = 1.5
+"""A body that is larger is followed by what of it is no farther from the other one than so many of the
+other's sizes: an arm that bends moves otherwise at its shoulder than at the hand with which it holds."""
+
 NEIGHBOUR_MARGIN = 6.0
 """How near the other body an outline is not trusted, pixels."""
 
@@ -53,11 +57,13 @@ class OutlineTemplate:
         points: (N, 2) pixels.
         normals: (N, 2) unit vectors across the outline.
         shift: (x, y) by which the body has moved since, pixels.
+        local: Whether they are only of that part of the body that is near the other one.
     """
 
     points: Floats
     normals: Floats
     shift: tuple[float, float] = (0.0, 0.0)
+    local: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +93,10 @@ class RelativeTrack:
 
 
 def outline_template(
-    region: Region, others: Sequence[Region], size: tuple[int, int]
+    region: Region,
+    others: Sequence[Region],
+    size: tuple[int, int],
+    beside: Region | None = None,
 ) -> OutlineTemplate | None:
     """The points of a region's outline that can be followed, or None when there are too few.
 
@@ -95,6 +104,7 @@ def outline_template(
         region: The region.
         others: Bodies near it.
         size: (width, height) of the image, pixels.
+        beside: A body relative to which it moves; of a larger one what is near that is followed.
     """
     points = resampled(prepared_outline(region).points, TEMPLATE_POINTS)
     tangent = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
@@ -105,7 +115,22 @@ def outline_template(
     for other in others:
         near = prepared_outline(other)
         free &= ~near_outline(points, near.points, near.boxes, NEIGHBOUR_MARGIN)
-    return OutlineTemplate(points[free], normals[free]) if free.sum() >= LEAST_POINTS else None
+    if free.sum() < LEAST_POINTS:
+        return None
+    if beside is not None and region.area > beside.area:
+        reach = max(NEAR_REACH * float(np.hypot(*beside.bbox[2:])), 0.05 * float(np.hypot(*size)))
+        close = free & (_from_box(points, beside.bbox) <= reach)
+        # Where too little is left, or hardly anything is left out, the whole body is followed.
+        if 2 * LEAST_POINTS <= close.sum() < 0.8 * free.sum():
+            return OutlineTemplate(points[close], normals[close], local=True)
+    return OutlineTemplate(points[free], normals[free])
+
+
+def _from_box(points: Floats, box: tuple[int, int, int, int]) -> Floats:
+    """(N,) distances of points from a box, pixels; 0 inside."""
+    low, high = np.array(box[:2]), np.array(box[:2]) + np.array(box[2:])
+    away = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return np.asarray(np.hypot(away[:, 0], away[:, 1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +172,7 @@ def registered(kept: OutlineTemplate, target: TargetOutline) -> OutlineTemplate 
     found, x, y = register(
         kept.points, kept.normals, kept.shift, target.points, target.boxes, limits
     )
-    return OutlineTemplate(kept.points, kept.normals, (x, y)) if found else None
+    return replace(kept, shift=(x, y)) if found else None
 
 
 def update_relative_track(
@@ -180,7 +205,8 @@ def update_relative_track(
     if first is None or second is None:
         return begin_relative_track(regions, now, size) if apart else replace(track, path=())
     x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
-    place = (now, x, y, *_image_motion(regions))
+    local = first.local or second.local
+    place = (now, x, y, *(UNTOLD if local else _image_motion(regions)))
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
     if apart and now - track.since > anew_s:
         fresh = begin_relative_track(regions, now, size)
@@ -193,11 +219,16 @@ def begin_relative_track(
     regions: tuple[Region, Region], now: float, size: tuple[int, int]
 ) -> RelativeTrack | None:
     """Two bodies followed from now on; None when too little of them is in the clear."""
-    first = outline_template(regions[0], regions[1:], size)
-    second = outline_template(regions[1], regions[:1], size)
+    first = outline_template(regions[0], regions[1:], size, regions[1])
+    second = outline_template(regions[1], regions[:1], size, regions[0])
     if first is None or second is None:
         return None
-    return RelativeTrack(first, second, now, path=((now, 0.0, 0.0, *_image_motion(regions)),))
+    told = UNTOLD if first.local or second.local else _image_motion(regions)
+    return RelativeTrack(first, second, now, path=((now, 0.0, 0.0, *told),))
+
+
+UNTOLD = (np.nan, np.nan, np.nan)
+"""Image motion is that of a whole region: of one that bends it says little of the part that counts."""
 
 
 def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:

@@ -263,7 +263,7 @@ def velocities(
 def quick_trend(
     times: Floats, values: Floats, recent: int, limits: tuple[float, float, float], room: Floats
 ) -> tuple[float, float]:
-    """Slope over the window, or over its last part where that is strong and of another sign.
+    """Slope over the window, or over its last part where that clearly goes on otherwise.
 
     Args:
         times: (T,) seconds.
@@ -288,8 +288,13 @@ def quick_trend(
     floor = slope_noise(times[recent:], noise)
     if spread < floor:
         spread = floor
+    # Where the last part goes on otherwise than the whole window, that is no line: it tells of the past.
     turned = abs(quick) > least and abs(quick) > sigmas * spread
     if turned and np.sign(quick) != np.sign(slope):
+        return quick, spread
+    strong = max(abs(slope), abs(quick)) > least
+    apart = abs(slope - quick)
+    if strong and apart > sigmas * spread and apart > 0.5 * max(abs(slope), abs(quick)):
         return quick, spread
     return slope, sigma
 

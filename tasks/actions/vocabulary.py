@@ -34,6 +34,9 @@ OF_TASKS = frozenset({"unexpected", "expected", "actor", "bystander", "one_machi
 BETWEEN = "between"
 DEPTHS = frozenset({"region", "hypothesis", "depth"})
 
+NEARNESS = frozenset({"gap", "distance"})
+"""Quantities that are small of bodies that are near each other."""
+
 FactEvaluator = Callable[[Snapshot, tuple[int, ...]], Truth]
 """Whether something holds between objects, by id, in a mind as rules see it."""
 
@@ -112,6 +115,9 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             zone = next(str(a) for a in fact.words if a in zones)
             looks[key] = _zone_look(task, name, zone)
             text = f"{text} {zone}"
+        if isinstance(fact, Comparison) and name in NEARNESS and fact.operator in ("<", "<="):
+            # Whoever shall be near another may draw nearer to it.
+            actions = {**actions, name: replace(actions[name], expects=("converging",))}
         takes = tuple(k for k in actions[name].kinds if k == "object")
         meanings[key] = replace(
             actions[name], name=key, holds=(key,), arity=len(takes), takes=takes, text=text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
@@ -139,6 +139,34 @@ def declared_sizes(tasks: Iterable[Task], bound: Mapping[str, Iterable[str]]) ->
                 for model in bound.get(actor.name, task.models(actor.name)):
                     found.setdefault(model, value(task.amount(actor.size)))
     return found
+
+
+def with_taught_actors(
+    tasks: Sequence[Task],
+    given: Mapping[str, tuple[str, ...]],
+    known: Collection[str],
+    taught: Collection[str],
+) -> dict[str, tuple[str, ...]]:
+    """Actors as they were given, and those that are what was taught under their name.
+
+    An actor of which nothing is declared stands for the model of its own name anyway. One that is
+    declared to look like models which nobody has (`actor station is trex`, written for another
+    scene) is what was taught as `station`, where something was. One told by its colour, place or
+    conduct has no models, and stays as it is told.
+
+    Args:
+        tasks: All tasks of a run.
+        given: Actor -> models, as the user bound them; it goes before everything else.
+        known: Names of all models that there are.
+        taught: Names of those that were taught.
+    """
+    actors = dict(given)
+    for actor in dict.fromkeys(a for task in tasks for a in task_actors(task)):
+        declared = {m for task in tasks if actor in task_actors(task) for m in task.models(actor)}
+        unknown = bool(declared) and not declared & set(known)
+        if actor not in actors and actor in taught and unknown:
+            actors[actor] = (actor,)
+    return actors
 
 
 def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:

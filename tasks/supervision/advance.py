@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from visup.agent import Relation, StageBelief, Status
+from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import extended
 from visup.tasks.automaton.derivatives import Leaf, TaskStep, leaves, with_leaves
@@ -49,7 +49,8 @@ class Advance:
         ends = any(t.ends and _may_end(t) for t in transitions)
         if ends and hypothesis.finished is None:
             hypothesis = replace(hypothesis, finished=self.now)
-        found = ((t, self._support(hypothesis, t)) for t in transitions if not t.ends)
+        ways = len({t.entered for t in transitions if not t.ends})
+        found = ((t, self._support(hypothesis, t, ways)) for t in transitions if not t.ends)
         supported = [(t, support) for t, support in found if support]
         # Where the steps are over by themselves, nothing is left to stay for but the end.
         forced = not ends and any(s >= Support.OVER and self._all_over(t) for t, s in supported)
@@ -76,16 +77,35 @@ class Advance:
     def _all_over(self, transition: OpenTransition) -> bool:
         return all(self.steps.over(x) for x in transition.left)
 
-    def _support(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> Support:
-        """How strongly something speaks for a transition."""
+    def _goes_on(self, transition: OpenTransition) -> bool:
+        """Whether what a transition leaves has lasted for as long as it must, and still goes on."""
+        return any(
+            x.step.hold_s is not None and self.observe(x.step).holds is Truth.TRUE
+            for x in transition.left
+        )
+
+    def _goes_round(self, transition: OpenTransition) -> bool:
+        """Whether what would begin is seen only since one goes round the other, near which it is to stay."""
+        return self._goes_on(transition) and any(self.observe(s).round for s in transition.entered)
+
+    def _support(
+        self, hypothesis: TaskHypothesis, transition: OpenTransition, ways: int
+    ) -> Support:
+        """How strongly something speaks for a transition, one of so many ways on."""
         finished = self._all_over(transition)
+        if self._goes_round(transition):
+            return Support.NONE
         if not finished and all(_goes_on(s, transition.left) for s in transition.entered):
             return Support.NONE
-        if transition.entered and self._opens(hypothesis, transition):
-            return Support.BEGUN
-        if finished:
+        opens = transition.entered and self._opens(hypothesis, transition)
+        # Where the course may also go on otherwise, an entry speaks for neither way: who touches may
+        # couple, or back off. What holds does.
+        holds = (self.observe(s).holds is Truth.TRUE for s in transition.entered)
+        if opens and (ways == 1 or all(holds)):
+            return Support.BEGUN if self._skipped(transition) == 1.0 else Support.EARLY
+        if finished and not self._goes_on(transition):
             return Support.OVER
-        nearer = all(self._nearer(s) for s in transition.entered)
+        nearer = ways == 1 and all(self._nearer(s) for s in transition.entered)
         return Support.NEARER if nearer else Support.NONE
 
     def _chance(
@@ -96,8 +116,8 @@ class Advance:
         if support <= dict(hypothesis.considered).get(transition.entered, Support.NONE):
             # What was weighed already counts once; but what was seen to begin may begin later on.
             late = -math.expm1(-hmm.leave * self.dt)
-            return skipped * late if support is Support.BEGUN else 0.0
-        if support is Support.BEGUN:
+            return skipped * late if support >= Support.EARLY else 0.0
+        if support >= Support.EARLY:
             return skipped * (1.0 - hmm.spurious)
         if support is Support.OVER:
             return 0.5 if ends else 1.0
@@ -116,6 +136,8 @@ class Advance:
         """When the entry to each transition was last seen, with what is seen now."""
         met = dict(hypothesis.met)
         for transition in transitions:
+            if self._goes_round(transition):
+                continue
             entries = (self.observe(s).entry for s in transition.entered)
             if transition.entered and all(self._lasted(entry) for entry in entries):
                 met[transition.entered] = self.now

@@ -92,6 +92,36 @@ def task_belief(
     )
 
 
+def failed_belief(belief: TaskBelief, before: TaskBelief, why: str, now: float) -> TaskBelief:
+    """A belief about a task that has failed by what must never be: the stage under way then has failed.
+
+    Args:
+        belief: As the hypotheses have it.
+        before: What was believed last.
+        why: What was not to be.
+        now: Seconds.
+    """
+    if belief.verdict is Verdict.INTERRUPTED:
+        return belief
+    if before.verdict is Verdict.FAILED:
+        # There is no way back from that, and nothing more to be told of it.
+        stages, current = before.stages, before.current
+    else:
+        current = belief.current
+        stages = tuple(
+            replace(s, status=Status.FAILED, since=now, evidence=why) if s.stage == current else s
+            for s in belief.stages
+        )
+    return replace(
+        belief,
+        verdict=Verdict.FAILED,
+        stages=stages,
+        current=current,
+        evidence=why,
+        success=0.0,
+    )
+
+
 def pending_stages(model: MonitoredPhases) -> tuple[StageBelief, ...]:
     """The stages of a task that has not begun."""
     return tuple(StageBelief(s, Status.PENDING, 0.0) for s in stage_names(model.task))

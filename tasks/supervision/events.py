@@ -140,7 +140,8 @@ def _kinds(was: Status, now: Status) -> Iterator[str]:
     if was is now:
         return
     begins = was in (Status.PENDING, Status.DONE) and now not in (Status.PENDING, Status.UNKNOWN)
-    if begins and (was is Status.PENDING or now is not Status.DONE):
+    # What was told done and fails has not begun anew: it is undone.
+    if begins and (was is Status.PENDING or now not in (Status.DONE, *BAD)):
         yield "stage_started"
     if now in KINDS and not (was is Status.UNKNOWN and now is Status.PENDING):
         yield KINDS[now]

@@ -33,7 +33,8 @@ class Support(IntEnum):
     NONE = 0
     NEARER = 1
     OVER = 2
-    BEGUN = 3
+    EARLY = 3  # it begins, but what it leaves has not been seen through
+    BEGUN = 4
 
 
 class Progress(IntEnum):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from visup.agent import AlertCondition, Event, Mind, Severity, Truth
 from visup.tasks.automaton.derivatives import leaves
-from visup.tasks.grammar.conditions import facts_of
+from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Invariant
 from visup.tasks.grammar.structure import fact_key
 from visup.tasks.grammar.units import value
@@ -45,6 +45,35 @@ def _under_way(memory: TaskMemory) -> frozenset[str]:
         return frozenset()
     steps = [x.step for x in leaves(posterior.likeliest.state)]
     return frozenset().union(*(s.inside for s in steps))
+
+
+def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
+    """Whether an invariant speaks of how bodies stand to each other, or to a zone: to break it is unsafe.
+
+    What must never be of one body alone (that the charger moves) is a matter of the work: it fails.
+    """
+    facts = facts_of(invariant.condition)
+    zones = {z.name for z in model.task.zones}
+    words = [action_of(f).words for f in facts]
+    return any(len(named) > 1 or zones & {str(w) for w in named} for named in words)
+
+
+def violation(
+    model: MonitoredPhases, broken: tuple[float | None, ...], now: float, *, safety: bool
+) -> str:
+    """What an invariant that has been broken for as long as counts says, or empty.
+
+    Args:
+        model: The task.
+        broken: Since when each invariant has been broken.
+        now: Seconds.
+        safety: Of those of safety, or of the others.
+    """
+    for invariant, since in zip(model.task.invariants, broken, strict=True):
+        lasted = since is not None and now - since >= patience(model, invariant)
+        if lasted and is_of_safety(model, invariant) is safety:
+            return f"`{invariant}` does not hold"
+    return ""
 
 
 def patience(model: MonitoredPhases, invariant: Invariant) -> float:

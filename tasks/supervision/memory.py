@@ -30,6 +30,7 @@ class TaskMemory:
         gain: The evidence that it is, of each second, as it was seen last.
         inferred: Seconds of the step in which it was last inferred whether it is.
         looks: What was seen while an actor is looked for, to be gone through again once it is found.
+        violated: What must never be of one body and was, by which the task has failed; or empty.
     """
 
     time: float
@@ -46,3 +47,4 @@ class TaskMemory:
     gain: float = 0.0
     inferred: float = 0.0
     looks: tuple[PastLook, ...] = ()
+    violated: str = ""

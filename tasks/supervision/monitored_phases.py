@@ -107,7 +107,8 @@ class MonitoredPhases:
             yield step.actors, (meaning.name, *meaning.holds, *meaning.expects)
         for transition in self.automaton.transitions(node):
             for step in begun_by(self.automaton, transition):
-                yield step.actors, self.actions[step.action].begins
+                begins = self.actions[step.action].begins
+                yield step.actors, tuple("touching" if n == "in_contact" else n for n in begins)
 
     def begin(self, now: float) -> Iterator[tuple[int, TaskHypothesis, float]]:
         """See `TaskModel`."""

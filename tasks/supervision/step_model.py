@@ -44,6 +44,9 @@ class StepModel:
         """How well `dt` seconds of what is seen fit a step; 1 at best."""
         if not seen.observed:
             return self.hmm.fit(ActionStatus.UNKNOWN, 1.0, dt)
+        if leaf.payload.status in BAD and not done:
+            # That it fails was paid for when it began to: from then on its contrary is what is to be seen.
+            return math.exp(-self.hmm.recover * dt)
         if seen.contrary is not None and _counts(seen):
             return self.hmm.fit(ActionStatus.CONTRARY, seen.contrary.confidence, dt)
         if done or self.over(leaf) or (seen.helps is not None and leaf.payload.held):

@@ -31,7 +31,12 @@ from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.casting.matching import bystanders, machines, match, unexplained
 from visup.tasks.grammar.nodes import Task
-from visup.tasks.supervision.belief import pending_stages, suppressed, task_belief
+from visup.tasks.supervision.belief import (
+    failed_belief,
+    pending_stages,
+    suppressed,
+    task_belief,
+)
 from visup.tasks.supervision.events import (
     activity_events,
     done_stages,
@@ -43,7 +48,7 @@ from visup.tasks.supervision.invariants import (
     broken_since,
     invariant_concerns,
     invariant_events,
-    patience,
+    violation,
 )
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
@@ -212,7 +217,11 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         interrupted, strangers = "", ()
     if not interrupted:
         interrupted, strangers = _interrupted(model, snapshot, memory, broken, let_be)
+    violated = memory.violated
+    if not violated and memory.belief.verdict not in OVER:
+        violated = violation(model, broken, now, safety=False)
     belief = task_belief(model, snapshot, posterior, interrupted)
+    belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     one = machines(model.task, bindings)
     belief = replace(belief, unexplained=lasting, bystanders=let_be, machines=one)
@@ -231,6 +240,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         gain,
         memory.inferred,
         remembered(memory.looks, mind, start, since) if _awaited(model, bindings) else (),
+        violated,
     )
 
 
@@ -334,10 +344,7 @@ def _interrupted(
         if alert.kind in UNSAFE and alert.severity >= Severity.WARNING:
             strangers = alert.objects if alert.kind == "unexpected_object" else ()
             return alert.cause.rstrip("."), strangers
-    for invariant, since in zip(model.task.invariants, broken, strict=True):
-        if since is not None and snapshot.mind.time - since >= patience(model, invariant):
-            return f"`{invariant}` does not hold", ()
-    return "", ()
+    return violation(model, broken, snapshot.mind.time, safety=True), ()
 
 
 def _current_actors(memory: TaskMemory) -> tuple[str, ...]:

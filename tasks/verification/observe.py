@@ -8,12 +8,19 @@ from functools import cached_property
 from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
+from visup.agent.model.fast_replace import replace
 from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.relations.reasoner import kinematics
 from visup.tasks.actions.actions import ActionDefinition
 from visup.tasks.actions.vocabulary import FactEvaluator
 
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NEVER: Mapping[str, float] = MappingProxyType({})
+TRENDS = ("converging", "diverging")
+
+RADIAL_SHARE = 0.45
+"""Two draw nearer or apart where their distance changes at no less than this share of their relative speed;
+that of a body that flies round another one does at up to 0.4 of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +38,7 @@ class ActionObservation:
         over: Whether what its course says of its end is seen; None when the course says nothing.
         observed: Whether anything at all is known about it; False while an actor is not found
             or its object is hidden.
+        round: Whether its entry is that two draw nearer or apart of which one goes round the other.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -42,6 +50,7 @@ class ActionObservation:
     decisive: bool = False
     over: Truth | None = None
     observed: bool = False
+    round: bool = False
 
 
 UNOBSERVED = ActionObservation()
@@ -84,11 +93,25 @@ class RelationLookup:
 
     def _given_or_derived(self, name: str, objects: tuple[int, ...]) -> Relation:
         found = self._mind.relation(name, *objects)
+        meets = name == "touching" and found is not None and found.truth is Truth.TRUE
+        if meets and found is not None and self._passes_by(objects):
+            return replace(found, truth=Truth.UNKNOWN)
         if found is not None and found.truth is not Truth.UNKNOWN:
             return found
         derive = DERIVED.get(name)
         derived = derive(self._mind, self, objects) if derive else None
         return derived or found or Relation(name, objects, Truth.UNKNOWN, self._mind.time)
+
+    def _passes_by(self, objects: tuple[int, ...]) -> bool:
+        """Whether outlines meet only because one body passes in front of the other."""
+        passing = self._mind.relation("passing_by", *objects)
+        return passing is not None and passing.truth is Truth.TRUE
+
+    def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:
+        """Whether of two that draw nearer or apart one rather goes round the other; unknown is no."""
+        now, pair = kinematics(self._mind), (objects[0], objects[1])
+        rate, speed = now.pair("rate", *pair), now.pair("relative_speed", *pair)
+        return (rate if trend == "diverging" else -rate) < RADIAL_SHARE * speed
 
     @property
     def time(self) -> float:
@@ -163,16 +186,24 @@ def observe(
     holds = Truth.TRUE if held_by else _not_true(meaning, ids, relations)
     helps = relations.first_true(meaning.helps, ids)
     contrary = relations.first_given(meaning.contrary, ids)
+    if (
+        contrary is not None
+        and contrary.name in TRENDS
+        and relations.goes_round(contrary.name, ids)
+    ):
+        contrary = None  # who passes over or round another draws away from it a little
     known = (*meaning.helps, *meaning.contrary)
+    entry = relations.first_true(meaning.begins, ids)
     return ActionObservation(
         holds=holds,
         held_by=held_by,
         helps=helps,
-        entry=relations.first_true(meaning.begins, ids),
+        entry=entry,
         not_yet=holds is not Truth.TRUE
         and relations.first_true(meaning.while_not, ids) is not None,
         contrary=contrary,
         observed=relations.known(known, ids),
+        round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
     )
 
 
@@ -185,7 +216,9 @@ Derive = Callable[[Mind, RelationLookup, tuple[int, ...]], Relation | None]
 
 
 def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
-    """Coupled when the mind says so, whether or not a relation of that name is kept."""
+    """Coupled when the mind says so where no relation of that name is kept."""
+    if mind.relation("coupled", *ids) is not None:
+        return None  # it is in doubt
     pair = tuple(sorted(ids))
     since = next((c.since for c in mind.couplings if c.objects == pair), None)
     return None if since is None else Relation("coupled", ids, Truth.TRUE, since)
@@ -193,6 +226,13 @@ def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Rel
 
 def _decoupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     return _opposite("decoupled", relations.find("coupled", ids))
+
+
+def _in_contact(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
+    """In contact, where nobody judges that by itself: touching."""
+    if mind.relation("in_contact", *ids) is not None:
+        return None
+    return replace(relations.find("touching", ids), name="in_contact")
 
 
 def _apart(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
@@ -221,6 +261,7 @@ def _opposite(name: str, relation: Relation) -> Relation | None:
 
 DERIVED: Mapping[str, Derive] = {
     "coupled": _coupled,
+    "in_contact": _in_contact,
     "decoupled": _decoupled,
     "apart": _apart,
     "present": _present,

@@ -160,6 +160,9 @@ def _note_progress(
     held, broken, ceased = monitor.held_s, monitor.broken_since, monitor.ceased
     if seen.holds is Truth.TRUE:
         held, broken = held + dt, None
+        if step.hold_s is None and seen.held_by is not None:
+            # What held already when the step began need not hold for as long once more.
+            held = max(held, now - seen.held_by.since)
     elif seen.holds is Truth.FALSE:
         broken = _first(broken, now)
         if now - broken >= settings.gap_s:

@@ -36,7 +36,7 @@ def test_outlines_are_stored_told_and_drawn(picture: Path, tmp_path: Path) -> No
     done = run(picture, *words("part"), *words("tray", 9), "--models", models)
     assert done.exit_code == 0, done.output
     assert f"part: {SIDE} x {SIDE} pixels at (20, {TOP})." in done.output
-    assert "knows by outlines: part (1), tray (1)" in done.output
+    assert "knows by outlines: part (1 view), tray (1 view)" in done.output
     assert ModelDatabase.open(models).names() == ("part", "tray")
     drawn = cv2.imread(str(tmp_path / "cell-taught.png"))
     assert drawn is not None
@@ -58,7 +58,7 @@ def test_a_brief_says_what_is_outlined_where(tmp_path: Path) -> None:
     (folder / "brief.json").write_text(json.dumps(told))
     done = run("--brief", folder / "brief.json", "--models", tmp_path / "a.models")
     assert done.exit_code == 0, done.output
-    assert "part (1)" in done.output
+    assert "part (1 view)" in done.output
 
 
 @pytest.mark.parametrize(

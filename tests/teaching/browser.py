@@ -128,6 +128,10 @@ class Browser:
             time.sleep(0.02)
         raise AssertionError(f"never true: {script}")
 
+    def move(self, x: float, y: float) -> None:
+        """Move the pointer to a place."""
+        self._mouse("mouseMoved", x, y, 0)
+
     def click(self, x: float, y: float, count: int = 1) -> None:
         """Click at a place of the window; a double click is two clicks."""
         self._mouse("mouseMoved", x, y, 0)

@@ -144,6 +144,8 @@ def taught(browser: Browser, tmp_path: Path) -> ModelDatabase:
 
 def test_a_user_draws_with_the_mouse(page: TeachingPage, browser: Browser, tmp_path: Path) -> None:
     """Zoomed in, one corner taken back and one moved, two things in two frames."""
+    browser.move(*at(browser, 40, 50))
+    browser.until("document.getElementById('spot').textContent === '(40, 50)'")
     browser.wheel(*at(browser, 40, 50), -300)
     zoom = browser.until("state.zoom > 6 && state.zoom")
     assert zoom < 24

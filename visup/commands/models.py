@@ -103,6 +103,40 @@ def add(
     _tell_size(ModelDatabase.open_or_new(db).add(new))
 
 
+@app.command("learn")
+def learn(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder, or its journal.")],
+    models: Annotated[
+        Path, typer.Option(metavar="DB", help="Model database; begun if there is none.")
+    ],
+    thing: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=OBJECT", help="What an object of the run was; repeatable."),
+    ] = None,
+    source: Annotated[
+        str | None, typer.Option(metavar="FILE", help="The run's video, where it has moved.")
+    ] = None,
+    views: Annotated[int, typer.Option(min=1, help="Views of each thing at most.")] = 5,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="PNG", help="Picture of what was stored (default: beside DB)."),
+    ] = None,
+) -> None:
+    """Add views of what was confirmed in a run: this was the gripper.
+
+    What the operator answered in the run counts, and what --thing says.
+    """
+    from visup.percepts.taught.drawing import taught_picture
+    from visup.teaching.learning import learn_from
+    from visup.teaching.outlines import parse_things
+
+    lesson = learn_from(run, models, parse_things(thing or ()), source, views)
+    for sentence in lesson.told:
+        typer.echo(sentence)
+    out = out or models.with_name(f"{models.stem}-taught.png")
+    write_picture(out, taught_picture(lesson.views))
+
+
 @app.command("list")
 def list_models(db: Db) -> None:
     """List the models of a database with their views."""
@@ -173,7 +207,7 @@ def show(
 ) -> None:
     """Draw a contact sheet: a row for each model, its views with their shock graphs."""
     from visup.percepts.shape.database.model_database import ModelDatabase
-    from visup.percepts.shape.drawing.pictures import contact_sheet
+    from visup.percepts.shape.drawing.contact_sheet import contact_sheet
 
     sheet = contact_sheet(ModelDatabase.open(db))
     write_picture(out or db.with_name(f"{db.stem}-sheet.png"), sheet)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -159,11 +159,15 @@ class _Run:
         past: InterruptedRun | None,
         stack: ExitStack,
     ) -> None:
-        self._settings, self._folder, self._stack = settings, folder, stack
         self._faults = RuntimeFaults()
         self.source = stack.enter_context(open_video(settings))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
+        # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
+        actors = self._agent.mind.actors
+        self._notes = _told_of_actors(settings.actors, actors)
+        settings = replace(settings, actors=dict(actors))
+        self._settings, self._folder, self._stack = settings, folder, stack
         self._recorder = (
             Recorder(settings, self.source, folder, options, resume=past is not None)
             if folder
@@ -178,7 +182,6 @@ class _Run:
         self._pace: RealTimeFrames | None = None
         self._steps = past.steps if past else 0
         self._stopped = False
-        self._notes: tuple[str, ...] = ()
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
         """Make the agent what it was, and give the frames that are left."""
@@ -186,7 +189,8 @@ class _Run:
         if recorder and past.state:
             recorder.collector.load(past.state.kept)
         tell = recorder.catch_up if recorder else lambda step, frame: None
-        frames, self._notes = catch_up(self._agent, self.source, past, tell)
+        frames, notes = catch_up(self._agent, self.source, past, tell)
+        self._notes = (*self._notes, *notes)
         return frames
 
     def connect(self, audience: Audience, past: InterruptedRun | None) -> None:
@@ -272,6 +276,16 @@ def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str]
             notice(text)
 
     return tell
+
+
+def _told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
+    """A sentence on each actor that is what was taught, other than its task declares."""
+    return tuple(
+        f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
+        "models that its task names."
+        for actor in actors
+        if actor not in given
+    )
 
 
 class _SeverityMonitor:

@@ -31,7 +31,13 @@ from visup.runs.zones import load_ground, load_zones
 from visup.tasks import load_tasks
 from visup.tasks.casting.fitness import asks_for_colour, asks_for_traits
 from visup.tasks.grammar.criteria import Place
-from visup.tasks.grammar.structure import declared_sizes, needs_ground, task_actors, undrawn_zones
+from visup.tasks.grammar.structure import (
+    declared_sizes,
+    needs_ground,
+    task_actors,
+    undrawn_zones,
+    with_taught_actors,
+)
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 if TYPE_CHECKING:
@@ -82,8 +88,10 @@ def build_agent(
     tasks, zones = _tasks_and_zones(settings)
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
+    known, taught = _names(database)
+    actors = with_taught_actors(tasks, settings.actors, known, taught)
     behaviours = [
-        *_behaviours(settings, database, declared_sizes(tasks, settings.actors), _places(tasks)),
+        *_behaviours(settings, database, declared_sizes(tasks, actors), _places(tasks)),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
         *also,
     ]
@@ -91,13 +99,20 @@ def build_agent(
     return Agent(
         behaviours=behaviours,
         reasoners=_reasoners(settings, tasks, contracts),
-        actors=settings.actors,
+        actors=actors,
         zones=zones,
-        cast=_cast(tasks),
+        cast={**_cast(tasks), **actors},
         observers=observers,
-        models=database.names() if database is not None else (),
+        models=known,
         limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
+
+
+def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:
+    """All models that there are, and those that were taught."""
+    if database is None:
+        return (), frozenset()
+    return database.names(), frozenset(view.name for view in database.taught)
 
 
 def reasoning_agent(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,7 +145,7 @@ def store(models: Path, views: Sequence[TaughtView]) -> Lesson:
     before = ModelDatabase.open_or_new(models)
     database = before.teach(views)
     known = len(before.taught)
-    told = [_told(v, database) for v in views]
+    told = [_told(v) for v in views]
     if len(database.taught) == known:
         told.append(f"{models} has all of this already; nothing was added.")
     else:
@@ -165,12 +166,9 @@ def _view(name: str, picture: NDArray[np.uint8], drawn: OutlineLike) -> TaughtVi
     return taught_view(name, picture, drawn)
 
 
-def _told(view: TaughtView, database: ModelDatabase) -> str:
+def _told(view: TaughtView) -> str:
     x, y, width, height = view.bbox
-    times = sum(v.name == view.name.strip() for v in database.taught)
     told = f"{view.name}: {width} x {height} pixels at ({x}, {y})"
-    if times > 1:
-        told += f", now shown {times} times"
     if min(x, y) == 0 or x + width == view.frame_size[0] or y + height == view.frame_size[1]:
         told += ", cut by the picture's border"
     if max(width, height) < SMALL:
@@ -179,6 +177,6 @@ def _told(view: TaughtView, database: ModelDatabase) -> str:
 
 
 def _summary(database: ModelDatabase) -> str:
-    names = dict.fromkeys(v.name for v in database.taught)
-    listed = ", ".join(f"{n} ({sum(v.name == n for v in database.taught)})" for n in names)
+    counts = Counter(v.name for v in database.taught)
+    listed = ", ".join(f"{n} ({c} view{'s' if c > 1 else ''})" for n, c in counts.items())
     return f"{database.path} knows by outlines: {listed}."

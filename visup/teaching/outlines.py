@@ -77,6 +77,28 @@ def _short(text: str) -> str:
     return text if len(text) <= 24 else text[:23] + "…"
 
 
+def parse_things(texts: Iterable[str]) -> dict[str, int]:
+    """What objects of a run were, from `NAME=OBJECT`.
+
+    >>> parse_things(["gripper=4", "part = 2"])
+    {'gripper': 4, 'part': 2}
+
+    Raises:
+        SettingsError: One is not of that form, or an object or a name is there twice.
+    """
+    things: dict[str, int] = {}
+    for text in texts:
+        name, _, number = (part.strip() for part in text.rpartition("="))
+        if not (name and number.isdecimal()):
+            raise SettingsError(
+                f"--thing {text!r} cannot be read", expected="NAME=OBJECT, such as gripper=4"
+            )
+        if name in things or int(number) in things.values():
+            raise SettingsError(f"--thing {text!r}: '{name}' or object {number} is there twice")
+        things[name] = int(number)
+    return things
+
+
 def join_corners(words: Sequence[str], flag: str = "--outline") -> list[str]:
     """Words of a command line in which the corners of an outline are one word, quoted or not.
 

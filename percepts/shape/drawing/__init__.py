@@ -1,1 +1,5 @@
-"""Pictures of shapes, for people: `pictures.py` says what is drawn, `sheet.py` is what it is drawn on."""
+"""Pictures of shapes, for people.
+
+`contact_sheet.py` shows all that a database knows, `pictures.py` why a silhouette matches a view, and
+`sheet.py` is what they are drawn on.
+"""

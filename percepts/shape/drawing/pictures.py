@@ -1,4 +1,4 @@
-"""Pictures of shapes, for people: contact sheets, and why a silhouette matches a view.
+"""Pictures of shapes, for people: why a silhouette matches a view.
 
 Colours follow the kinds of shock: protrusions orange, necks red, bends green, seeds blue.
 """
@@ -6,7 +6,7 @@ Colours follow the kinds of shock: protrusions orange, necks red, bends green, s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -32,11 +32,6 @@ from visup.percepts.shape.shocks.shock_labels import ShockKind, label_branch
 from visup.percepts.shape.shocks.skeleton import skeletonise
 from visup.percepts.shape.silhouette.silhouette import Silhouette
 
-TILE = 104
-"""Side of one view on a contact sheet, pixels."""
-
-_VIEWS_SHOWN = 10
-_LABEL = 170
 _HEAD = 44
 _ROW = 172
 _MARGIN = 18
@@ -44,7 +39,7 @@ _MARGIN = 18
 Place = Callable[[NDArray[np.floating]], list[Point]]
 
 
-def _placed(
+def placed(
     contour: NDArray[np.floating],
     centre: Point,
     side: float,
@@ -63,11 +58,13 @@ def _placed(
     return place
 
 
-def _draw_shape(sheet: Sheet, contour: NDArray[np.floating], place: Place) -> None:
+def draw_shape(sheet: Sheet, contour: NDArray[np.floating], place: Place) -> None:
+    """A shape's body with its outline, where `place` puts it."""
     sheet.polygon(place(contour), BODY, OUTLINE)
 
 
-def _draw_graph(sheet: Sheet, graph: ShockGraph, place: Place, radius: float = 3.0) -> None:
+def draw_graph(sheet: Sheet, graph: ShockGraph, place: Place, radius: float = 3.0) -> None:
+    """The nodes of a shock graph in their colours, and its edges."""
     at = place(graph.positions)
     for parent, child in graph.edges:
         if parent > 0:
@@ -80,48 +77,6 @@ def _draw_graph(sheet: Sheet, graph: ShockGraph, place: Place, radius: float = 3
 
 def _colour(graph: ShockGraph, node: int) -> Colour:
     return COLOURS.get(ShockKind(int(graph.kinds[node])), INK)
-
-
-def contact_sheet(database: ModelDatabase, names: Sequence[str] | None = None) -> NDArray[np.uint8]:
-    """A row for each model: its name, how many views it has, and up to ten of them.
-
-    Args:
-        database: The models.
-        names: Models to show; all when None.
-
-    Returns:
-        (H, W, 3) uint8, BGR.
-    """
-    shown = list(database.names() if names is None else names)
-    sheet = Sheet(_LABEL + _VIEWS_SHOWN * TILE + _MARGIN, _HEAD + max(1, len(shown)) * TILE)
-    title = f"{len(shown)} models, {len(database.views)} views"
-    sheet.text((_MARGIN, 28), title, 16)
-    legend(sheet, (_LABEL + _VIEWS_SHOWN * TILE - 4 * 104, 28), 104)
-    for number, name in enumerate(shown):
-        _draw_row(sheet, database, name, _HEAD + number * TILE)
-    return sheet.picture()
-
-
-def _draw_row(sheet: Sheet, database: ModelDatabase, name: str, top: float) -> None:
-    own = database.views.named({name}).tolist()
-    views = [database.views[k] for k in own]
-    sheet.line([(0, top), (sheet.size[0], top)], RULE)
-    sheet.fitted((_MARGIN, top + 40), name, _LABEL - _MARGIN - 8, 14)
-    cut, directions = sum(v.cut for v in views), sum(len(v.seen_from) for v in views)
-    lines = [f"{len(views)} view{'s' if len(views) != 1 else ''}"]
-    if directions:
-        lines.append(f"{directions} directions")
-    if cut:
-        lines.append(f"{cut} cut by a border")
-    for k, line in enumerate(lines):
-        sheet.text((_MARGIN, top + 59 + 16 * k), line, 12, PALE)
-    spread = [own[i * len(own) // _VIEWS_SHOWN] for i in range(_VIEWS_SHOWN)] if own else []
-    for column, view in enumerate(dict.fromkeys(spread)):
-        shape = database.shapes[view]
-        centre = (_LABEL + (column + 0.5) * TILE, top + TILE / 2)
-        place = _placed(shape.contour, centre, TILE - 16)
-        _draw_shape(sheet, shape.contour, place)
-        _draw_graph(sheet, shape.graph, place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +121,8 @@ def match_picture(
 
 def _draw_query(sheet: Sheet, silhouette: Silhouette, query: Shape, height: int) -> None:
     """The silhouette, its skeleton by kind of shock, and its nodes with their numbers."""
-    place = _placed(query.contour, (250, _HEAD + 0.5 * min(height - _HEAD, 500)), 420)
-    _draw_shape(sheet, query.contour, place)
+    place = placed(query.contour, (250, _HEAD + 0.5 * min(height - _HEAD, 500)), 420)
+    draw_shape(sheet, query.contour, place)
     for point, kind in _labelled_points(silhouette)[::4]:
         (x, y) = place(point[None])[0]
         sheet.box((x - 1.2, y - 1.2), (x + 1.2, y + 1.2), COLOURS[kind])
@@ -231,11 +186,11 @@ def _draw_match(
     top = _HEAD + row * _ROW
     middle = top + _ROW / 2
     sheet.line([(500, top), (1120, top)], RULE)
-    own = _Panel(query, _placed(query.contour, (600, middle), 140))
+    own = _Panel(query, placed(query.contour, (600, middle), 140))
     shape = database.shapes[match.view.id - 1]
-    theirs = _Panel(shape, _placed(shape.contour, (830, middle), 140, _turn(match)))
+    theirs = _Panel(shape, placed(shape.contour, (830, middle), 140, _turn(match)))
     for panel in (own, theirs):
-        _draw_shape(sheet, panel.shape.contour, panel.place)
+        draw_shape(sheet, panel.shape.contour, panel.place)
     _draw_pairs(sheet, own, theirs, match)
     x = 928
     sheet.fitted((x, top + 42), f"{row + 1}. {match.view.name}", 180, 15)

@@ -84,6 +84,15 @@ class Sheet:
             x, y = at[0] * _FINE, at[1] * _FINE
             self._draw.ellipse((x - r * _FINE, y - r * _FINE, x + r * _FINE, y + r * _FINE), fill)
 
+    def photo(self, corner: Point, picture: NDArray[np.uint8], side: float) -> None:
+        """A picture (H, W, 3) uint8, BGR, fitted into a square with this upper left corner."""
+        image = Image.fromarray(np.ascontiguousarray(picture[:, :, ::-1]))
+        zoom = side * _FINE / max(image.size)
+        width, height = (max(1, round(n * zoom)) for n in image.size)
+        spare = (side * _FINE - width) / 2, (side * _FINE - height) / 2
+        spot = round(corner[0] * _FINE + spare[0]), round(corner[1] * _FINE + spare[1])
+        self._image.paste(image.resize((width, height), Image.Resampling.BICUBIC), spot)
+
     def picture(self) -> NDArray[np.uint8]:
         """What was drawn, (H, W, 3) uint8, BGR."""
         small = self._image.resize(self.size, Image.Resampling.LANCZOS)

@@ -139,10 +139,23 @@ def test_a_strong_trend_of_the_last_part_counts_when_it_has_turned(
     sigma = np.maximum(sigma, slope_noise(times, noise))
     quick, spread = by_medians(*by_bins(times[recent:], values[recent:], 8))
     spread = np.maximum(spread, slope_noise(times[recent:], noise))
-    if abs(quick) > max(least, sigmas * spread) and np.sign(quick) != np.sign(slope):
+    turned = abs(quick) > max(least, sigmas * spread) and np.sign(quick) != np.sign(slope)
+    steeper, apart = max(abs(slope), abs(quick)), abs(slope - quick)
+    if turned or (steeper > least and apart > max(sigmas * spread, 0.5 * steeper)):
         slope, sigma = quick, spread
     found = quick_trend(times, values, recent, (noise, least, sigmas), np.empty((10, 8)))
     assert found == pytest.approx((slope, sigma), nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [(-40.0, 0.0), (0.0, 40.0), (10.0, 60.0), (30.0, -30.0)]
+)
+def test_what_changed_half_a_second_ago_is_told_as_it_is_now(before: float, after: float) -> None:
+    times = np.arange(0.0, 1.5, 1 / 15)
+    values = np.where(times < 0.8, before * (times - 0.8), after * (times - 0.8))
+    recent = int(np.searchsorted(times, times[-1] - 0.7, side="right"))
+    slope, _ = quick_trend(times, values, recent, (0.7, 2.4, 4.0), np.empty((10, 8)))
+    assert slope == pytest.approx(after, abs=2.0)
 
 
 def test_too_few_samples_give_no_slope() -> None:

@@ -123,6 +123,14 @@ def test_conditions_are_read_as_they_are_written(condition: str, true: bool) -> 
     assert broken is true
 
 
+def test_what_must_never_be_of_one_body_fails_the_task_and_is_not_unsafe() -> None:
+    text = "<t> ::= <near>\n<near> ::= keeping_distance(arm, satellite) for 9 s\nnever present(satellite)"
+    script = Script((Spell("keeping_distance", 0.0, 30.0),))
+    found = watch(text, script, 5.0)
+    assert belief(found).verdict is Verdict.FAILED
+    assert status(found, "near") is Status.FAILED
+
+
 def test_a_condition_that_cannot_be_observed_breaks_nothing() -> None:
     text = "<t> ::= keeping_distance(arm, satellite)\nnever not moving(boom)"
     script = Script((Spell("keeping_distance", 0.0, 30.0),))

@@ -136,7 +136,7 @@ def actor_objects(mind: Mind, others: Collection[str]) -> Iterator[tuple[str, in
 def touching(mind: Mind, who: Mapping[str, int]) -> Iterator[tuple[str, str]]:
     """Pairs of names, in order, whose objects are believed to be in contact."""
     for (a, i), (b, j) in combinations(sorted(who.items()), 2):
-        if mind.coupled(i, j) or mind.truth("touching", i, j) is Truth.TRUE:
+        if mind.truth("in_contact", i, j) is Truth.TRUE:
             yield a, b
 
 

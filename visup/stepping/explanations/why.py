@@ -22,7 +22,7 @@ from visup.agent import (
     Truth,
 )
 from visup.agent.model.errors import SettingsError
-from visup.rules.coupling.reasoner import COUPLING
+from visup.rules.coupling.evidence import COUPLING
 from visup.rules.safety.queries import explain
 from visup.rules.safety.reasoner import rule_memory
 from visup.rules.wording.sentences import short

@@ -102,6 +102,7 @@ function inside([x, y]) {
 function draw() {
   paper.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
   $("zoom").textContent = `${Math.round(100 * state.zoom)} %`;
+  $("spot").textContent = state.pointer ? `(${state.pointer.map(Math.round).join(", ")})` : "";
   if (!state.image) return;
   paper.imageSmoothingEnabled = state.zoom < 3; // close by, pixels are to be seen
   const { naturalWidth: w, naturalHeight: h } = state.image;

@@ -59,7 +59,7 @@ TASK = """\
 # inspect_gap.task: the inspector goes round the station within a range, and leaves.
 <inspect>    ::= <approach> <fly_around> <retreat>
 <approach>   ::= converging(inspector, station)
-<fly_around> ::= gap(inspector, station) < {gap} px for {hold} s
+<fly_around> ::= gap(inspector, station) {range} for {hold} s
 <retreat>    ::= diverging(inspector, station) for 1 s
 never touching(inspector, station)
 """
@@ -99,6 +99,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     if outcome == "in_progress":
         end = times.arrive + float(rng.uniform(1.5, 3.5))
         truth, frames = cut_short(truth, end), frames_until(end)
+    wording = "< {} px" if rng.random() < 0.5 else "between 3 px and {} px"
     surface = Surface("grain", 0.4, float(rng.uniform(0.05, 0.3)), seed_of(rng))
     things = [
         Thing("station", station, standing, STATION, surface),
@@ -108,7 +109,7 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     script = Script(
         things,
         view,
-        ("inspect_gap", TASK.format(gap=limit, hold=HOLD_S)),
+        ("inspect_gap", TASK.format(range=wording.format(limit), hold=HOLD_S)),
         ("inspector", "station"),
         truth,
         frames,

@@ -1,0 +1,57 @@
+"""Outlines that meet: what passes by is no contact, what comes to rest is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from visup.rules.coupling.contact import ContactSettings, OutlineContact, updated_contact
+
+SETTINGS = ContactSettings()
+LIMIT, DT = 10.0, 0.1
+
+speeds = st.lists(st.one_of(st.none(), st.floats(0, 40)), min_size=1, max_size=30)
+
+
+def seen(speeds: Sequence[float | None]) -> OutlineContact:
+    contact = None
+    for k, speed in enumerate(speeds):
+        contact = updated_contact(contact, speed, LIMIT, (k * DT, DT), SETTINGS)
+    assert contact is not None
+    return contact
+
+
+def test_what_comes_to_rest_at_another_settles() -> None:
+    assert seen([30.0, 20.0, 5.0, 1.0, 0.0]).settled_since is not None
+
+
+def test_what_passes_by_never_settles_and_its_path_grows() -> None:
+    contact = seen([30.0] * 10)
+    assert contact.settled_since is None
+    assert contact.path > 25.0
+
+
+def test_what_moves_on_has_settled_no_more() -> None:
+    assert seen([0.0] * 5 + [30.0]).settled_since is None
+
+
+def test_where_nothing_is_known_of_their_motion_it_settles_later() -> None:
+    assert seen([None] * 3).settled_since is None
+    assert seen([None] * 7).settled_since is not None
+
+
+@given(speeds)
+def test_nobody_settles_while_passing(told: list[float | None]) -> None:
+    contact = seen(told)
+    assert not (contact.passing and contact.settled_since is not None)
+    assert contact.path >= 0.0
+    assert contact.passing or contact.path == 0.0
+
+
+@given(speeds, st.floats(0.0, LIMIT))
+def test_rest_ends_every_passing(told: list[float | None], slow: float) -> None:
+    contact = seen([*told, slow, slow, slow])
+    assert contact.settled_since is not None
+    assert contact.path == 0.0
