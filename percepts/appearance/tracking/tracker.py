@@ -14,6 +14,7 @@ from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
 from visup.percepts.appearance.tracking.change import ChangeMap
 from visup.percepts.appearance.tracking.finding import (
+    SURE,
     ThingPlace,
     assigned,
     candidates,
@@ -209,6 +210,7 @@ def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTr
         looks=place.looks,
         rest=None,
         path=(),
+        proven=track.proven or place.match.score > SURE,
         peak=place.match.peak,
         explained=place.match.explained,
     )
