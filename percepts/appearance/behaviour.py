@@ -9,10 +9,11 @@ from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Per
 from visup.percepts.appearance.looks.scene import Scene, prepare_scene
 from visup.percepts.appearance.looks.thing_model import view_models
 from visup.percepts.appearance.output.explaining import shares, unexplained
-from visup.percepts.appearance.output.thing_region import confidence, thing_region
+from visup.percepts.appearance.output.thing_region import confidence, thing_outline, thing_region
 from visup.percepts.appearance.tracking.track import Blob, ThingTrack
 from visup.percepts.appearance.tracking.tracker import ThingTracker
 from visup.percepts.motion.behaviour import MotionBehaviour, image_is_sound, image_is_trusted
+from visup.percepts.motion.outlines.region_outline import RegionOutline
 from visup.percepts.taught.view import TaughtView
 
 SAME = 0.4  # overlap (IoU) at which what moves is a thing that is now known by name
@@ -36,6 +37,7 @@ class AppearanceBehaviour:
     ) -> None:
         self._motion = motion or MotionBehaviour()
         self._tracker = ThingTracker(view_models(taught))
+        self._drawn: dict[str, tuple[Blob, RegionOutline | None]] = {}
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
@@ -73,8 +75,8 @@ class AppearanceBehaviour:
         if not image_is_trusted(observation):
             return []
         before = None if last is None else last.time
-        seen = [(t, thing_region(t, scene, before)) for t in tracks]
-        things = [(t, r) for t, r in seen if r is not None]
+        seen = [(t, self._outline(t, scene)) for t in tracks]
+        things = [(t, thing_region(t, o, scene, before)) for t, o in seen if o is not None]
         known = {t.id for t in tracks}
         moving = [r for r in moving if r.id not in known]
         others = unexplained(moving, [r for _, r in things], frame.size)
@@ -83,6 +85,16 @@ class AppearanceBehaviour:
             *(self._percept(frame, "region", r, r.confidence) for r in regions),
             *(self._named(frame, t, r) for t, r in things),
         ]
+
+    def _outline(self, track: ThingTrack, scene: Scene) -> RegionOutline | None:
+        """What is seen of a thing; drawn anew only when that has changed."""
+        known = self._drawn.get(track.name)
+        if track.visible is None:
+            return None
+        if known is None or known[0] is not track.visible:
+            known = track.visible, thing_outline(track.visible, scene)
+            self._drawn[track.name] = known
+        return known[1]
 
     def _id_of(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:
         """The id of a thing seen for the first time: that of the region that was seen to move there."""

@@ -96,7 +96,9 @@ def fits(role: Role, models: Sequence[str], objects: Sequence[ObjectBelief]) -> 
         if isinstance(criterion, Ranked):
             fit = _ranked(criterion, fit, objects, known, role.playing.get(role.actor))
         elif isinstance(criterion, Conduct) and criterion.kind == "moves":
-            fit = _first_to_move(fit, known)
+            others = {i for a, i in role.playing.items() if a != role.actor}
+            free = [f * (o.id not in others) for f, o in zip(fit, objects, strict=True)]
+            fit = _first_to_move(free, known)
     return _answered(fit, role, objects)
 
 

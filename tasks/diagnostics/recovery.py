@@ -210,7 +210,7 @@ KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
     "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
-    "first", "rests", "from", "part", "of",
+    "first", "rests", "from", "part", "of", "the", "other",
 )  # fmt: skip
 
 

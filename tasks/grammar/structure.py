@@ -149,6 +149,11 @@ def with_taught_actors(
 ) -> dict[str, tuple[str, ...]]:
     """Actors as they were given, and those that are what was taught under their name.
 
+    An actor of which nothing is declared stands for the model of its own name anyway. One that is
+    declared to look like models which nobody has (`actor station is trex`, written for another
+    scene) is what was taught as `station`, where something was. One told by its colour, place or
+    conduct has no models, and stays as it is told.
+
     Args:
         tasks: All tasks of a run.
         given: Actor -> models, as the user bound them; it goes before everything else.
@@ -158,7 +163,8 @@ def with_taught_actors(
     actors = dict(given)
     for actor in dict.fromkeys(a for task in tasks for a in task_actors(task)):
         declared = {m for task in tasks if actor in task_actors(task) for m in task.models(actor)}
-        if actor not in actors and actor in taught and not declared & set(known):
+        unknown = bool(declared) and not declared & set(known)
+        if actor not in actors and actor in taught and unknown:
             actors[actor] = (actor,)
     return actors
 

@@ -12,6 +12,7 @@ from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer
 from visup.percepts.appearance.behaviour import AppearanceBehaviour
+from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
 from visup.percepts.health import HealthBehaviour
@@ -29,6 +30,7 @@ from visup.runs.settings import WatchSettings
 from visup.runs.zones import load_ground, load_zones
 from visup.tasks import load_tasks
 from visup.tasks.casting.fitness import asks_for_colour, asks_for_traits
+from visup.tasks.grammar.criteria import Place
 from visup.tasks.grammar.structure import (
     declared_sizes,
     needs_ground,
@@ -89,7 +91,7 @@ def build_agent(
     known, taught = _names(database)
     actors = with_taught_actors(tasks, settings.actors, known, taught)
     behaviours = [
-        *_behaviours(settings, database, declared_sizes(tasks, actors)),
+        *_behaviours(settings, database, declared_sizes(tasks, actors), _places(tasks)),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
         *also,
     ]
@@ -188,10 +190,15 @@ def _limits(settings: WatchSettings, live: bool) -> Limits:
 
 
 def _behaviours(
-    settings: WatchSettings, database: ModelDatabase | None, sizes_m: Mapping[str, float]
+    settings: WatchSettings,
+    database: ModelDatabase | None,
+    sizes_m: Mapping[str, float],
+    places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
     taught = database.taught if database is not None else ()
-    moving = AppearanceBehaviour(taught) if taught else MotionBehaviour()
+    moving: Behaviour = AppearanceBehaviour(taught) if taught else MotionBehaviour()
+    if places:
+        moving = PlacedBehaviour(places, taught)
     seeing: list[Behaviour] = [HealthBehaviour(), moving]
     if database is not None:
         seeing += [
@@ -199,6 +206,17 @@ def _behaviours(
             DepthBehaviour(database, settings.fov_vertical_deg, sizes_m),
         ]
     return [*seeing, *user_behaviours(settings)]
+
+
+def _places(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
+    """Actors that are told by their place, and by no model: where they are in the first picture."""
+    return {
+        a.name: c.at
+        for t in tasks
+        for a in t.actors
+        for c in a.criteria
+        if isinstance(c, Place) and not a.models
+    }
 
 
 def _rules(settings: WatchSettings) -> tuple[Rule, ...]:

@@ -11,31 +11,33 @@ from visup.agent import Region
 from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.tracking.track import Blob, State, ThingTrack
-from visup.percepts.motion.outlines.region_outline import describe_mask
+from visup.percepts.motion.outlines.region_outline import RegionOutline, describe_mask
 
 OVER_S = 0.2  # over which a velocity is taken, seconds
 JITTER_PX = 0.5  # working pixels by which a pose is off
 LEAST_SIGMA = 0.5  # pixels per second
 
 
-def thing_region(track: ThingTrack, scene: Scene, last: float | None) -> Region | None:
+def thing_outline(blob: Blob, scene: Scene) -> RegionOutline | None:
+    """A blob of the working picture in frame pixels; None when nothing is left of it."""
+    mask, origin = _enlarged(blob, scene)
+    return describe_mask(mask, origin, scene.frame_size) if mask.any() else None
+
+
+def thing_region(
+    track: ThingTrack, shape: RegionOutline, scene: Scene, last: float | None
+) -> Region:
     """What is reported of a thing in a frame.
 
     Args:
         track: The thing.
+        shape: What is seen of it.
         scene: The frame.
         last: Time of the frame before, seconds; None when there was none.
 
     Returns:
-        Its region in frame pixels, None when nothing of it is seen.
+        Its region in frame pixels.
     """
-    if track.visible is None:
-        return None
-    size = scene.frame_size
-    mask, origin = _enlarged(track.visible, scene)
-    if not mask.any():
-        return None
-    shape = describe_mask(mask, origin, size)
     velocity, sigma = _velocity(track, scene.scale, shape.centroid)
     region = shape.region(track.id, velocity, sigma, confidence(track))
     return replace(region, motion=_motion(track, scene.scale, last), visible_since=track.since)

@@ -15,6 +15,7 @@ from visup.percepts.appearance.looks.thing_model import Appearance
 from visup.percepts.appearance.tracking.verification import OWN, Match, verify
 
 Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 
 COARSE = 13.0  # side of a thing when the whole picture is searched, pixels
 _MOST = 6  # places that are looked at closely
@@ -22,7 +23,11 @@ _EACH = 3  # of one size and turn
 
 
 def search(
-    scene: Scene, it: Appearance, poses: Sequence[PatchPose], most: int = _MOST
+    scene: Scene,
+    it: Appearance,
+    poses: Sequence[PatchPose],
+    most: int = _MOST,
+    where: Mask | None = None,
 ) -> list[Match]:
     """The places that look most like a thing.
 
@@ -31,11 +36,12 @@ def search(
         it: What the thing looks like.
         poses: Sizes and turns to try; where they are does not matter.
         most: Places that are looked at closely.
+        where: (h, w) bool, of any size: parts of the picture in which the thing's middle may lie.
 
     Returns:
         The best first.
     """
-    found = [c for p in poses for c in _coarse(scene, it, p)]
+    found = [c for p in poses for c in _coarse(scene, it, p, where)]
     found.sort(key=lambda c: c[0])
     places: list[PatchPose] = []
     for _, pose in found:
@@ -45,13 +51,16 @@ def search(
     return sorted(matches, key=lambda m: -m.score)
 
 
-def colour_peaks(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[float, PatchPose]]:
+def colour_peaks(
+    scene: Scene, it: Appearance, pose: PatchPose, where: Mask | None = None
+) -> list[tuple[float, PatchPose]]:
     """Where a thing's colours are gathered, whatever its shape: for what has bent or turned.
 
     Args:
         scene: The frame.
         it: What the thing looked like.
         pose: Its size and turn; where it is does not matter.
+        where: (h, w) bool, of any size: parts of the picture in which the thing's middle may lie.
 
     Returns:
         The two best places: how much more of its colours they have than what is around, and the pose.
@@ -64,6 +73,8 @@ def colour_peaks(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[fl
     at, inside, around = _gathering(it, pose, small)
     off = own.mean()
     more = cv2.filter2D(own - off, -1, inside - around, borderType=cv2.BORDER_CONSTANT)
+    if where is not None:
+        more[~_middles(where, size, more.shape, at)] = -1
     reach = max(2, round(0.6 * COARSE))
     out = []
     for _ in range(2):
@@ -94,7 +105,9 @@ def _alike(a: PatchPose, b: PatchPose, radius: float) -> bool:
     return near and abs(a.angle - b.angle) < 0.3 and 0.8 < a.scale / b.scale < 1.25
 
 
-def _coarse(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[float, PatchPose]]:
+def _coarse(
+    scene: Scene, it: Appearance, pose: PatchPose, where: Mask | None
+) -> list[tuple[float, PatchPose]]:
     """Places of one size and turn by colour alone: (mean squared difference, pose)."""
     side = float(np.sqrt(it.mask.sum())) * pose.scale
     small = min(1.0, COARSE / side)
@@ -108,14 +121,28 @@ def _coarse(scene: Scene, it: Appearance, pose: PatchPose) -> list[tuple[float, 
     count = float(mask.sum())
     off = cv2.matchTemplate(picture, template, cv2.TM_SQDIFF, mask=np.repeat(mask[..., None], 3, 2))
     off = np.nan_to_num(off / np.float32(3 * max(count, 1.0)), nan=1e6, posinf=1e6)
+    if where is not None:
+        off[~_middles(where, size, off.shape, middle)] = 1e6
     out = []
     for _ in range(_EACH):
         y, x = divmod(int(off.argmin()), off.shape[1])
         value = float(off[y, x])
+        if value >= 1e6:
+            break
         at = (x + middle[0] + 0.5) / small - 0.5, (y + middle[1] + 0.5) / small - 0.5
         out.append((value, PatchPose(at[0], at[1], pose.scale, pose.angle)))
         off[max(0, y - h // 3) : y + h // 3 + 1, max(0, x - w // 3) : x + w // 3 + 1] = 1e6
     return out
+
+
+def _middles(
+    where: Mask, size: tuple[int, int], shape: tuple[int, ...], middle: tuple[float, float]
+) -> Mask:
+    """(h, w) bool: corners of a template for which its middle lies in a part of the picture."""
+    small = cv2.resize(where.view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    ys = np.clip(np.arange(shape[0]) + round(middle[1]), 0, size[1] - 1)
+    xs = np.clip(np.arange(shape[1]) + round(middle[0]), 0, size[0] - 1)
+    return np.asarray(small[np.ix_(ys, xs)] > 0)
 
 
 def _small_template(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.pose import PatchPose, paint, window_of
 from visup.percepts.appearance.looks.scene import Scene
@@ -18,6 +19,7 @@ SURE = 0.6  # score that no other thing is seen to reach
 FAIR, APART = 0.42, 1.5  # score that will do where no other place has a share of it
 GATHERED = 0.45  # how much more of its colours a place must have than what is around
 NOISE = 0.15  # score that any place may have
+MOVING_FAIR, MOVING_APART = 0.45, 1.2  # the same among places that have changed of late
 AT_HOME = 0.1  # how much the place where a thing was taught speaks for it
 RECENT_SIZES = (0.85, 1.0, 1.18)
 SIZES = (0.75, 0.87, 1.0, 1.15, 1.32)
@@ -65,6 +67,27 @@ def candidates(scene: Scene, view: ViewModel, number: int) -> list[ThingPlace]:
     ]
 
 
+def moving_places(
+    scene: Scene, view: ViewModel, number: int, where: NDArray[np.bool_]
+) -> list[ThingPlace]:
+    """Places that have changed of late and look like a thing: more so than all else that moves.
+
+    Args:
+        scene: The frame.
+        view: What the thing looked like when it was taught.
+        number: Of the view.
+        where: (h, w) bool, of any size: what has changed of late.
+    """
+    it = view.appearance
+    unit = view.pose.scale * max(scene.size) / max(view.size)
+    poses = [PatchPose(0, 0, unit * s) for s in SIZES] + [PatchPose(0, 0, unit, a) for a in TURNS]
+    found = search(scene, it, poses, where=where)
+    fine = [m for m in _outstanding(found, it, MOVING_APART) if m.score > MOVING_FAIR]
+    if not fine:
+        fine = _gathered(scene, it, PatchPose(0, 0, unit), where)
+    return [ThingPlace(view.name, number, it, m, m.score) for m in fine]
+
+
 def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
     """Places that look like a thing did when it was last seen.
 
@@ -82,23 +105,25 @@ def lost_places(scene: Scene, track: ThingTrack) -> list[ThingPlace]:
     return [ThingPlace(track.name, track.number, it, m, m.score) for m in found]
 
 
-def _gathered(scene: Scene, it: Appearance, last: PatchPose) -> list[Match]:
+def _gathered(
+    scene: Scene, it: Appearance, last: PatchPose, where: NDArray[np.bool_] | None = None
+) -> list[Match]:
     """The one place where a thing's colours are gathered, if there is just one."""
-    (most, pose), (second, _) = colour_peaks(scene, it, last)
+    (most, pose), (second, _) = colour_peaks(scene, it, last, where)
     if most < GATHERED or second > most / APART:
         return []
     share = min(1.0, most)
     return [Match(pose, share, share)]
 
 
-def _outstanding(matches: Sequence[Match], it: Appearance) -> list[Match]:
+def _outstanding(matches: Sequence[Match], it: Appearance, apart: float = APART) -> list[Match]:
     """Those that look like a thing, and not only a little more so than other places do."""
     if not matches:
         return []
     top = max(matches, key=lambda m: m.score).pose
     away = [m.score for m in matches if m.pose.apart(top, 0) > it.radius * top.scale]
     rival = max([*away, NOISE])
-    return [m for m in matches if m.score > SURE or (m.score > FAIR and m.score > APART * rival)]
+    return [m for m in matches if m.score > SURE or (m.score > FAIR and m.score > apart * rival)]
 
 
 def assigned(

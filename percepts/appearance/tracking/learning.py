@@ -18,6 +18,7 @@ Floats = NDArray[np.float32]
 SURE_PEAK, SURE_SHARE = 0.4, 0.5  # below these one does not learn: it may be something else
 SURE_COLOURS = 0.35
 GROW_RATE, SHRINK_RATE = 0.08, 0.05
+ANCHOR = np.float32(0.02)
 PIXEL_RATE, FILTER_RATE = 0.12, 0.04
 COLOUR_RATE, AROUND_RATE = 0.02, 0.1
 PATH_S = 0.4
@@ -26,7 +27,7 @@ STILL_PX, STILL_SHARE = 0.6, 0.01  # what a thing at rest may seem to move, and 
 
 
 def learned(
-    track: ThingTrack, scene: Scene, claim: tuple[Window, Floats], blob: Blob
+    track: ThingTrack, scene: Scene, claim: tuple[Window, Floats], blob: Blob, taught: Appearance
 ) -> ThingTrack:
     """A thing with how it looks now.
 
@@ -35,6 +36,7 @@ def learned(
         scene: The frame.
         claim: Its window and log odds before others had their share.
         blob: The pixels that it won.
+        taught: The view that it looks like.
     """
     it, pose = track.looks, track.pose
     sure = track.peak >= SURE_PEAK and track.explained >= SURE_SHARE
@@ -45,7 +47,9 @@ def learned(
     # What another thing has won tells nothing of the shape.
     taken = _in_patch(claim[0], claim[1] > 0, track, scene) - seen
     rate = np.where(seen > it.mask, GROW_RATE, SHRINK_RATE) * np.clip(1 - taken, 0, 1)
-    mask = (it.mask + rate * (seen - it.mask)).astype(np.float32)
+    # Its shape is drawn back to that which was taught, or it would spread over what it touches.
+    back = ANCHOR * (taught.mask - it.mask)
+    mask = (it.mask + rate * (seen - it.mask) + back).astype(np.float32)
     share = (np.float32(PIXEL_RATE) * seen)[..., None]
     pixels = np.round(it.lab + share * (lab.astype(np.float32) - it.lab)).astype(np.uint8)
     now = learn_colours(lab, seen * it.mask, surroundings(np.maximum(it.mask, seen)))

@@ -16,6 +16,7 @@ from visup.percepts.appearance.tracking.verification import Match, verify
 
 MOVING_S, RESTING_S = 0.3, 2.0  # between two comparisons
 BETTER = 0.15  # score by which another place must look more like what was taught
+DOUBTFUL = 0.4  # score at rest below which what was never beyond doubt is not believed
 REACH = 2.5  # how far it may be, of the thing's radius
 SIZES = (0.8, 1.0, 1.25)
 
@@ -44,13 +45,17 @@ def recalled(
     number, best = max(known, key=lambda found: found[1].score)
     near = best.pose.apart(pose, it.radius) < it.radius * pose.scale
     if best.score > SURE and near:
+        track = replace(track, proven=True)
         return _as_taught(track, number, best, views, scene) if _strayed(track, best) else track
     number, best = _elsewhere(track, number, best, views, scene)
     taught = views[number].appearance
     blob = footprint(scene, best.pose, taught)
+    if best.score < DOUBTFUL and track.state is State.RESTING and not track.proven:
+        # It was taken for the thing when it moved; at rest it does not look like it.
+        return replace(track, state=State.ABSENT, visible=None, rest=None, path=())
     if best.score <= SURE or blob is None or any(overlap(blob, o) > 0.5 for o in others):
         return track
-    return _as_taught(track, number, best, views, scene)
+    return replace(_as_taught(track, number, best, views, scene), proven=True)
 
 
 def _strayed(track: ThingTrack, best: Match) -> bool:

@@ -25,7 +25,9 @@ Claim = tuple[Window, Floats]
 _SHAPE = np.float32(3.0)  # log odds of a pixel well within a thing, or well outside
 _COLOUR = np.float32(2.0)  # most that a colour says
 _LIKE, _UNLIKE = np.float32(1.0), np.float32(-1.5)  # of a pixel that looks as the template wants
-_SOFT = 2.5  # how far a thing's outline may be off, pixels of its patch
+_INNER = np.float32(4.0)  # pixels of a patch from the outline, beyond which one is well in or out
+_LIMB = 11.0  # how far a limb may reach beyond the outline
+_UNLIKE_ALL = 2.5  # log odds of a colour that is the thing's alone
 _CHANGED = 14, 7  # steps of lightness and of colour by which a pixel at rest may differ
 # What looks as it did, to the pixel, is nothing that has come in front.
 _KEPT, _LOST = np.float32(5.0), np.float32(-2.0)
@@ -47,12 +49,26 @@ def thing_scores(scene: Scene, pose: PatchPose, looks: Appearance) -> Claim | No
     if window is None:
         return None
     lab = scene.patch(pose, looks.shape)
-    shape = cv2.GaussianBlur(looks.mask, (0, 0), _SOFT)
-    score = np.clip((shape - np.float32(0.5)) * 2 * _SHAPE * np.float32(1.3), -_SHAPE, _SHAPE)
-    score += np.clip(looks.colours.odds(colour_bins(lab)), -_COLOUR, _COLOUR)
+    odds = looks.colours.odds(colour_bins(lab))
+    score = _shape_odds(looks.mask, odds) + np.clip(odds, -_COLOUR, _COLOUR)
     like, _ = explained_pixels(template_of(looks.lab, looks.mask), lab)
     score += np.where(like, _LIKE, _UNLIKE) * np.clip(looks.mask * 2 - 1, 0, 1)
     return window, np.asarray(paint(score, pose, window, float(NOWHERE)), dtype=np.float32)
+
+
+def _shape_odds(mask: Floats, colours: Floats) -> Floats:
+    """(h, w) float32: log odds of a pixel from how far within or without the outline it lies.
+
+    Limbs move: a colour that nothing else around has may carry the outline outwards.
+    """
+    thing = (mask > 0.5).view(np.uint8)
+    if not thing.any():
+        return np.full(mask.shape, -_SHAPE)
+    within = cv2.distanceTransform(thing, cv2.DIST_L2, 3)
+    without = cv2.distanceTransform(np.uint8(1) - thing, cv2.DIST_L2, 3)
+    depth = np.minimum(within, _INNER) / _INNER - np.minimum(without, _INNER) / _INNER
+    limb = (colours > _UNLIKE_ALL) & (without > 0) & (without < _LIMB)
+    return np.where(limb, np.maximum(depth * _SHAPE, -0.5 * _COLOUR), depth * _SHAPE)
 
 
 def rest_scores(rest: RestMemory, same: Mask) -> Claim:
@@ -87,7 +103,7 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
         size: (width, height) of the picture.
 
     Returns:
-        For each thing what it shows, None where nothing is left.
+        For each thing what it shows, specks and all; None where nothing is left.
     """
     best = np.zeros(size[::-1], dtype=np.float32)
     for claim in claims:
@@ -102,11 +118,11 @@ def compete(claims: Sequence[Claim | None], size: tuple[int, int]) -> list[Blob 
             continue
         left, top, right, bottom = claim[0]
         mask = (claim[1] > 0) & (claim[1] >= best[top:bottom, left:right])
-        out.append(_cleaned(Blob(claim[0], mask)))
+        out.append(Blob(claim[0], mask) if mask.any() else None)
     return out
 
 
-def _cleaned(blob: Blob) -> Blob | None:
+def cleaned(blob: Blob) -> Blob | None:
     """Without specks."""
     mask = blob.mask.view(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)

@@ -76,6 +76,7 @@ class ThingTrack:
         colours: How much more of its colours it showed than what is around it.
         seen: When it was last seen, seconds.
         since: When it was first seen, seconds.
+        proven: Whether it has looked beyond doubt as it was taught.
         asked: When the whole picture was last searched for it, seconds.
     """
 
@@ -93,4 +94,5 @@ class ThingTrack:
     colours: float = 0.0
     seen: float = -np.inf
     since: float = 0.0
+    proven: bool = False
     asked: float = -np.inf

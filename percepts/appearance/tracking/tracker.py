@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
+from visup.percepts.appearance.tracking.change import ChangeMap
 from visup.percepts.appearance.tracking.finding import (
+    SURE,
     ThingPlace,
     assigned,
     candidates,
     lost_places,
+    moving_places,
 )
 from visup.percepts.appearance.tracking.following import (
     AS_IT_WAS,
@@ -35,6 +38,7 @@ from visup.percepts.appearance.tracking.points import (
 from visup.percepts.appearance.tracking.recalling import recalled
 from visup.percepts.appearance.tracking.segmentation import (
     Claim,
+    cleaned,
     compete,
     rest_scores,
     thing_scores,
@@ -68,8 +72,10 @@ class ThingTracker:
         names = dict.fromkeys(v.name for v in views)
         self.tracks = tuple(ThingTrack(n, self._numbers(n)[0]) for n in names)
         self.scene: Scene | None = None
+        self._change = ChangeMap()
         self._count = 0
         self._static = True
+        self._camera = STILL
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far."""
@@ -96,7 +102,9 @@ class ThingTracker:
             same = {t.name: unchanged(scene, t.rest) for t in self.tracks if t.rest is not None}
             self._follow(old, scene, same)
         else:
+            self._camera = STILL
             self.tracks = tuple(_forgotten(t) for t in self.tracks)
+        self._change.update(scene, self._camera)
         self._find(scene)
         self._share_pixels(scene, same)
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
@@ -120,7 +128,8 @@ class ThingTracker:
             moved = self._followed_points(old, scene, calm if self._static else set())
         camera = camera_motion(moved)
         self._static = camera is STILL
-        motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count, same)
+        self._camera = STILL if camera is None else camera
+        motion = FrameMotion(scene, self._camera, moved, self._count, same)
         tracks = [followed(t, k, motion) for k, t in enumerate(self.tracks)]
         for k, t in enumerate(tracks):
             if t.state in IN_VIEW and t.seen == scene.time:
@@ -151,6 +160,14 @@ class ThingTracker:
             for c in candidates(scene, view, number)
         ]
         found += [c for t in due for c in lost_places(scene, t)]
+        lately = self._change.lately(scene)
+        if lately is not None:
+            found += [
+                c
+                for number, view in enumerate(self.views)
+                if view.name in names - {f.name for f in found}
+                for c in moving_places(scene, view, number, lately)
+            ]
         taken = [t.visible for t in self.tracks if t.state in IN_VIEW and t.visible is not None]
         placed = assigned(scene, found, taken)
         asked = (replace(t, asked=scene.time) if t.name in names else t for t in self.tracks)
@@ -169,14 +186,17 @@ class ThingTracker:
         pose, it, rest = track.pose, track.looks, track.rest
         if claim is None or blob is None or pose is None or it is None:
             return replace(track, visible=None)
-        if blob.area < LEAST_SEEN * it.area * pose.scale**2:
+        resting = track.state is State.RESTING
+        if resting and rest is not None and np.array_equal(blob.mask, rest.blob.mask):
+            return track if track.visible is rest.blob else replace(track, visible=rest.blob)
+        blob = cleaned(blob)
+        if blob is None or blob.area < LEAST_SEEN * it.area * pose.scale**2:
             return replace(track, visible=None)
-        if track.state is State.RESTING:
-            as_it_was = rest is not None and np.array_equal(blob.mask, rest.blob.mask)
-            return replace(track, visible=rest.blob if rest and as_it_was else blob)
+        if resting:
+            return replace(track, visible=blob)
         track = replace(track, visible=blob)
         if self._count % 2:
-            track = learned(track, scene, claim, blob)
+            track = learned(track, scene, claim, blob, self.views[track.number].appearance)
         return rested(track, scene, self._count == 1) if self._static else track
 
 
@@ -190,6 +210,7 @@ def _found(track: ThingTrack, place: ThingPlace | None, scene: Scene) -> ThingTr
         looks=place.looks,
         rest=None,
         path=(),
+        proven=track.proven or place.match.score > SURE,
         peak=place.match.peak,
         explained=place.match.explained,
     )

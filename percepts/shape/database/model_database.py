@@ -198,15 +198,16 @@ class ModelDatabase:
         write_more(self.path, views)
         return ModelDatabase.open(self.path)
 
-    def teach(self, views: Iterable[TaughtView], *, silhouettes: bool = True) -> ModelDatabase:
+    def teach(self, views: Iterable[TaughtView], *, silhouettes: bool = False) -> ModelDatabase:
         """Add what was taught, all of it or nothing; the database as it is then.
 
         A view that is there already is not added once more.
 
         Args:
             views: Of things new or known.
-            silhouettes: Whether each outline is kept as a view of a silhouette besides, with its shock
-                graph.
+            silhouettes: Whether each outline is stored as a view of a silhouette besides, with its shock
+                graph. Not unless told: what was taught is recognised by its appearance, and by
+                shape alone things that look alike lend each other votes, and fragments take names.
 
         Raises:
             DatabaseError: The file cannot be written, or a view is too large; it stays as it was.

@@ -14,9 +14,10 @@ import pytest
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.machines.clips import read_brief, read_truth
+from visup.evaluation.machines.clips import clip_folders, read_brief, read_truth
 from visup.render.worlds.frames import WorldRenderer
 from visup.render.worlds.kinds.catalogue import KINDS, random_world
+from visup.render.worlds.lesson import lesson
 from visup.render.worlds.world import FPS, World
 from visup.render.worlds.writer import write_world
 from visup.tasks import load_tasks
@@ -96,12 +97,13 @@ def test_masks_hold_labels_alone_and_none_that_means_unscored(folder: Path) -> N
 
 
 def test_outlines_lie_in_the_picture_and_on_their_thing(folder: Path) -> None:
-    truth, seen = read(folder / "truth.json"), masks(folder)
+    truth = read(folder / "truth.json")
     for actor, shown in read(folder / "brief.json")["teach"].items():
         corners = np.array(shown["polygon"])
         assert (corners >= 0).all()
         assert (corners < SMALL).all()
         drawn = cv2.fillPoly(np.zeros(SMALL[::-1], np.uint8), [corners], 1) > 0
+        seen = masks(folder.parent / shown["clip"])
         thing = seen[shown["frame"]] == truth["labels"][truth["roles"][actor]]
         assert np.count_nonzero(drawn & thing) > 0.5 * np.count_nonzero(drawn)
 
@@ -130,6 +132,17 @@ def test_every_stage_of_the_truth_is_in_the_task_file(kind: str) -> None:
     for way in KINDS[kind].outcomes:
         world = random_world(kind, 7, way)
         assert all(f"<{s.stage}>" in world.task_text for s in world.course.stages)
+
+
+def test_things_may_be_shown_on_another_day(tmp_path: Path) -> None:
+    worlds = (small(random_world("conveyor", seed, "ok")) for seed in range(20))
+    world = next(w for w in worlds if lesson(w) is not None)
+    write_world(replace(world, size=(240, 180)), tmp_path / "w")
+    taught = read(tmp_path / "w" / "brief.json")["teach"]
+    assert {shown["clip"] for shown in taught.values()} == {"w-shown"}
+    frames = masks(tmp_path / "w-shown")
+    assert len(frames) == len(taught)
+    assert len(clip_folders(tmp_path)) == 1
 
 
 def test_what_does_not_exist_is_refused() -> None:

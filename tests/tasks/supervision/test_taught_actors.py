@@ -39,6 +39,8 @@ def database(tmp_path: Path) -> ModelDatabase:
         ("actor station is station", {}, {}),
         ("actor station is trex", {"station": ("hubble",)}, {"station": ("hubble",)}),
         ("actor station size 2 m", {}, {}),
+        ("actor station is red", {}, {}),
+        ("actor station at (410, 160)", {}, {}),
         (
             "actor station is trex\nactor inspector is helicopter",
             {},

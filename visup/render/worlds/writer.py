@@ -16,10 +16,13 @@ from visup.agent.model.errors import OutputError
 from visup.render.output.truth import frame_truth
 from visup.render.output.writer import ClipWriter
 from visup.render.worlds.frames import WorldRenderer
+from visup.render.worlds.lesson import lesson
 from visup.render.worlds.truth import outline, well_seen, world_brief, world_truth
 from visup.render.worlds.world import FPS, World
 
 Masks = list[NDArray[np.uint8]]
+LEAST_PX = 60
+"""A thing of which less shows in another clip is shown in the clip itself."""
 
 
 def write_world(
@@ -30,7 +33,7 @@ def write_world(
     Args:
         world: What to render.
         out: Folder, new or empty: ``video.mp4``, ``masks/00000.png``, the task file, ``brief.json``,
-            ``truth.json``.
+            ``truth.json``. The clip in which things are shown, if it is another, goes beside it.
         progress: Told frames done and frames in all.
 
     Returns:
@@ -48,30 +51,52 @@ def write_world(
         for index in range(world.frames):
             picture = renderer.picture(index)
             video.write(picture.image)
-            _write(
-                out / "masks" / f"{index:05d}.png", cv2.imencode(".png", picture.mask)[1].tobytes()
-            )
+            _write_mask(out, index, picture.mask)
             frames.append(frame_truth(picture, world.labels))
             masks.append(picture.mask)
             if progress is not None:
                 progress(index + 1, world.frames)
     truth = world_truth(world, frames)
-    brief = world_brief(world, _teach(world, frames, masks))
+    brief = world_brief(world, _teach(world, out, frames, masks))
     _write(out / f"{world.task}.task", world.task_text.encode())
     _write(out / "truth.json", json.dumps(truth).encode())
     _write(out / "brief.json", (json.dumps(brief) + "\n").encode())
     return truth
 
 
-def _teach(world: World, frames: list[dict[str, Any]], masks: Masks) -> dict[str, Any]:
+def _teach(world: World, out: Path, frames: list[dict[str, Any]], masks: Masks) -> dict[str, Any]:
     """For each actor the clip, the frame and the outline that a user would draw."""
-    rng = np.random.default_rng([world.seed, 1])
-    teach = {}
-    for actor, name in world.actors.items():
-        at = well_seen(name, frames, world.size)
-        polygon = outline(masks[at] == world.labels[name], rng)
-        teach[actor] = {"clip": world.name, "frame": at, "polygon": polygon}
-    return teach
+    best = {a: well_seen(name, frames, world.size) for a, name in world.actors.items()}
+    teach = {a: _shown(world, a, at, masks[at]) for a, at in best.items()}
+    other = lesson(world)
+    return teach if other is None else _lesson(other, out, best) or teach
+
+
+def _shown(world: World, actor: str, at: int, mask: NDArray[np.uint8]) -> dict[str, Any]:
+    label = world.labels[world.actors[actor]]
+    rng = np.random.default_rng([world.seed, 1, label])
+    return {"clip": world.name, "frame": at, "polygon": outline(mask == label, rng)}
+
+
+def _lesson(world: World, out: Path, best: dict[str, int]) -> dict[str, Any]:
+    """Write a clip of those frames alone in which things are well seen; nothing if one of them is not."""
+    renderer = WorldRenderer(world)
+    pictures = [renderer.picture(at) for at in best.values()]
+    pairs = list(zip(best, pictures, strict=True))
+    labels = {actor: world.labels[name] for actor, name in world.actors.items()}
+    if any(np.count_nonzero(p.mask == labels[a]) < LEAST_PX for a, p in pairs):
+        return {}
+    folder = out.resolve().parent / world.name
+    _make_folder(folder)
+    with ClipWriter(folder / "video.mp4", FPS, world.size) as video:
+        for index, picture in enumerate(pictures):
+            video.write(picture.image)
+            _write_mask(folder, index, picture.mask)
+    return {a: _shown(world, a, index, p.mask) for index, (a, p) in enumerate(pairs)}
+
+
+def _write_mask(folder: Path, index: int, mask: NDArray[np.uint8]) -> None:
+    _write(folder / "masks" / f"{index:05d}.png", cv2.imencode(".png", mask)[1].tobytes())
 
 
 def _make_folder(out: Path) -> None:

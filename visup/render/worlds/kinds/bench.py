@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
-from visup.render.worlds import clutter
 from visup.render.worlds.kinds.kind import (
     Script,
     cut_short,
@@ -20,14 +19,15 @@ from visup.render.worlds.kinds.kind import (
     spans,
 )
 from visup.render.worlds.motion import carried, clock, dropped, eased, frame_at, posed, still
-from visup.render.worlds.robot import (
+from visup.render.worlds.things import clutter
+from visup.render.worlds.things.robot import (
     RobotCourse,
     RobotDesign,
     hand_poses,
     random_robot,
     robot_things,
 )
-from visup.render.worlds.scenery import pick_colour, seed_of, tabletop, unlike
+from visup.render.worlds.things.scenery import pick_colour, seed_of, tabletop, unlike
 from visup.render.worlds.viewpoint import shows
 from visup.render.worlds.world import (
     SIZE,

@@ -17,9 +17,9 @@ from visup.render.worlds.kinds.kind import (
     random_view,
     spans,
 )
-from visup.render.worlds.machines import BLACK, GLASS, STEEL
 from visup.render.worlds.motion import along, bend, clock, cruised, eased, posed, still
-from visup.render.worlds.scenery import pick_colour, seed_of, unlike
+from visup.render.worlds.things.machines import BLACK, GLASS, STEEL
+from visup.render.worlds.things.scenery import pick_colour, seed_of, unlike
 from visup.render.worlds.water import random_waves
 from visup.render.worlds.world import Contact, Course, Motion, Poses, Surface, Thing, Water, World
 

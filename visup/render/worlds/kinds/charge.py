@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.render.worlds import clutter, machines
 from visup.render.worlds.kinds.kind import (
     Script,
     cut_short,
@@ -17,7 +16,8 @@ from visup.render.worlds.kinds.kind import (
     spans,
 )
 from visup.render.worlds.motion import along, bend, clock, cruised, eased, frame_at, posed
-from visup.render.worlds.scenery import (
+from visup.render.worlds.things import clutter, machines
+from visup.render.worlds.things.scenery import (
     hall,
     meadow,
     pick_colour,

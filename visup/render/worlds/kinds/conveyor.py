@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
-from visup.render.worlds import clutter
 from visup.render.worlds.kinds.kind import (
     Script,
     cut_short,
@@ -18,9 +17,10 @@ from visup.render.worlds.kinds.kind import (
     random_view,
     spans,
 )
-from visup.render.worlds.machines import BLACK, STEEL
 from visup.render.worlds.motion import clock, cruised, dropped, frame_at, posed, still
-from visup.render.worlds.scenery import floor, pick_colour, seed_of, unlike, wall
+from visup.render.worlds.things import clutter
+from visup.render.worlds.things.machines import BLACK, STEEL
+from visup.render.worlds.things.scenery import floor, pick_colour, seed_of, unlike, wall
 from visup.render.worlds.world import Contact, Course, Motion, Poses, Surface, Thing, World
 
 OUTCOMES = ("ok", "falls_off", "jams", "in_progress")

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
-from visup.render.worlds import clutter, machines
 from visup.render.worlds.kinds.kind import (
     Script,
     cut_short,
@@ -19,7 +18,8 @@ from visup.render.worlds.kinds.kind import (
     spans,
 )
 from visup.render.worlds.motion import along, bend, clock, cruised, frame_at, posed
-from visup.render.worlds.scenery import hall, meadow, pick_colour, seed_of, unlike
+from visup.render.worlds.things import clutter, machines
+from visup.render.worlds.things.scenery import hall, meadow, pick_colour, seed_of, unlike
 from visup.render.worlds.viewpoint import shows
 from visup.render.worlds.world import (
     SIZE,

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
-from visup.render.worlds import clutter
 from visup.render.worlds.kinds.kind import (
     Script,
     cut_short,
@@ -19,14 +18,15 @@ from visup.render.worlds.kinds.kind import (
     spans,
 )
 from visup.render.worlds.motion import carried, clock, dropped, eased, frame_at, posed
-from visup.render.worlds.robot import (
+from visup.render.worlds.things import clutter
+from visup.render.worlds.things.robot import (
     RobotCourse,
     RobotDesign,
     hand_poses,
     random_robot,
     robot_things,
 )
-from visup.render.worlds.scenery import pick_colour, seed_of, tabletop, unlike
+from visup.render.worlds.things.scenery import pick_colour, seed_of, tabletop, unlike
 from visup.render.worlds.world import Contact, Course, Motion, Poses, Surface, Thing, World
 
 OUTCOMES = ("ok", "drop", "never", "in_progress")

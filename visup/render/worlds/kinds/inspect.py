@@ -11,10 +11,10 @@ from scipy.spatial.distance import cdist
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
 from visup.render.meshes.spacecraft import mesh
-from visup.render.worlds import clutter, machines
 from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, spans
 from visup.render.worlds.motion import clock, dropped, eased, frame_at, posed, still
-from visup.render.worlds.scenery import (
+from visup.render.worlds.things import clutter, machines
+from visup.render.worlds.things.scenery import (
     hall,
     meadow,
     pick_colour,

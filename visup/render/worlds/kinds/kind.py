@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from visup.render.worlds.scenery import random_heaven, random_imager, random_light, seed_of
+from visup.render.worlds.things.scenery import random_heaven, random_imager, random_light, seed_of
 from visup.render.worlds.viewpoint import disturbed, steady
 from visup.render.worlds.world import FPS, Course, StageSpan, Thing, Viewpoint, Water, World
 

@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.render.meshes.solids import Colour, Solid, box, join, lathe
-from visup.render.worlds import clutter
 from visup.render.worlds.kinds import pick_tasks
 from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, random_view
 from visup.render.worlds.motion import carried, clock, dropped, eased, frame_at, posed, still
-from visup.render.worlds.robot import (
+from visup.render.worlds.things import clutter
+from visup.render.worlds.things.robot import (
     RobotCourse,
     RobotDesign,
     hand_poses,
     random_robot,
     robot_things,
 )
-from visup.render.worlds.scenery import (
+from visup.render.worlds.things.scenery import (
     pick_colour,
     seed_of,
     tabletop,

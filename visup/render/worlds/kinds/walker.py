@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.meshes.solids import Colour, Solid, ball, box, cone, join
-from visup.render.worlds import clutter
 from visup.render.worlds.kinds.kind import (
     Script,
     cut_short,
@@ -17,9 +16,10 @@ from visup.render.worlds.kinds.kind import (
     from_around,
     spans,
 )
-from visup.render.worlds.machines import BLACK, STEEL
 from visup.render.worlds.motion import along, bend, clock, cruised, eased, posed, still
-from visup.render.worlds.scenery import floor, hall, pick_colour, seed_of
+from visup.render.worlds.things import clutter
+from visup.render.worlds.things.machines import BLACK, STEEL
+from visup.render.worlds.things.scenery import floor, hall, pick_colour, seed_of
 from visup.render.worlds.viewpoint import projected, shows, steady
 from visup.render.worlds.world import (
     FPS,

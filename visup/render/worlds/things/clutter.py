@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from visup.render.meshes.solids import Colour, Solid, ball, box, cone, join, lathe
 from visup.render.worlds.motion import along, posed, still
-from visup.render.worlds.scenery import pick_colour, seed_of
+from visup.render.worlds.things.scenery import pick_colour, seed_of
 from visup.render.worlds.world import FPS, Surface, Thing
 
 Doubles = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from visup.render.meshes.solids import Colour, Solid, ball, box, cone, join
-from visup.render.worlds.scenery import pick_colour
+from visup.render.worlds.things.scenery import pick_colour
 
 BLACK: Colour = (0.07, 0.07, 0.08)
 STEEL: Colour = (0.6, 0.6, 0.62)

@@ -1,0 +1,67 @@
+"""Things that a task tells by their place alone are taught by the first picture: what lies there is it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from visup.agent import Contract, Directive, Frame, Observation, Percept
+from visup.agent.model.errors import SettingsError
+from visup.percepts.appearance.behaviour import AppearanceBehaviour
+from visup.percepts.motion.behaviour import image_is_sound
+from visup.percepts.taught.pointed import outline_at
+from visup.percepts.taught.view import TaughtView, taught_view
+
+
+class PlacedBehaviour:
+    """Reports taught things, what moves, and the things at some places of the first sound picture.
+
+    Where nothing has an edge about a place, nothing is taught there: what moves from there may
+    still be found to have been there.
+
+    Args:
+        places: Name -> (x, y), pixels.
+        taught: Views of other things.
+    """
+
+    contract = Contract("appearance", gives=("region", "hypothesis"))
+
+    def __init__(
+        self, places: Mapping[str, tuple[float, float]], taught: Sequence[TaughtView] = ()
+    ) -> None:
+        self._places = dict(places)
+        self._given = tuple(taught)
+        self._views: tuple[TaughtView, ...] | None = None
+        self._inner = AppearanceBehaviour(self._given)
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
+        return {"views": self._views, "inner": self._inner.save()}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a behaviour of the same settings remembered."""
+        self._views = state["views"]
+        self._inner = AppearanceBehaviour((*self._given, *(self._views or ())))
+        self._inner.load(state["inner"])
+
+    def missed(self, observation: Observation) -> None:
+        """Take note of regions reported since the state that was taken on: their ids are used."""
+        self._inner.missed(observation)
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Report the things and the other moving regions of one frame; see `AppearanceBehaviour`."""
+        if self._views is None and image_is_sound(observation):
+            self._views = tuple(self._shown(frame))
+            self._inner = AppearanceBehaviour((*self._given, *self._views))
+        return self._inner.perceive(frame, observation, directives)
+
+    def _shown(self, frame: Frame) -> Iterable[TaughtView]:
+        for name, at in sorted(self._places.items()):
+            outline = outline_at(frame.image, at)
+            try:
+                if outline is not None:
+                    yield taught_view(name, frame.image, outline)
+            except SettingsError:
+                continue  # too small a thing to be known again

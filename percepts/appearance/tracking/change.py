@@ -1,0 +1,74 @@
+"""Where the picture has changed of late: where things that move are looked for first."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.pose import Doubles
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.tracking.points import STILL
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+COARSER = 4  # working pixels per pixel of what is compared
+APART_S = 0.2  # between two pictures that are compared
+LATELY_S = 0.6  # for how long a change counts
+LEAST = 12  # steps of lightness that are no noise
+NEVER = np.float32(-1e6)
+
+
+class ChangeMap:
+    """When each part of the picture last changed; one per video."""
+
+    def __init__(self) -> None:
+        self._was: Bytes | None = None
+        self._time = 0.0
+        self._when: Floats | None = None
+
+    def update(self, scene: Scene, camera: Doubles) -> None:
+        """Take in a frame.
+
+        Args:
+            scene: The frame.
+            camera: (2, 3) similarity of the picture since the frame before.
+        """
+        early = scene.time - self._time < APART_S - 1e-6
+        if early and camera is STILL and self._was is not None:
+            return
+        width, height = (max(1, n // COARSER) for n in scene.size)
+        whole = scene.grey[: height * COARSER, : width * COARSER]
+        grey = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+        now = np.asarray(grey, dtype=np.uint8)
+        if self._was is None or self._when is None or self._was.shape != now.shape:
+            self._when = np.full(now.shape, NEVER)
+            self._was, self._time = now, scene.time
+            return
+        if camera is not STILL:
+            small = camera.copy()
+            small[:, 2] /= COARSER
+            # What comes into view is new, but has not changed.
+            self._was = _warped(self._was, small, now)
+        if early:
+            return
+        off = cv2.absdiff(now, self._was)
+        strong = cv2.morphologyEx((off > LEAST).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2)))
+        grown = np.asarray(cv2.dilate(strong, np.ones((7, 7), np.uint8))) > 0
+        self._when[grown] = scene.time
+        self._was, self._time = now, scene.time
+
+    def lately(self, scene: Scene) -> NDArray[np.bool_] | None:
+        """(h, w) bool, of any size: the parts that changed of late; None when none did."""
+        if self._when is None:
+            return None
+        out = np.asarray(scene.time - self._when < LATELY_S)
+        return out if 0 < np.mean(out) < 0.7 else None
+
+
+def _warped(was: Bytes, camera: Doubles, now: Bytes) -> Bytes:
+    size = was.shape[1], was.shape[0]
+    moved = cv2.warpAffine(was, camera, size, flags=cv2.INTER_LINEAR)
+    known = cv2.warpAffine(np.ones_like(was), camera, size, flags=cv2.INTER_NEAREST)
+    return np.where(np.asarray(known) > 0, moved, now).astype(np.uint8)
