@@ -132,8 +132,14 @@ def touches(gap: Floats, depth: Floats, before: Array) -> Array:
     return np.where(np.isnan(gap), UNKNOWN, code)
 
 
+SWAY = 0.12
+
+
 def together(now: Kinematics, before: Array) -> Array:
-    """(P,) by relative speeds of 2 px/s, 4 in halves, half as much more and 0.7 while it goes on."""
+    """(P,) by relative speeds of 2 px/s, 4 in halves, half as much more and 0.7 while it goes on.
+
+    Of what moves fast (8 px/s of late) the last half alone counts, and a share of the speed is rest.
+    """
     i, j = pairs(len(now.speed))
     held = before == 1
     moves = np.minimum(now.speed[i], now.speed[j]) > 2 * 2.0 * np.where(held, 0.7, 1.0)
@@ -141,7 +147,11 @@ def together(now: Kinematics, before: Array) -> Array:
     early, late = (np.hypot(*(v[i] - v[j]).T) for v in now.motion[1:])
     relative = now.relative_speed[i, j]
     rest = (np.maximum(early, late) < 4.0 * wide) & (relative < 2.0 * wide)
-    return np.where(np.isnan(relative), UNKNOWN, rest & moves)
+    slow = np.where(np.isnan(relative), UNKNOWN, rest & moves)
+    latest = np.hypot(*now.motion[2].T)
+    lately = np.minimum(latest[i], latest[j])
+    fast = (lately > 4.0 * 2.0) & (late < np.maximum(4.0, SWAY * wide * lately))
+    return np.where(fast, 1, slow)
 
 
 def rcc8_of(order: Array) -> Array:

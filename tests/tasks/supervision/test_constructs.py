@@ -192,8 +192,9 @@ def test_what_is_asked_of_an_optional_actor_may_be_left_out() -> None:
     assert belief(must).verdict is not Verdict.SUCCEEDED
     assert belief(may).verdict is Verdict.SUCCEEDED
     # Nobody waits for it: an object that no actor explains is told at once.
+    later = {**BOOM, INTRUDER: (2.0, 1e9)}  # what is there from the start is scenery
     crowded = replace(
-        script, objects=BOOM, identities={ARM: {"arm": 1.0}, SATELLITE: {"satellite": 1.0}}
+        script, objects=later, identities={ARM: {"arm": 1.0}, SATELLITE: {"satellite": 1.0}}
     )
     text = "<t> ::= coupled(arm, satellite) & present(boom)"
     assert belief(watch("optional actor boom is dish\n" + text, crowded, 3.0)).unexplained == (
