@@ -186,13 +186,17 @@ def unexplained(
 def scenery(
     mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
 ) -> tuple[int, ...]:
-    """Objects that nobody knows and that were in view from the start, by id: part of the scene."""
+    """Objects that nobody knows and that were in view from the start, by id: part of the scene.
+
+    What looks like an actor that is found elsewhere is known no better.
+    """
     bound = {b.object_id for b in bindings}
+    taken = {m for b in bindings if b.object_id is not None for m in b.models}
     return tuple(
         o.id
         for o in mind.present()
         if o.id not in bound
-        and o.strength < settings.familiar
+        and (o.strength < settings.familiar or o.name in taken)
         and o.first_seen <= settings.scenery_s
     )
 

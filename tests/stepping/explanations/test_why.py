@@ -73,7 +73,7 @@ def test_every_event_has_a_reason_that_ends_in_percepts(it: Stepper) -> None:
 
 
 MISSING = {
-    "coupled 1 2": "log odds that they touch and are at rest 0 of 5: 5 short",
+    "coupled 1 2": "log odds that they touch and are at rest 0 of 2: 2 short",
     "collision_course": "time_to_contact(",
     "collision_course 1 2": "converging(the satellite, the hubble) is false",
     "stage captured": "before it, approach is failing",
