@@ -1,7 +1,8 @@
 """Contact that is meant: outlines that meet in the image, of bodies that do not pass each other.
 
 Touching in the picture is not touching. What happens next tells: of two that meet, one comes to rest at the
-other, or takes it along; what goes on past the other as fast as it came is in front of it, or behind.
+other, takes it along, or is thrown back; what goes on past the other as fast as it came is in front of it, or
+behind.
 """
 
 from __future__ import annotations
@@ -58,6 +59,8 @@ def updated_contact(
     limit: float,
     moment: tuple[float, float],
     settings: ContactSettings,
+    *,
+    thrown_back: bool = False,
 ) -> OutlineContact:
     """What is believed of two whose outlines meet after another look.
 
@@ -67,6 +70,7 @@ def updated_contact(
         limit: From which speed on one passes the other, pixels per second.
         moment: Seconds now, and since the look before.
         settings: Patience.
+        thrown_back: Whether they part again on the side on which they met: that is contact made.
     """
     now, dt = moment
     contact = before or OutlineContact(now, changed_at=now)
@@ -76,6 +80,9 @@ def updated_contact(
             contact = replace(contact, passing=passing, changed_at=now, known=True)
         path = contact.path + speed * dt if passing else 0.0
         contact = replace(contact, path=path) if path != contact.path else contact
+    if thrown_back:
+        since = contact.met_at if contact.settled_since is None else contact.settled_since
+        return replace(contact, settled_since=since, passing=False, path=0.0)
     if contact.passing:
         return contact if contact.settled_since is None else replace(contact, settled_since=None)
     lasted = now - (contact.changed_at if contact.known else contact.met_at)

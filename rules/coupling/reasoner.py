@@ -243,7 +243,10 @@ class CouplingReasoner:
         limit = max(limit, s.passing_share * common_speed(mind, seen.pair))
         speed = None if found is None else float(np.hypot(*found.velocity))
         dt = mind.time - track.path_end if track is not None else 0.0
-        return updated_contact(before.contact, speed, limit, (mind.time, dt), s)
+        moment, crossed = (mind.time, dt), before.contact.path if before.contact else 0.0
+        size = min(float(np.sqrt(mind.objects[i].region.area)) for i in seen.pair)
+        back = seen.diverging == YES and crossed < s.doubt_share * size
+        return updated_contact(before.contact, speed, limit, moment, s, thrown_back=back)
 
     def _leaves(self, contact: OutlineContact | None, seen: PairObservation, mind: Mind) -> bool:
         """Whether one of two whose outlines still meet moves on, while the other rests."""

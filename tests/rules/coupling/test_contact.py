@@ -43,6 +43,13 @@ def test_where_nothing_is_known_of_their_motion_it_settles_later() -> None:
 
 
 @given(speeds)
+def test_what_is_thrown_back_has_made_contact(told: list[float | None]) -> None:
+    contact = updated_contact(seen(told), 30.0, LIMIT, (9.0, DT), SETTINGS, thrown_back=True)
+    assert contact.settled_since is not None
+    assert not contact.passing
+
+
+@given(speeds)
 def test_nobody_settles_while_passing(told: list[float | None]) -> None:
     contact = seen(told)
     assert not (contact.passing and contact.settled_since is not None)
