@@ -11,6 +11,7 @@ from visup.rules.formula.nodes import Comparison
 from visup.tasks.grammar.conditions import Fact, action_of, bounds_of, facts_of
 from visup.tasks.grammar.nodes import (
     Action,
+    Actor,
     Actors,
     Conditioned,
     Course,
@@ -216,3 +217,15 @@ def _reached(task: Task, stage: Stage) -> list[Stage]:
             named = [n.stage for n in walk(stage.body) if isinstance(n, Reference)]
             todo += [known[n] for n in reversed(named) if n in known]
     return list(found.values())
+
+
+def with_bystanders(task: Task, names: Iterable[str]) -> Task:
+    """The task with further models that have no part in it and are let be; those that it declares stay.
+
+    Args:
+        task: The task.
+        names: Of models or of taught things.
+    """
+    declared = {a.name for a in (*task.actors, *task.bystanders)}
+    more = (Actor(n, (n,), bystander=True) for n in dict.fromkeys(names) if n not in declared)
+    return replace(task, bystanders=(*task.bystanders, *more))

@@ -91,6 +91,14 @@ class WatchSettings:
             "The model that an actor of the task looks like.", "--actor", "NAME=MODEL", parse_actors
         ),
     ] = field(default_factory=dict)
+    bystanders: Annotated[
+        tuple[str, ...],
+        Option(
+            "A model, or a taught thing, that has no part in the task and is let be.",
+            "--bystander",
+            "NAME",
+        ),
+    ] = ()
     behaviours: Annotated[
         tuple[Path | str, ...],
         Option("A behaviour of your own: FILE.py or package.module:Class.", "--behaviour", "FILE"),

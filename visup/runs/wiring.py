@@ -36,6 +36,7 @@ from visup.tasks.grammar.structure import (
     needs_ground,
     task_actors,
     undrawn_zones,
+    with_bystanders,
     with_taught_actors,
 )
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -147,7 +148,8 @@ def reasoning_agent(
 
 def _tasks_and_zones(settings: WatchSettings) -> tuple[list[Task], tuple[Zone, ...]]:
     """The tasks of a run and the zones of its settings; a task without a ground has that of the zones."""
-    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    loaded = [t for name in settings.tasks for t in load_tasks(name)]
+    tasks = [with_bystanders(t, settings.bystanders) for t in loaded]
     zones = load_zones(settings.zones) if settings.zones else ()
     ground = load_ground(settings.zones) if settings.zones else None
     if ground is not None:

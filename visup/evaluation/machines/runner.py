@@ -80,13 +80,18 @@ def _with_masks(folder: Path) -> list[Path]:
 
 
 def clip_settings(brief: Brief) -> WatchSettings:
-    """What a supervisor is told of a clip: each actor of the task is the taught thing of its name."""
+    """What a supervisor is told of a clip: each actor of the task is the taught thing of its name.
+
+    What is taught beside the actors has no part in the task: it is let be.
+    """
     wanted = {a for task in load_tasks(brief.task) for a in task_actors(task)}
     taught = [o.name for o in brief.actors if o.name in wanted]
+    others = [o.name for o in (*brief.actors, *brief.others) if o.name not in wanted]
     return WatchSettings(
         source=str(brief.video),
         tasks=(brief.task,),
         actors={name: (name,) for name in taught},
+        bystanders=tuple(others),
         fov_vertical_deg=brief.fov_vertical_deg,
     )
 
