@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from functools import cache
+from typing import Any
+
+import numpy as np
 
 from tests.agent.scripted import Scripted, counting, frames, worried_while
 from visup.agent import Directive, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
-from visup.agent.storage.checkpoint import dump_state
 from visup.evaluation.runtime.scripted_observations import moving_ellipses
 from visup.evaluation.runtime.stepping import whole
 from visup.runs.settings import WatchSettings
@@ -50,7 +54,21 @@ def reasoning_stepper(count: int = COUNT, spacing: int = 7, latest: int = 5) -> 
 def told(step: Step | None) -> bytes:
     """All that a step came to, as bytes."""
     assert step is not None
-    return dump_state((whole(step.mind), step.events, step.alerts, step.directives))
+    return flat((whole(step.mind), step.events, step.alerts, step.directives))
+
+
+def flat(value: Any) -> bytes:
+    """A value as bytes by its content alone: which records are one and which are equal depends on the way."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape}".encode() + value.tobytes()
+    if isinstance(value, Mapping):
+        return b"{" + b",".join(flat(k) + b":" + flat(v) for k, v in value.items()) + b"}"
+    if isinstance(value, tuple | list):
+        return b"(" + b",".join(map(flat, value)) + b")"
+    if is_dataclass(value):
+        held = (getattr(value, f.name) for f in fields(value))
+        return type(value).__name__.encode() + flat(tuple(held))
+    return repr(value).encode()
 
 
 @cache

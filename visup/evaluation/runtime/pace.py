@@ -50,15 +50,9 @@ rule meets_soon(a, b): info
 rule bounced(a, b): info
     when diverging(a, b) and touching(a, b) within 2 s
     say "{a} bounced off {b}."
-rule stays_at(a, b): info
-    when close_to(a, b) for 5 s
-    say "{a} stays close to {b}."
 rule overlaps(a, b): info
     when partially_overlapping(a, b) for 1 s and not coupled(a, b)
     say "{a} overlaps {b}."
-rule side_by_side(a, b): info
-    when moving_together(a, b) for 2 s and relative_speed(a, b) < 5 px/s
-    say "{a} moves along with {b}."
 rule fast(a): info
     when speed(a) > 60 px/s in 60 % of 2 s hold 1 s
     say "{a} is fast."
@@ -78,7 +72,7 @@ rule was_apart(a, b): info
     when touching(a, b) since disconnected(a, b) within 20 s
     say "{a} came to {b}."
 """
-"""Of most operators one; with the seven that ship they are twenty."""
+"""Of most operators one; with the nine that ship they are twenty."""
 
 
 def evaluate_pace(
