@@ -36,6 +36,20 @@ def hypotheses_by_object(
     return said
 
 
+def recognised(mind: Mind, observation: Observation) -> frozenset[int]:
+    """Objects that a behaviour found by their looks: it told a region and whose it is in one.
+
+    Such a region is the object's own, however near another one is; of regions that merely move together
+    nobody knows how many bodies they are.
+    """
+    owner, found = region_owners(mind), set[int]()
+    for report in observation.reports:
+        if {"region", "hypothesis"} <= set(report.gives):
+            named = (p.value.region_id for p in report.percepts if p.kind == "hypothesis")
+            found.update(owner[i] for i in named if i in owner)
+    return frozenset(found)
+
+
 def associate(mind: Mind, regions: Iterable[Region]) -> tuple[dict[int, Region], dict[int, int]]:
     """The objects that a frame's regions belong to; a region that none owns is a new object's.
 

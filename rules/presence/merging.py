@@ -1,16 +1,21 @@
-"""An object may merge with another: two bodies that meet are soon seen as one region."""
+"""An object may merge with another: two bodies that meet are soon seen as one region.
+
+What is recognised by its looks has a region of its own and takes up no other.
+"""
 
 from __future__ import annotations
 
 from visup.agent import ObjectBelief, Presence
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import shared_pixels, shifted_region
+from visup.rules.presence.association import recognised
 from visup.rules.presence.object_tracks import ObjectTrack
 from visup.rules.presence.step_context import StepContext
 
 
 def merge(context: StepContext) -> None:
     """Find objects that merged with another one, whose region grew into the union of the two."""
+    alone = recognised(context.mind, context.observation)
     for gone in context.missing():
         track = context.of.get(gone.id)
         if track is None or gone.presence is not Presence.SEEN:
@@ -18,7 +23,8 @@ def merge(context: StepContext) -> None:
         if track.merged_with is not None:
             _stay_merged(context, gone, track)
             continue
-        host = next((b for b in context.seen() if _has_absorbed(context, b, track)), None)
+        hosts = (b for b in context.seen() if b.id not in alone)
+        host = next((b for b in hosts if _has_absorbed(context, b, track)), None)
         if host is not None:
             again = track.parted_at is not None and context.now - track.parted_at < 0.5
             since = track.merged_since if again else context.now
