@@ -4,6 +4,9 @@ The frame goes over shared memory, everything else as messages. The process is s
 that has the libraries loaded already where the platform has one (`forkserver`), else afresh
 (`spawn`). A process that hangs or dies is replaced by a new one, whose behaviour is as it was when
 it was plugged in: what it had learnt is lost. `worker.py` is the other end.
+
+Both ends are pickled through a pipe that nobody else can open. Loading what comes back may run code of the
+behaviour's, which importing its file here has done before: isolation is for mishaps, not for malice.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ def test_a_recorded_run_gives_back_the_records_of_the_run(
 def test_tables_have_the_same_columns_however_many_records_there_are(
     recorded: tuple[visup.Run, Path],
 ) -> None:
-    pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow", reason="the extra visup[tables] is not installed")
     run = visup.open_run(recorded[1])
     for records in (run.events, run.alerts, run.steps, run.objects):
         names = list(columns(records.kind))

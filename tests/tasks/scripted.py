@@ -21,11 +21,16 @@ from visup.agent import (
     Region,
     Relation,
     Severity,
+    TaskBelief,
     Truth,
 )
 from visup.rules.relations.kinematics import Kinematics
 from visup.rules.relations.reasoner import RELATIONS, RelationMemory
 from visup.rules.relations.rows import PairQuantity
+from visup.tasks import load_task, parse_task
+from visup.tasks.supervision.supervise import task_reasoner
+
+DOCK = load_task("dock")
 
 ARM, SATELLITE, INTRUDER = 1, 2, 3
 IDENTITIES: Mapping[int, Mapping[str, float]] = {
@@ -187,3 +192,13 @@ def play(reasoner: Reasoner, script: Script, until: float, fps: float = 10.0) ->
         minds.append(mind)
         outcomes.append(outcome)
     return Played(tuple(minds), tuple(outcomes))
+
+
+def watch(script: Script, until: float, text: str = "", fps: float = 10.0) -> Played:
+    """The play of a task, that of docking unless another is given."""
+    return play(task_reasoner([parse_task(text) if text else DOCK]), script, until, fps)
+
+
+def task_of(played: Played, time: float | None = None) -> TaskBelief:
+    """What is believed of the only task, at the end or at a time."""
+    return (played.last if time is None else played.at(time)).tasks[0]

@@ -6,12 +6,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, Played, Script, Spell, play
-from visup.agent import Expectation, Severity, Status, TaskBelief, Truth, Verdict
-from visup.tasks import load_task, parse_task
+from tests.tasks.scripted import (
+    ARM,
+    DOCK,
+    INTRUDER,
+    SATELLITE,
+    Played,
+    Script,
+    Spell,
+    play,
+    task_of,
+    watch,
+)
+from visup.agent import Expectation, Severity, Status, Truth, Verdict
+from visup.tasks import load_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
-DOCK = load_task("dock")
 FAILS = (
     Spell("converging", 0.5, 12.3),
     Spell("touching", 12.0, 12.8),
@@ -25,15 +35,6 @@ SUCCEEDS = (
 )
 ABORTED = (Spell("converging", 0.5, 11.5), Spell("diverging", 12.5, 20))
 CROWDED = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (6.5, 1e9)}
-
-
-def watch(script: Script, until: float, text: str = "", fps: float = 10.0) -> Played:
-    task = parse_task(text) if text else DOCK
-    return play(task_reasoner([task]), script, until, fps)
-
-
-def task_of(played: Played, time: float | None = None) -> TaskBelief:
-    return (played.last if time is None else played.at(time)).tasks[0]
 
 
 def status(played: Played, stage: str, time: float | None = None) -> Status:
@@ -215,134 +216,6 @@ def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
     assert task_of(played, 8.0).current == "back_off"
     assert task_of(played, 14.0).current == "approach"
     assert finish(task_of(watch(Script(TWICE), 20.0))) is not Verdict.SUCCEEDED
-
-
-def spells(*named: tuple[str, float, float]) -> Script:
-    return Script(tuple(Spell(*n) for n in named))
-
-
-HOLD = ("keeping_distance", 5, 12)
-CASES = {
-    "an alternative, the first": (
-        "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
-        spells(("converging", 0, 5), ("touching", 5, 9)),
-        Verdict.SUCCEEDED,
-    ),
-    "an alternative, the second": (
-        "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
-        spells(("converging", 0, 5), ("diverging", 5.5, 9)),
-        Verdict.SUCCEEDED,
-    ),
-    "what may be left out, left out": (
-        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
-        "touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 9)),
-        Verdict.SUCCEEDED,
-    ),
-    "what may be left out, there": (
-        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
-        "touching(arm, satellite)",
-        spells(("converging", 0, 5), HOLD, ("converging", 12, 13), ("touching", 13, 16)),
-        Verdict.SUCCEEDED,
-    ),
-    "what must be there, left out": (
-        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 5 s "
-        "touching(arm, satellite)",
-        spells(("converging", 0, 5), ("keeping_distance", 5, 7), ("diverging", 7, 15)),
-        Verdict.FAILED,
-    ),
-    "a repetition, none": (
-        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
-        spells(("touching", 3, 9)),
-        Verdict.SUCCEEDED,
-    ),
-    "a repetition, two": (
-        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
-        spells(
-            ("converging", 0, 4),
-            ("diverging", 4, 8),
-            ("converging", 8, 12),
-            ("diverging", 12, 15),
-            ("touching", 16, 20),
-        ),
-        Verdict.SUCCEEDED,
-    ),
-    "a repetition, at least once": (
-        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))+ coupled(arm, satellite)",
-        spells(
-            ("converging", 0, 4),
-            ("diverging", 4, 8),
-            ("converging", 8, 12),
-            ("diverging", 12, 15),
-            ("coupled", 16, 20),
-        ),
-        Verdict.SUCCEEDED,
-    ),
-    "at the same time": (
-        "<t> ::= converging(arm, satellite) & present(arm) touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 8)),
-        Verdict.SUCCEEDED,
-    ),
-    "held for long enough": (
-        "<t> ::= keeping_distance(arm, satellite) for 5 s",
-        spells(HOLD),
-        Verdict.SUCCEEDED,
-    ),
-    "not held for long enough": (
-        "<t> ::= keeping_distance(arm, satellite) for 8 s",
-        spells(HOLD, ("diverging", 12, 20)),
-        Verdict.FAILED,
-    ),
-    "in time": (
-        "<t> ::= converging(arm, satellite) within 8 s touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 8)),
-        Verdict.SUCCEEDED,
-    ),
-    "too late": (
-        "<t> ::= converging(arm, satellite) within 4 s touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 8)),
-        Verdict.FAILED,
-    ),
-    "too late in all": (
-        "<t> ::= (converging(arm, satellite) coupled(arm, satellite)) within 10 s",
-        spells(("converging", 0, 8), ("touching", 8, 30), ("coupled", 12, 30)),
-        Verdict.FAILED,
-    ),
-    "something that must never be": (
-        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)\n"
-        "never touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 7), ("keeping_distance", 7, 12)),
-        Verdict.INTERRUPTED,
-    ),
-    "something that must never be in another stage": (
-        "<t> ::= <a> <b>\n<a> ::= converging(arm, satellite)\n<b> ::= touching(arm, satellite)\n"
-        "never moving_together(arm, satellite) during <a>",
-        spells(("converging", 0, 5), ("touching", 5, 9), ("moving_together", 5.5, 9)),
-        Verdict.SUCCEEDED,
-    ),
-    "something that must always be": (
-        "<t> ::= converging(arm, satellite) touching(arm, satellite)\nalways present(arm)",
-        spells(("converging", 0, 5), ("touching", 5, 9)),
-        Verdict.SUCCEEDED,
-    ),
-}
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_verdicts_of_the_language(name: str) -> None:
-    text, script, verdict = CASES[name]
-    until = max(s.to_s for s in script.spells)
-    assert finish(task_of(watch(script, until, text))) is verdict
-
-
-def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
-    text, script, _ = CASES["something that must never be"]
-    played = watch(script, 12.0, text)
-    event = next(e for e in played.events if e.kind == "invariant_broken")
-    assert event.severity is Severity.CRITICAL
-    assert "`never touching(arm, satellite)` has not held since 5.0 s" in event.text
-    assert [c.kind for c in played.outcomes[60].conditions] == ["invariant_broken"]
-    assert not played.outcomes[80].conditions
 
 
 def test_an_actor_does_not_change_hands_in_a_moment() -> None:

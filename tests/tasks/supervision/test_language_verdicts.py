@@ -1,0 +1,137 @@
+"""What each construct of the task language comes to: a sentence, what is seen, the verdict."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.tasks.scripted import Script, Spell, task_of, watch
+from visup.agent import Severity, Verdict
+from visup.tasks.supervision.supervise import finish
+
+
+def spells(*named: tuple[str, float, float]) -> Script:
+    return Script(tuple(Spell(*n) for n in named))
+
+
+HOLD = ("keeping_distance", 5, 12)
+CASES = {
+    "an alternative, the first": (
+        "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
+        spells(("converging", 0, 5), ("touching", 5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "an alternative, the second": (
+        "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
+        spells(("converging", 0, 5), ("diverging", 5.5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "what may be left out, left out": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
+        "touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "what may be left out, there": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
+        "touching(arm, satellite)",
+        spells(("converging", 0, 5), HOLD, ("converging", 12, 13), ("touching", 13, 16)),
+        Verdict.SUCCEEDED,
+    ),
+    "what must be there, left out": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 5 s "
+        "touching(arm, satellite)",
+        spells(("converging", 0, 5), ("keeping_distance", 5, 7), ("diverging", 7, 15)),
+        Verdict.FAILED,
+    ),
+    "a repetition, none": (
+        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
+        spells(("touching", 3, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "a repetition, two": (
+        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
+        spells(
+            ("converging", 0, 4),
+            ("diverging", 4, 8),
+            ("converging", 8, 12),
+            ("diverging", 12, 15),
+            ("touching", 16, 20),
+        ),
+        Verdict.SUCCEEDED,
+    ),
+    "a repetition, at least once": (
+        "<t> ::= (converging(arm, satellite) diverging(arm, satellite))+ coupled(arm, satellite)",
+        spells(
+            ("converging", 0, 4),
+            ("diverging", 4, 8),
+            ("converging", 8, 12),
+            ("diverging", 12, 15),
+            ("coupled", 16, 20),
+        ),
+        Verdict.SUCCEEDED,
+    ),
+    "at the same time": (
+        "<t> ::= converging(arm, satellite) & present(arm) touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 8)),
+        Verdict.SUCCEEDED,
+    ),
+    "held for long enough": (
+        "<t> ::= keeping_distance(arm, satellite) for 5 s",
+        spells(HOLD),
+        Verdict.SUCCEEDED,
+    ),
+    "not held for long enough": (
+        "<t> ::= keeping_distance(arm, satellite) for 8 s",
+        spells(HOLD, ("diverging", 12, 20)),
+        Verdict.FAILED,
+    ),
+    "in time": (
+        "<t> ::= converging(arm, satellite) within 8 s touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 8)),
+        Verdict.SUCCEEDED,
+    ),
+    "too late": (
+        "<t> ::= converging(arm, satellite) within 4 s touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 8)),
+        Verdict.FAILED,
+    ),
+    "too late in all": (
+        "<t> ::= (converging(arm, satellite) coupled(arm, satellite)) within 10 s",
+        spells(("converging", 0, 8), ("touching", 8, 30), ("coupled", 12, 30)),
+        Verdict.FAILED,
+    ),
+    "something that must never be": (
+        "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)\n"
+        "never touching(arm, satellite)",
+        spells(("converging", 0, 5), ("touching", 5, 7), ("keeping_distance", 7, 12)),
+        Verdict.INTERRUPTED,
+    ),
+    "something that must never be in another stage": (
+        "<t> ::= <a> <b>\n<a> ::= converging(arm, satellite)\n<b> ::= touching(arm, satellite)\n"
+        "never moving_together(arm, satellite) during <a>",
+        spells(("converging", 0, 5), ("touching", 5, 9), ("moving_together", 5.5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+    "something that must always be": (
+        "<t> ::= converging(arm, satellite) touching(arm, satellite)\nalways present(arm)",
+        spells(("converging", 0, 5), ("touching", 5, 9)),
+        Verdict.SUCCEEDED,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_verdicts_of_the_language(name: str) -> None:
+    text, script, verdict = CASES[name]
+    until = max(s.to_s for s in script.spells)
+    assert finish(task_of(watch(script, until, text))) is verdict
+
+
+def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
+    text, script, _ = CASES["something that must never be"]
+    played = watch(script, 12.0, text)
+    event = next(e for e in played.events if e.kind == "invariant_broken")
+    assert event.severity is Severity.CRITICAL
+    assert "`never touching(arm, satellite)` has not held since 5.0 s" in event.text
+    assert [c.kind for c in played.outcomes[60].conditions] == ["invariant_broken"]
+    assert not played.outcomes[80].conditions
