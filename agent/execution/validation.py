@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from visup.agent.contract.contract import Contract
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.records import (
+    CameraMotion,
     Depth,
     Frame,
     Health,
@@ -161,6 +162,14 @@ def _depth(d: Depth, size: tuple[int, int]) -> None:
     _expect(_least(d.sigma, 0.0), f"{who} has sigma {_brief(d.sigma)}", "a number, at least 0")
 
 
+def _camera(c: CameraMotion, size: tuple[int, int]) -> None:
+    _array(c.motion, "camera: motion", (2, 3))
+    turn = float(np.linalg.det(c.motion[:, :2]))
+    _expect(
+        turn > 0.0, f"camera: motion with determinant {turn:.3g}", "one above 0: it can be undone"
+    )
+
+
 def _health(h: Health, size: tuple[int, int]) -> None:
     fine = isinstance(h.status, HealthStatus) and isinstance(h.detail, str)
     _expect(fine, f"health has status {_brief(h.status)}", "a HealthStatus and a sentence")
@@ -170,6 +179,7 @@ VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] 
     "region": (Region, _region),
     "hypothesis": (Hypothesis, _hypothesis),
     "depth": (Depth, _depth),
+    "camera": (CameraMotion, _camera),
     "health": (Health, _health),
 }
 """Kinds with a fixed type of value, and what judges one of them."""

@@ -92,8 +92,8 @@ class Kinematics:
         ids: (M,) object ids, increasing.
         tables: (5, M, M) `gap`, `rate`, `rate_sigma`, `relative_speed`, `time_to_contact`.
         motion: (3, M, 2) velocities over the window of motion, in its first and in its second half,
-            pixels per second in the image.
-        speed: (M,) pixels per second in the image.
+            pixels per second in the image, less those of the camera where they are perceived.
+        speed: (M,) the same, pixels per second.
         depth: (M,) in the objects' units.
         spread: Standard deviation of a component of a velocity that noise of the outlines makes.
         noise_px: Standard deviation of an outline, pixels.
@@ -228,7 +228,7 @@ class KinematicsEstimator:
         windows = s.window_s, s.quick_window_s, s.motion_window_s
         slope, sigma, motion, spread = fit_motion(
             h.times,
-            h.support,
+            h.steady_support,
             h.free,
             h.separation,
             DIRECTIONS,
