@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from visup.agent import ObjectBelief
+from visup.agent import ObjectBelief, Region
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import GAP
-from visup.rules.predicates.snapshot import Codes, Snapshot, code
+from visup.rules.predicates.snapshot import YES, Codes, Snapshot, code
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.presence.settings import PresenceSettings
@@ -30,7 +30,11 @@ KEEP_OUT = "keep_out"
 
 
 def standalone(facts: Snapshot) -> Codes:
-    """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones."""
+    """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones.
+
+    Of what the image border cuts nobody knows what it hangs on, unless it is known what it is: it may be
+    an arm, of which the hand is known.
+    """
     beliefs = facts.beliefs
     if not beliefs:
         return facts.among(())
@@ -38,6 +42,7 @@ def standalone(facts: Snapshot) -> Codes:
     area = np.array([b.region.area for b in beliefs], dtype=float)
     sure = np.array([b.region.confidence for b in beliefs]) >= LEAST_CONFIDENCE
     sure &= area >= LEAST_SHARE * width * height
+    sure &= (whole(facts) == YES) | (identified(facts) == YES)
     far = np.maximum(
         PART.apart * image_diagonal(facts.mind.frame_size), PART.apart_size * np.sqrt(area)
     )
@@ -46,6 +51,17 @@ def standalone(facts: Snapshot) -> Codes:
     larger = area[:, None] <= PART.part * area[None]
     alone = sure & ~(beside & larger).any(axis=1)
     return facts.among({b.id for b, yes in zip(beliefs, alone.tolist(), strict=True) if yes})
+
+
+def whole(facts: Snapshot) -> Codes:
+    """Whether an object is clear of the image border."""
+    width, height = facts.mind.frame_size
+
+    def clear(region: Region) -> bool:
+        x, y, w, h = region.bbox
+        return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
+
+    return facts.each(lambda b: code(clear(b.region)))
 
 
 def identified(facts: Snapshot) -> Codes:

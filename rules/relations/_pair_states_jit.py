@@ -188,7 +188,7 @@ def classify_trend(
         limits: Rate that must be exceeded to enter a trend, and below which it ends.
         sigmas: How many deviations the rate must also exceed to want to enter, and how many to go
             on wanting it. Deviations are themselves estimates and jump; one wide one in a row does
-            not take back what was seen.
+            not take back what was seen. A rate below one deviation is none.
 
     Returns:
         Its code; a rate between the thresholds leaves things as they are.
@@ -202,7 +202,7 @@ def classify_trend(
         return towards
     # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
     goes_on = (before == CONVERGING and rate <= 0.0) or (before == DIVERGING and rate >= 0.0)
-    return before if goes_on and abs(rate) >= leave else KEEPING
+    return before if goes_on and abs(rate) >= max(leave, sigma) else KEEPING
 
 
 @compiled
