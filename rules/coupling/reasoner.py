@@ -143,7 +143,8 @@ class CouplingReasoner:
             elif log is None and evidence.relative_track is None:
                 pass  # as nearly always: they are not near each other; the first condition
             elif decide(self._coupling(evidence, seen, mind), log, "coupled", pair):
-                coupled[pair] = Coupling(pair, mind.time)
+                since = mind.time if evidence.rest_since is None else evidence.rest_since
+                coupled[pair] = Coupling(pair, since)
                 text = "{0} and {1} {are} coupled."
                 events.append(_event("coupled", text, pair, mind, observation))
                 evidence = replace(evidence, apart_since=None)
