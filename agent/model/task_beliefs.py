@@ -38,12 +38,14 @@ class Binding:
         models: Model names that the actor may be.
         object_id: The object believed to play it, or None when none does.
         strength: Strength of that belief, 0 to 1.
+        guessed: Whether nothing but that nobody else is left speaks for the object.
     """
 
     actor: str
     models: tuple[str, ...]
     object_id: int | None = None
     strength: float = 0.0
+    guessed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -308,7 +308,7 @@ def _bind(
 
 
 def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
-    if before.object_id is None or before.object_id == now.object_id:
+    if before.object_id is None or before.guessed or before.object_id == now.object_id:
         return False
     belief = mind.objects.get(before.object_id)
     return belief is not None and belief.presence is not Presence.LEFT
@@ -319,6 +319,8 @@ def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, i
     belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
     if belief is None:
         return replace(binding, object_id=None, strength=0.0)
+    if binding.guessed:
+        return binding
     (now,) = fits(Role(task, binding.actor, mind, playing), binding.models, [belief])
     return replace(binding, strength=now)
 
