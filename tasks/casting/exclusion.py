@@ -13,7 +13,7 @@ import numpy as np
 
 from visup.agent import Binding, Mind, ObjectBelief, Presence, Region
 from visup.agent.model.fast_replace import replace
-from visup.rules.geometry.regions import image_diagonal
+from visup.rules.geometry.regions import Floats, image_diagonal
 from visup.rules.relations.reasoner import kinematics
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.verification.settings import TaskSettings
@@ -55,8 +55,9 @@ def guessed(
     unknown = [o for o in mind.present() if o.id not in playing and _unknown(o, settings)]
     was = next((b.object_id for b in before if b.guessed and b.actor == bindings[k].actor), None)
     it = next((o.id for o in unknown if o.id == was), None)
-    if it is None and not any(_moves(i, mind) for i in playing):
-        it = _only_mover(unknown, mind, playing)
+    known = [mind.objects[i] for i in playing if i in mind.objects]
+    if it is None and not any(_movers(known, mind, known)):
+        it = _only_mover(unknown, mind, known)
     if it is None:
         return tuple(bindings)
     guess = replace(bindings[k], object_id=it, strength=settings.bind_at, guessed=True)
@@ -78,7 +79,7 @@ def _unknown(belief: ObjectBelief, settings: TaskSettings) -> bool:
 
 
 def _only_mover(
-    unknown: Collection[ObjectBelief], mind: Mind, known: Collection[int]
+    unknown: Collection[ObjectBelief], mind: Mind, known: Sequence[ObjectBelief]
 ) -> int | None:
     """The one that moves, and is much larger than whatever else does."""
     movers = sorted(_movers(unknown, mind, known), reverse=True)
@@ -88,11 +89,12 @@ def _only_mover(
 
 
 def _movers(
-    unknown: Collection[ObjectBelief], mind: Mind, known: Collection[int]
+    objects: Collection[ObjectBelief], mind: Mind, known: Sequence[ObjectBelief]
 ) -> Iterator[tuple[float, int]]:
     """Area and id of those that move."""
-    for o in unknown:
-        if _moves(o.id, mind) or _sets_out(o.region, [mind.objects[i].region for i in known], mind):
+    scene = np.mean([o.region.velocity for o in known], axis=0)
+    for o in objects:
+        if _moves(o.id, mind) or _sets_out(o.region, scene, mind):
             yield o.region.area, o.id
 
 
@@ -103,11 +105,9 @@ def _moves(object_id: int, mind: Mind) -> bool:
     return now.one("speed", object_id) > max(MOVES * image_diagonal(mind.frame_size), noise)
 
 
-def _sets_out(region: Region, resting: Sequence[Region], mind: Mind) -> bool:
-    """Whether what is too new to have a past moves in the image as what rests does not."""
+def _sets_out(region: Region, scene: Floats, mind: Mind) -> bool:
+    """Whether a region moves in the image as what rests does not, however short a time it is known."""
     if region.velocity_sigma <= 0.0:
         return False
-    x, y = np.mean([r.velocity for r in resting], axis=0)
-    speed = float(np.hypot(region.velocity[0] - x, region.velocity[1] - y))
-    least = max(MOVES * image_diagonal(mind.frame_size), SIGMAS * region.velocity_sigma)
-    return speed > least
+    speed = float(np.hypot(region.velocity[0] - scene[0], region.velocity[1] - scene[1]))
+    return speed > max(MOVES * image_diagonal(mind.frame_size), SIGMAS * region.velocity_sigma)
