@@ -88,7 +88,7 @@ class CouplingSettings:
     window_s: float = 0.3
     path_s: float = 1.2
     moving: float = 0.0125
-    still_share: float = 0.12
+    still_share: float = 0.2
     moving_share: float = 0.6
     rest_s: float = 0.8
     odds: float = 5.0

@@ -203,7 +203,9 @@ def update_relative_track(
     first = registered(track.first, target_of(regions[0]))
     second = registered(track.second, target_of(regions[1]))
     if first is None or second is None:
-        return _begun_again(track, regions, now, size, lasts_s) if apart else replace(track, path=())
+        return (
+            _begun_again(track, regions, now, size, lasts_s) if apart else replace(track, path=())
+        )
     x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
     local = first.local or second.local
     place = (now, x, y, *(UNTOLD if local else _image_motion(regions)))
@@ -216,7 +218,11 @@ def update_relative_track(
 
 
 def _begun_again(
-    track: RelativeTrack, regions: tuple[Region, Region], now: float, size: tuple[int, int], lasts_s: float
+    track: RelativeTrack,
+    regions: tuple[Region, Region],
+    now: float,
+    size: tuple[int, int],
+    lasts_s: float,
 ) -> RelativeTrack | None:
     """Two bodies whose outlines have changed too much to be followed: image motion alone leads on."""
     fresh, told = begin_relative_track(regions, now, size), _image_motion(regions)

@@ -276,9 +276,7 @@ def jitter(values: Floats) -> float:
 
 
 @compiled
-def longest_that_agrees(
-    found: Floats, sigmas: Floats, limits: tuple[float, float]
-) -> int:
+def longest_that_agrees(found: Floats, sigmas: Floats, limits: tuple[float, float]) -> int:
     """The longest window whose estimate agrees with those of all shorter ones (Lepski 1990).
 
     What goes on as it did is so known from a long window, and what has just changed from a short one.

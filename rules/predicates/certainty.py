@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from visup.agent import ObjectBelief, Region
+from visup.rules.formula.truth import MAYBE
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import GAP
 from visup.rules.predicates.snapshot import YES, Codes, Snapshot, code
@@ -25,6 +26,8 @@ LEAST_SHARE = 2 * PresenceSettings().least_share
 """Share of the image that a thing of its own fills, unless it is far away or a speck."""
 LEAST_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
+CAME_IN = 0.5
+"""How far from the border what came over it may first be seen, in sizes of what was seen."""
 KEEP_OUT = "keep_out"
 """Zones whose names begin so are forbidden to all."""
 
@@ -62,6 +65,24 @@ def whole(facts: Snapshot) -> Codes:
         return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
 
     return facts.each(lambda b: code(clear(b.region)))
+
+
+def came_in(facts: Snapshot) -> Codes:
+    """Whether an object came over the border of the image: where it was first seen lies there.
+
+    What sets out within the picture was there before, hangs on something that was, or is its shadow. What
+    comes in fast is first seen a little within.
+    """
+    memory, (width, height) = presence_memory(facts.mind), facts.mind.frame_size
+
+    def look(b: ObjectBelief) -> int:
+        if b.id not in memory.of:
+            return MAYBE
+        x, y, w, h = memory.of[b.id].first_box
+        near = CAME_IN * max(w, h)
+        return code(min(x, y, width - x - w, height - y - h) <= near)
+
+    return facts.each(look)
 
 
 def identified(facts: Snapshot) -> Codes:

@@ -277,6 +277,9 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
         "lost": PredicateDefinition(_ONE, lost, "it is out of sight and nothing tells why"),
         "moving": PredicateDefinition(_ONE, moving, "it moves in the image"),
+        "came_in": PredicateDefinition(
+            _ONE, certainty.came_in, "it came over the border of the image"
+        ),
         "whole": PredicateDefinition(_ONE, certainty.whole, "it is clear of the image border"),
         **{
             question: PredicateDefinition(
