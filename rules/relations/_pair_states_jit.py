@@ -303,7 +303,10 @@ def classify_motion(
         for j in range(i + 1, len(now.speed)):
             k += 1
             rate, sigma = tables[PairQuantity.RATE, i, j], tables[PairQuantity.SIGMA, i, j]
-            found = classify_trend(rate, sigma, state[0, k], pending[0, k], rates, limits.sigmas)
+            # What two that move as one do to their distance is no trend: they sway.
+            sway = SWAY * min(now.speed[i], now.speed[j])
+            least = max(rates[0], sway), max(rates[1], sway)
+            found = classify_trend(rate, sigma, state[0, k], pending[0, k], least, limits.sigmas)
             found = combined_trend(found, codes[3, k])
             touching = _touching(now.gap[k], (depth[i], depth[j]), state[1, k], limits.touch)
             halves = _length(now.motion[1], i, j), _length(now.motion[2], i, j)
