@@ -127,7 +127,7 @@ _TABLE = (
         "coupled",
         holds=("coupled",),
         entry=("coupled", "in_contact"),
-        while_not=("converging",),
+        while_not=(),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),
