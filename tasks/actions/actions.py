@@ -106,7 +106,7 @@ _TABLE = (
     ),
     ActionDefinition(
         "moving_together",
-        holds=("moving_together", "coupled"),
+        holds=("moving_together",),
         lasts=True,
         hold_s=0.6,
         contrary=("converging", "diverging"),
