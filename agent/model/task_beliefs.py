@@ -84,6 +84,8 @@ class StageBelief:
         since: Seconds since when it has this status.
         confidence: 0 to 1.
         evidence: One sentence: why.
+        begun: Whether anything of it was seen since it was last pending; the first stage begins with the
+            task.
     """
 
     stage: str
@@ -91,6 +93,7 @@ class StageBelief:
     since: float
     confidence: float = 1.0
     evidence: str = ""
+    begun: bool = False
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ from visup.tasks.supervision.belief import (
     pending_stages,
     suppressed,
     task_belief,
+    with_begun,
 )
 from visup.tasks.supervision.events import (
     activity_events,
@@ -231,7 +232,8 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     one = machines(model.task, bindings)
-    belief = replace(belief, unexplained=lasting, bystanders=let_be, machines=one)
+    stages = with_begun(memory.belief.stages, belief.stages)
+    belief = replace(belief, stages=stages, unexplained=lasting, bystanders=let_be, machines=one)
     return TaskMemory(
         now,
         posterior,
