@@ -44,6 +44,9 @@ LEAST_SIGMA = 0.3
 CORRELATION_S = 0.2
 """Errors of velocities are alike for so long, seconds."""
 
+PART_VARIANCE = 4.0
+"""By how much less is known of a part of a body from the motion of the whole, where nothing else tells."""
+
 LEAST_POINTS = 12
 LEAST_SAMPLES = 5
 _OUTLIER = 1.5  # pixels beyond which a point counts less
@@ -225,9 +228,12 @@ def _begun_again(
     lasts_s: float,
 ) -> RelativeTrack | None:
     """Two bodies whose outlines have changed too much to be followed: image motion alone leads on."""
-    fresh, told = begin_relative_track(regions, now, size), _image_motion(regions)
-    if fresh is None or not track.path or fresh.path[-1][5] != told[2]:
+    fresh, (vx, vy, variance) = begin_relative_track(regions, now, size), _image_motion(regions)
+    if fresh is None or not track.path or np.isnan(variance):
         return fresh
+    if fresh.first.local or fresh.second.local:
+        variance *= PART_VARIANCE
+    told = vx, vy, variance
     then, x, y, *_ = track.path[-1]
     place = (now, x + told[0] * (now - then), y + told[1] * (now - then), *told)
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
