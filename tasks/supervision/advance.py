@@ -158,9 +158,10 @@ class Advance:
         return math.prod(self._passed_over(x) for x in transition.left)
 
     def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
-        if leaf.payload.fulfilled:
+        # What held, and must not for any time, is over as soon as the next thing is seen.
+        lasts, held = self.steps.actions[leaf.step.action].lasts, leaf.payload.held
+        if leaf.payload.fulfilled or (held and not lasts and leaf.step.hold_s is None):
             return 1.0
-        lasts = self.steps.actions[leaf.step.action].lasts
         missed = not lasts and not leaf.payload.held and leaf.payload.broken_since is not None
         return self.steps.hmm.pass_over ** (2 if missed else 1)
 
