@@ -35,6 +35,8 @@ KEEP_OUT = "keep_out"
 def standalone(facts: Snapshot) -> Codes:
     """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones.
 
+    Nor does it move as one with one that is larger.
+
     Of what the image border cuts nobody knows what it hangs on, unless it is known what it is: it may be
     an arm, of which the hand is known.
     """
@@ -52,6 +54,7 @@ def standalone(facts: Snapshot) -> Codes:
     gap = facts.of_pairs(GAP)
     beside = np.isfinite(gap[1]) & (gap[0] <= far[:, None])
     larger = area[:, None] <= PART.part * area[None]
+    beside |= facts.related("moving_together") == YES
     alone = sure & ~(beside & larger).any(axis=1)
     return facts.among({b.id for b, yes in zip(beliefs, alone.tolist(), strict=True) if yes})
 
