@@ -43,6 +43,7 @@ from visup.rules.formula.units import Number, ticks
 from visup.rules.monitoring.intervals import EQUAL
 from visup.rules.monitoring.operators import (
     BooleanWindow,
+    DelayedUnbounded,
     HysteresisLatch,
     SampleAndHold,
     SlidingCount,
@@ -233,12 +234,16 @@ class Compiler:
     def _past(self, kind: str, window: TimeWindow | None, at: ValueRef) -> ValueRef:
         if window is not None:
             return self._slid(kind, ticks(window.low.base), ticks(window.high.base), 0, at)
-        return self._operator(Unbounded(kind), at, certain=at.certain)
+        return self._unbounded(kind, at)
+
+    def _unbounded(self, kind: str, *at: ValueRef) -> ValueRef:
+        delay = at[0].delay
+        operator = DelayedUnbounded(kind, delay) if delay else Unbounded(kind)
+        return self._operator(operator, *at, certain=all(p.certain for p in at))
 
     def _since(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         if window is None:
-            certain = left.certain and right.certain
-            return self._operator(Unbounded("since"), left, right, certain=certain)
+            return self._unbounded("since", left, right)
         return self._slid("since", 0, ticks(window.high.base), 0, left, right)
 
     def _until(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:

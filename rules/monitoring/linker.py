@@ -29,9 +29,8 @@ from visup.rules.monitoring.operators import (
     HysteresisLatch,
     PointOperator,
     SampleAndHold,
-    SlidingCount,
-    SlidingWindow,
     Unbounded,
+    WindowOperator,
 )
 from visup.rules.monitoring.states import PointSlot, StateLayout, States, WindowSlot
 from visup.rules.monitoring.vm import Codes, Floats, bits
@@ -150,7 +149,7 @@ class LinkedProgram:
         """Say how a step is done."""
         cells = self.n ** len(step.axes)
         stage = max((self._ready[r] for r in step.reads), default=0)
-        if isinstance(step.operator, SlidingWindow | SlidingCount):
+        if isinstance(step.operator, WindowOperator):
             self._stage(stage).windows.append(len(self._windows))
             reads = tuple(self._wide(r, step.axes) for r in step.reads)
             self._windows.append(

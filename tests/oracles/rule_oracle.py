@@ -99,7 +99,7 @@ class _Oracle:
             case PastOperator(kind=kind, part=part, window=None):
                 s = self.formula(part)
                 join = _both if kind == "always" else _either
-                return Signal(self.each(lambda k: _fold(self.so_far(k, s), join)), s.delay)
+                return Signal(self.each(lambda k: _fold([p.value[0] for p in self.so_far(k, s)], join)), s.delay)
             case PastOperator(kind=kind, part=part, window=TimeWindow(low=low, high=high)):
                 join = _both if kind == "always" else _either
                 return self.past(self.formula(part), join, _micro(low), _micro(high))
@@ -143,8 +143,9 @@ class _Oracle:
         """Its values at all moments from `low` to `high`, _both included."""
         return [p.value[0] for p in self.pieces(k, signal) if p.start <= high and p.end > low]
 
-    def so_far(self, k: int, signal: Signal) -> Values:
-        return [p.value[0] for p in self.pieces(k, signal)[1:]]
+    def so_far(self, k: int, *signals: Signal) -> list[Piece]:
+        """The pieces that begin at the first sample or later."""
+        return [p for p in self.pieces(k, *signals) if p.start >= self.times[0]]
 
     def past(self, s: Signal, join: Join, a: int, b: int) -> Signal:
         def back(k: int) -> Interval:
@@ -175,7 +176,9 @@ class _Oracle:
         def at(k: int) -> Interval:
             pieces = self.pieces(k, left, right)
             begin = self.times[k] - left.delay - (_micro(window.high) if window else 0)
-            inner = [p for p in pieces if p.end > begin] if window else pieces[1:]
+            inner = [p for p in pieces if p.end > begin]
+            if window is None:
+                inner = self.so_far(k, left, right)
             found = [
                 _fold([p.value[1], *(later.value[0] for later in inner[i + 1 :])], _both)
                 for i, p in enumerate(inner)
@@ -293,7 +296,7 @@ def _either(v: Interval, w: Interval) -> Interval:
 
 
 def _fold(values: Values, join: Join) -> Interval:
-    return reduce(join, values)
+    return reduce(join, values) if values else ANYTHING
 
 
 def _micro(n: Number) -> int:
