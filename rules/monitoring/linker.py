@@ -23,8 +23,6 @@ from visup.rules.monitoring.intervals import (
     Interval,
 )
 from visup.rules.monitoring.operators import (
-    LONG_AGO,
-    SAMPLE_HOLD,
     BooleanWindow,
     HysteresisLatch,
     PointOperator,
@@ -32,6 +30,7 @@ from visup.rules.monitoring.operators import (
     Unbounded,
     WindowOperator,
 )
+from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD
 from visup.rules.monitoring.states import PointSlot, StateLayout, States, WindowSlot
 from visup.rules.monitoring.vm import Codes, Floats, bits
 
@@ -49,6 +48,9 @@ _KINDS = {
     "*": vm.TIMES,
     "/": vm.OVER,
     "rate": vm.RATE,
+    "sqrt": vm.ROOT,
+    "exp": vm.EXP,
+    "power": vm.POWER,
     "exists": vm.SOME,
     "forall": vm.EVERY,
     "number": vm.NUMBER,

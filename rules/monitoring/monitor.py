@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import inf, isfinite
-from typing import Any
+from typing import Any, SupportsFloat
 
 from visup.agent.model.errors import SettingsError
 from visup.rules.formula.nodes import Formula
@@ -17,18 +17,17 @@ from visup.rules.monitoring import _interval_jit as on_intervals
 from visup.rules.monitoring.compiler import Compiler, Operation
 from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval, Scalars
 from visup.rules.monitoring.operators import (
-    LONG_AGO,
-    SAMPLE_HOLD,
     BooleanWindow,
     HysteresisLatch,
     SampleAndHold,
     SlidingWindow,
     TemporalOperator,
     Unbounded,
-    Update,
 )
+from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD, Update
 
-SignalValue = float | Interval | None
+SignalValue = SupportsFloat | Interval | None
+"""A number of Python or NumPy, an interval, or None where nothing is known."""
 Signals = Mapping[str, SignalValue]
 Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
 """(values of the operations before, states before, states after, microseconds, signals) -> value."""
@@ -166,6 +165,9 @@ _FUNCTIONS: Mapping[str, Callable[..., Interval]] = {
     "*": _plain(on_intervals.product),
     "/": on_intervals.quotient,
     "rate": _plain(on_intervals.rate),
+    "sqrt": _plain(on_intervals.rooted),
+    "exp": _plain(on_intervals.exponential),
+    "power": on_intervals.powered,
 }
 """What an operation without memory does: (interval, two numbers) or (two intervals, a number)."""
 

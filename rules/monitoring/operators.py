@@ -11,33 +11,18 @@ Those that retain no more than a few numbers for each choice of objects (`Boolea
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
 from typing import Any, NamedTuple
 
-from visup.rules.formula.units import ticks
-from visup.rules.monitoring.intervals import EQUAL, FALSE, TRUE, UNKNOWN, Algebra, Interval
+from visup.rules.monitoring.beside_windows import (
+    BegunWindow,
+    DelayedUnbounded,
+    EndedWindow,
+    PreviousSample,
+)
+from visup.rules.monitoring.intervals import EQUAL, UNKNOWN, Algebra, Interval
+from visup.rules.monitoring.samples import SAMPLE_HOLD, SelectObjects, Update, max_samples
 from visup.rules.monitoring.sliding import Fold, Queue, SlidingState, initial, mapped, slide
-
-SAMPLE_HOLD = ticks(0.5)
-"""How long one sample speaks for what follows, microseconds."""
-MIN_SPACING = ticks(0.01)
-"""Samples closer than this are not taken in, which bounds what a window holds; microseconds."""
-LONG_AGO = -(2**62)
-
-Update = Callable[..., tuple[Any, Any]]
-"""(state before or None at the first sample, microseconds, intervals of the parts) -> (state after,
-the interval of the whole)."""
-
-
-def max_samples(span: int) -> int:
-    """Most samples of a span in microseconds, with one for each silence and one at either end."""
-    return span // MIN_SPACING + span // SAMPLE_HOLD + 2
-
-
-SelectObjects = Callable[[Any, Interval], Any]
-"""(intervals, what those of new objects are) -> intervals of the objects there are now."""
 
 
 @dataclass(frozen=True)
@@ -141,89 +126,6 @@ class Unbounded:
         """Most intervals that the state holds for one choice of objects."""
         return 1
 
-
-class LateState(NamedTuple):
-    """What `DelayedUnbounded` retains.
-
-    Attributes:
-        then: Time of the last sample, microseconds.
-        born: Time of the first sample, as an interval without width; infinite before it.
-        kept: The value so far.
-    """
-
-    then: int
-    born: Any
-    kept: Any
-
-
-@dataclass(frozen=True)
-class DelayedUnbounded:
-    """`always`, `once` and `since` of what is told late: from the first sample's moment on.
-
-    What is told first is about moments before the first sample, which are no part of what was
-    watched; of these nothing is known.
-
-    Attributes:
-        kind: 'always', 'once' or 'since'.
-        delay: How late the parts are told, microseconds.
-    """
-
-    kind: str
-    delay: int
-
-    def on(self, algebra: Algebra) -> Update:
-        """How it takes in the values of its parts at a sample."""
-        a, unknown = algebra, algebra.constant(UNKNOWN)
-        lasts = self.kind == "always"
-
-        def started(born: Any, moment: int) -> Any:
-            """TRUE where a moment is not before the first sample, else FALSE."""
-            # Half a microsecond more, so that nothing is 0, which has no sign.
-            return a.scaled(a.shifted(a.scaled(born, -1.0), moment + 0.5), inf)
-
-        def joined(kept: Any, on: Any, *values: Any) -> Any:
-            if lasts:
-                return a.least(kept, a.most(values[0], a.scaled(on, -1.0)))
-            if self.kind == "since":
-                kept = a.least(kept, values[0])
-            return a.most(kept, a.least(values[-1], on))
-
-        def step(state: LateState | None, now: int, *values: Any) -> tuple[LateState, Any]:
-            if state is None:
-                state = self._initial(a, now)
-            then, born, kept = state
-            if now - then > SAMPLE_HOLD:
-                on = started(born, then + SAMPLE_HOLD - self.delay)
-                kept = joined(kept, on, *(unknown,) * len(values))
-            born = a.least(born, a.constant((float(now), float(now))))
-            on = started(born, now - self.delay)
-            kept = joined(kept, on, *values)
-            if lasts:
-                told = a.least(kept, a.most(unknown, on))
-            else:
-                told = a.most(kept, a.least(unknown, a.scaled(on, -1.0)))
-            return LateState(now, born, kept), told
-
-        return step
-
-    def _initial(self, algebra: Algebra, now: int) -> LateState:
-        return LateState(now, algebra.constant(_UNBORN), algebra.constant(self._empty))
-
-    @property
-    def _empty(self) -> Interval:
-        return TRUE if self.kind == "always" else FALSE
-
-    @property
-    def kept(self) -> int:
-        """Most intervals that the state holds for one choice of objects."""
-        return 2
-
-    def rows(self, state: LateState, pick: SelectObjects) -> LateState:
-        """The same state for other objects; those that are new have no past."""
-        return LateState(state.then, pick(state.born, _UNBORN), pick(state.kept, self._empty))
-
-
-_UNBORN: Interval = (inf, inf)
 
 MAYBE: Interval = (0.0, 1.0)
 
@@ -352,7 +254,9 @@ class HysteresisLatch:
 
 PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch
 """Operators whose state is a few numbers for each choice of objects."""
-WindowOperator = SlidingWindow | SlidingCount | DelayedUnbounded
+WindowOperator = (
+    SlidingWindow | SlidingCount | DelayedUnbounded | BegunWindow | EndedWindow | PreviousSample
+)
 """Operators that retain a whole window, or what `vm` has no loop for."""
 TemporalOperator = PointOperator | WindowOperator
 """What remembers something of one formula or quantity from sample to sample."""

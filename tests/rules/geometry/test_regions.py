@@ -175,7 +175,9 @@ def test_outlines_of_an_l_hold_a_box_in_their_corner_that_their_boxes_do_not() -
     assert RCC8[from_outline_signs(signs)[0]] == "disconnected"
 
 
-@pytest.mark.parametrize("box", [(30, 30, 40, 30), (18, 30, 34, 12), (22, 22, 56, 56), (32, 52, 9, 9)])
+@pytest.mark.parametrize(
+    "box", [(30, 30, 40, 30), (18, 30, 34, 12), (22, 22, 56, 56), (32, 52, 9, 9)]
+)
 def test_rcc8_of_outlines_knows_the_hole_of_a_ring(box: tuple[int, ...]) -> None:
     """What covers a part of the hole is no part of the ring, though its outline may lie on it."""
     frame = np.ones((80, 80), dtype=bool)

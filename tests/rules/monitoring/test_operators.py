@@ -24,7 +24,7 @@ from visup.rules.monitoring.compiler import Compiler
 from visup.rules.monitoring.intervals import Interval, verdict
 from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.monitor import Monitor
-from visup.rules.monitoring.operators import max_samples
+from visup.rules.monitoring.samples import max_samples
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.safety.compiled_rules import CompiledRules
@@ -252,7 +252,9 @@ def test_a_verdict_of_the_future_comes_late_and_what_stands_beside_it_waits() ->
     assert [verdict(t).value for t in told] == ["unknown", "unknown", "true", "false", "true"]
 
 
-def test_what_looks_back_without_end_begins_with_the_first_sample_also_of_what_is_told_late() -> None:
+def test_what_looks_back_without_end_begins_with_the_first_sample_also_of_what_is_told_late() -> (
+    None
+):
     falling = [(k / 10, {"x": 1.0 if k < 5 else -1.0}) for k in range(40)]
     once = Monitor(parse_formula("once (eventually[1 s .. 2 s] x() > 0)", signals("x")))
     told = [verdict(once.step(t, v)).value for t, v in falling]
@@ -268,7 +270,7 @@ def test_what_looks_back_without_end_begins_with_the_first_sample_also_of_what_i
 def test_nan_of_any_kind_is_unknown_on_either_side(nan: Any) -> None:
     for text in ("x() > 0 or y() > 0", "y() > 0 or x() > 0"):
         monitor = Monitor(parse_formula(text, signals("x", "y")))
-        assert monitor.step(0.0, {"x": nan, "y": np.int64(-1)}) == (-1, inf)
+        assert monitor.step(0.0, {"x": nan, "y": np.float32(-1)}) == (-1, inf)
         assert monitor.step(0.1, {"x": nan, "y": 2}) == (2, inf)
 
 
