@@ -23,6 +23,7 @@ from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import TaskBelief
 from visup.agent.storage.codec import pack_observation
+from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.jsonable import event_record, object_summary, to_jsonable
 
 APPLICATION_ID = 0x56495355  # "VISU"
@@ -74,7 +75,8 @@ class Journal:
         last_frame: Number of the last frame that is recorded, or None.
 
     Raises:
-        OutputError: It cannot be written, or the one to go on with is of another version.
+        OutputError: It cannot be written, another process is writing it, or the one to go on with is
+            of another version.
     """
 
     def __init__(
@@ -86,12 +88,16 @@ class Journal:
         self._begun: float | None = None
         self._last_event = 0
         self._sizes: list[int] = []
-        if not resume:
-            self._open(path, 1)
-            return
-        old = segments(path)
-        begun = [one for one in old if self._take_over(one)]
-        self._db = _connected(begun[-1])
+        self._lock = acquire_lock(path, "this run")
+        try:
+            if resume:
+                begun = [one for one in segments(path) if self._take_over(one)]
+                self._db = _connected(begun[-1])
+            else:
+                self._begin()
+        except BaseException:
+            self._lock.release()
+            raise
 
     def note(self, **facts: Any) -> None:
         """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
@@ -131,6 +137,17 @@ class Journal:
             self._db.close()
         except sqlite3.Error as fault:
             raise _unwritable(self.path, fault) from fault
+        finally:
+            self._lock.release()
+
+    def _begin(self) -> None:
+        if self.path.is_file() and self.path.stat().st_size:
+            raise OutputError(
+                "a run is recorded here already",
+                where=str(self.path),
+                hint="choose another folder, or delete this one",
+            )
+        self._open(self.path, 1)
 
     def _open(self, path: Path, number: int) -> None:
         try:

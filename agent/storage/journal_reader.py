@@ -13,6 +13,7 @@ from typing import Any
 
 from visup.agent.model.errors import OutputError
 from visup.agent.model.records import Observation
+from visup.agent.storage.atomic import replacing
 from visup.agent.storage.codec import unpack_observation
 from visup.agent.storage.journal import check_version, is_empty, segments
 
@@ -151,7 +152,7 @@ def export_events(journal: Path, target: Path) -> None:
         OutputError: `target` cannot be written, or `journal` cannot be read.
     """
     try:
-        with target.open("w", encoding="utf-8") as out:
+        with replacing(target) as draft, draft.open("w", encoding="utf-8") as out:
             for event in Recording.open(journal).events():
                 out.write(event_text(event) + "\n")
     except OSError as fault:

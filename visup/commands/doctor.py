@@ -15,6 +15,7 @@ LIBRARIES = {
     "networkx": "shock graphs and task graphs",
     "pillow": "pictures with text",
     "lark": "grammars of tasks and rules",
+    "filelock": "one writer at a time for run folders and model databases",
     "pydantic": "settings and recorded files",
     "rich": "the terminal",
     "typer": "the command line",

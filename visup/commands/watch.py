@@ -75,7 +75,7 @@ def watch(
     """
     past = None
     if resume:
-        past = _interrupted(resume, source, settings_file, setting, shown.get("out"))
+        past = _interrupted(resume, setting, source, settings_file, shown.get("out"))
         settings = past.settings
     elif source is None:
         raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
@@ -99,17 +99,18 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
     return WatchSettings(source, **given)
 
 
-def _interrupted(run: Path, *given: Any) -> InterruptedRun:
-    """The run that goes on; what it is about was settled when it began."""
+def _interrupted(run: Path, setting: Given, *given: Any) -> InterruptedRun:
+    """The run that goes on; what it is about was settled when it began, but for code of the user's own."""
     from visup.agent.model.errors import SettingsError
     from visup.runs.resume import interrupted_run
 
-    if any(given):
+    if any(given) or setting.keys() - {"behaviours", "plugins"}:
         raise SettingsError(
             "a resumed run keeps its settings: --resume takes no source, task or other settings",
+            expected="nothing else but the behaviours that it had (--behaviour, --plugin)",
             hint=f"visup watch --resume {run}",
         )
-    return interrupted_run(run)
+    return interrupted_run(run, **setting)
 
 
 @takes(WatchSettings, only=("every",), every=2)

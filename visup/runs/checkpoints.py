@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
+from visup.agent.storage.atomic import write_whole
 from visup.agent.storage.checkpoint import StateError, dump_state, load_state
 from visup.version import __version__
 
@@ -110,10 +112,6 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
 
 
 def _replace(path: Path, data: bytes) -> None:
-    draft = path.with_suffix(".new")
-    try:
-        draft.write_bytes(data)
-        draft.replace(path)
-    except OSError:
-        # The older state stays; that the disk is in trouble is told of the journal.
-        draft.unlink(missing_ok=True)
+    # Where it cannot be written the older state stays; that the disk is in trouble is told of the journal.
+    with suppress(OSError):
+        write_whole(path, data)

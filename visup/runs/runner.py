@@ -36,14 +36,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
     Raises:
         OutputError: It cannot be made, or holds a run already (what was recorded is never lost).
     """
-    if out is None:
-        stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
-        stem = stem or Path(source).resolve().parent.name or "run"
-        out = next(
-            p
-            for n in range(1, 10**6)
-            if not (p := Path("runs") / (stem if n == 1 else f"{stem}-{n}")).exists()
-        )
+    out = out or _numbered_folder(source)
     if (out / "journal.sqlite").exists():
         raise OutputError(
             "the folder holds a run already",
@@ -62,6 +55,22 @@ def fresh_folder(out: Path | None, source: str) -> Path:
             hint="choose a folder that you may write to with --out",
         ) from fault
     return out
+
+
+def _numbered_folder(source: str) -> Path:
+    """`runs/<source>`, made new; numbered where that exists, so that no two runs are given the same."""
+    stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
+    stem = stem or Path(source).resolve().parent.name or "run"
+    for n in range(1, 10**6):
+        folder = Path("runs") / (stem if n == 1 else f"{stem}-{n}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError:
+            break  # it is told when it is tried once more
+        return folder
+    return folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +184,8 @@ class _Run:
         )
         if self._recorder:
             stack.callback(self._recorder.close)
+        if past:
+            past.check_unchanged()  # now that nobody else may write it
         self._sinks = Sinks(options.sinks, settings.source)
         stack.callback(self._sinks.close)
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None

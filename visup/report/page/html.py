@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 
 from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.storage.atomic import write_whole
 from visup.report.page import sections
 from visup.report.page.distance_figures import distance_figures
 from visup.report.page.figures import Figure, presence_figure, stage_figure, vote_figures
@@ -30,10 +31,8 @@ def write_report(run: RunData, path: Path) -> None:
         OutputError: The file cannot be written.
     """
     page = report_page(run)
-    part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(page, encoding="utf-8")
-        part.replace(path)
+        write_whole(path, page.encode())
     except OSError as fault:
         raise OutputError(
             f"the report cannot be written ({fault.strerror or fault})",
