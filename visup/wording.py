@@ -41,8 +41,8 @@ EVENT_KINDS: Mapping[str, str] = {
 def worded_once(events: Sequence[Event]) -> list[Event]:
     """Events for people: what has one cause in a step is told once, by the gravest of its events.
 
-    Of events of a step with the same words (a stage fails, an alert opens) one is told; so of grave ones whose reason
-    is the same (a stage and its task fail, since something was not to be); and a stage that begins and goes on
+    With the same words (a stage fails, an alert opens) one is told; so it is with grave ones of the same
+    reason (a stage and its task fail, since something was not to be); and a stage that begins and goes on
     for the same reason has begun.
     """
     told: dict[tuple[int, str], Event] = {}

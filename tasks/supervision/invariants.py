@@ -71,8 +71,9 @@ def violation(
         safety: Of those of safety, or of the others.
     """
     for invariant, since in zip(model.task.invariants, broken, strict=True):
-        lasted = since is not None and now - since >= patience(model, invariant)
-        if lasted and is_of_safety(model, invariant) is safety:
+        if since is None or now - since < patience(model, invariant):
+            continue
+        if is_of_safety(model, invariant) is safety:
             return _reason(invariant, since)
     return ""
 
