@@ -7,26 +7,28 @@ in `_interval_jit` and in `operators`, for this and for the loops over all choic
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from math import inf, isfinite
+from typing import Any, SupportsFloat
 
+from visup.agent.model.errors import SettingsError
 from visup.rules.formula.nodes import Formula
 from visup.rules.formula.units import TICKS, ticks
 from visup.rules.monitoring import _interval_jit as on_intervals
 from visup.rules.monitoring.compiler import Compiler, Operation
 from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval, Scalars
 from visup.rules.monitoring.operators import (
-    LONG_AGO,
-    SAMPLE_HOLD,
     BooleanWindow,
     HysteresisLatch,
     SampleAndHold,
     SlidingWindow,
     TemporalOperator,
     Unbounded,
-    Update,
 )
+from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD, Update
 
-Signals = Mapping[str, float | Interval | None]
+SignalValue = SupportsFloat | Interval | None
+"""A number of Python or NumPy, an interval, or None where nothing is known."""
+Signals = Mapping[str, SignalValue]
 Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
 """(values of the operations before, states before, states after, microseconds, signals) -> value."""
 
@@ -47,7 +49,8 @@ class Monitor:
 
     Attributes:
         delay: How many seconds late a verdict comes: what is reported at t is about t - delay.
-        state: All that is retained, an immutable value; put back an older one to go on from it.
+        state: All that is retained, an immutable value: microseconds of the last sample, or None
+            before it, and what the operators remember. Put back an older one to go on from it.
     """
 
     def __init__(self, formula: Formula) -> None:
@@ -56,7 +59,7 @@ class Monitor:
         self._runs = [_run(step, k) for k, step in enumerate(compiler.program.steps)]
         self._at = value.step
         self.delay = value.delay / TICKS
-        self.state: tuple[Any, ...] = (None,) * len(self._runs)
+        self.state: tuple[int | None, tuple[Any, ...]] = (None, (None,) * len(self._runs))
 
     def step(self, time: float, values: Signals) -> Interval:
         """Take in one sample.
@@ -67,12 +70,17 @@ class Monitor:
 
         Returns:
             The robustness interval of the formula; see `verdict`.
+
+        Raises:
+            SettingsError: The time is no number, or not later than the one before; a signal is a
+                reversed interval.
         """
-        now, before = ticks(time), self.state
+        then, before = self.state
+        now = _later(time, then)
         after, found = list(before), list[Interval]()
         for run in self._runs:
             found.append(run(found, before, after, now, values))
-        self.state = tuple(after)
+        self.state = now, tuple(after)
         return found[self._at]
 
 
@@ -107,13 +115,35 @@ def _remembering(update: Update, slot: int, one: int, other: int) -> Run:
     return single if other < 0 else pair
 
 
-def _known(value: float | Interval | None) -> Interval:
-    """What a signal says."""
-    if isinstance(value, tuple):
-        return value
-    if value is None or value != value:  # NaN is not equal to itself
+def _later(time: float, before: int | None) -> int:
+    """The moment of a sample in microseconds, which must come after the one before."""
+    if not isfinite(time):
+        raise SettingsError(
+            f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
+        )
+    now = ticks(time)
+    if before is not None and now <= before:
+        what = f"a sample at {time:.6g} s comes after one at {before / TICKS:.6g} s"
+        raise SettingsError(what, expected="times that increase", hint="sort samples by their time")
+    return now
+
+
+_LEAVE_OUT = "leave samples without a time out"
+
+
+def _known(value: SignalValue) -> Interval:
+    """What a signal says, in Python's floats: those of NumPy are slower and warn."""
+    if type(value) is float and value == value:  # NaN is not equal to itself
+        return (value, value)
+    if value is None:
         return UNKNOWN
-    return (value, value)
+    low, high = value if isinstance(value, tuple) else (value, value)
+    low, high = float(low), float(high)
+    low, high = -inf if low != low else low, inf if high != high else high
+    if low > high:
+        what = f"a signal is the interval ({low:g}, {high:g})"
+        raise SettingsError(what, expected="the lower bound first")
+    return (low, high)
 
 
 def _plain(function: Any) -> Callable[..., Any]:
@@ -135,6 +165,9 @@ _FUNCTIONS: Mapping[str, Callable[..., Interval]] = {
     "*": _plain(on_intervals.product),
     "/": on_intervals.quotient,
     "rate": _plain(on_intervals.rate),
+    "sqrt": _plain(on_intervals.rooted),
+    "exp": _plain(on_intervals.exponential),
+    "power": on_intervals.powered,
 }
 """What an operation without memory does: (interval, two numbers) or (two intervals, a number)."""
 

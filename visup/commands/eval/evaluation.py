@@ -70,7 +70,7 @@ class EvaluationCommand:
     def _run(self, json_file: Path | None, given: Given) -> None:
         from rich.console import Console
 
-        from visup.commands.eval.tables import figures_table
+        from visup.commands.eval.figures_table import figures_tables
         from visup.evaluation.oracles import evaluation_module
         from visup.evaluation.record import write_record
 
@@ -82,7 +82,7 @@ class EvaluationCommand:
         console = Console(highlight=False)
         if self.keys:
             title = f"{self.name}: {folder}" if folder else self.name
-            console.print(figures_table(title, figures, self.keys))
+            console.print(*figures_tables(title, figures, self.keys))
         for text in self.closing(figures):
             console.print(text, soft_wrap=isinstance(text, str), markup=False)
         if json_file:
