@@ -20,6 +20,7 @@ LIBRARIES = {
     "rich": "the terminal",
     "typer": "the command line",
     "prompt_toolkit": "the prompt of visup step",
+    "urllib3": "alerts to a webhook",
 }
 """What visup depends on, and what for; the same as `dependencies` in pyproject.toml."""
 
