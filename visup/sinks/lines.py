@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
 from visup.agent.model.errors import OutputError
+from visup.wording import escaped_json
 
 TIMEOUT_S = 5.0
 """For one attempt to reach another machine, seconds."""
@@ -57,5 +57,5 @@ def to_file(name: str, path: Path) -> JsonLines:
 
 
 def json_text(record: Mapping[str, Any]) -> str:
-    """A record as one line of JSON."""
-    return json.dumps(record, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+    """A record as one line of JSON, in which no terminal finds anything to obey."""
+    return escaped_json(record, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
