@@ -271,7 +271,7 @@ def _events(
 
 
 def _concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[AlertCondition]:
-    yield from stage_concerns(memory.belief)
+    yield from stage_concerns(memory.belief, memory.violated)
     yield from invariant_concerns(model, memory)
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 from rich.console import Console
 
@@ -28,6 +29,24 @@ def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:
         ("It fails.", Severity.WARNING),
         ("It rains.", Severity.INFO),
     ]
+
+
+def test_the_same_words_in_another_step_are_told_again() -> None:
+    again = replace(event("It is hidden."), frame_index=400)
+    assert len(worded_once([event("It is hidden."), again])) == 2
+
+
+def test_grave_events_of_one_reason_are_told_by_the_gravest() -> None:
+    told = worded_once(
+        [
+            event("Stage `a` has failed: it moved.", Severity.WARNING, "stage_failed"),
+            event("Task `t` has failed: it moved.", Severity.CRITICAL, "alert"),
+            event("Stage `b` is failing: it stood.", Severity.WARNING, "stage_failing"),
+            event("Task `u` is complete: it moved."),
+        ]
+    )
+    assert [e.text[:6] for e in told] == ["Task `", "Stage ", "Task `"]
+    assert told[0].severity is Severity.CRITICAL
 
 
 def test_long_sentences_go_on_below_themselves_within_80_columns() -> None:

@@ -10,6 +10,7 @@ import typer
 
 from visup.commands.options import REPLAYED, Given, takes
 from visup.runs.settings import Option, WatchSettings
+from visup.terminal.console import make_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,15 +52,13 @@ def replay(
     Exit code: with --diff or --against 0 when nothing changes and 1 when something does; else as of
     `visup watch`. 2 on bad input.
     """
-    from rich.console import Console
-
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import replay as reason_again
     from visup.runs.replay import settings_for
     from visup.runs.runner import fresh_folder
     from visup.terminal.narrator import Narrator
 
-    console, comparison = Console(highlight=False), ReplayComparison(**compared)
+    console, comparison = make_console(), ReplayComparison(**compared)
     recording = Recording.open(run)
     other = comparison.other(recording)
     settings = settings_for(recording, **setting)

@@ -12,6 +12,7 @@ import typer
 
 from visup.commands.options import Given, SettingsFile, takes
 from visup.runs.settings import Option, RunOptions, WatchSettings
+from visup.terminal.console import echo_json, make_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -139,14 +140,13 @@ def run_and_report(
     past: InterruptedRun | None = None,
 ) -> RunResult:
     """Run, print the narrative as it goes and the verdict last."""
-    from rich.console import Console
     from rich.markup import escape
 
     from visup.runs.operator import HumanOperator, typed_lines
     from visup.runs.runner import Audience, fresh_folder, supervise
     from visup.terminal.narrator import Narrator
 
-    console = Console(highlight=False)
+    console = make_console()
     folder = past.recording.path.parent if past else fresh_folder(shown.out, settings.source)
     silent = shown.quiet or shown.as_json
     # Whoever reads events from a pipe does not type answers.
@@ -195,9 +195,7 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
 
 def _print_result(console: Console, result: RunResult, *, as_json: bool) -> None:
     if as_json:
-        import json
-
-        print(json.dumps(_as_json(result), sort_keys=True))
+        echo_json(_as_json(result), sort_keys=True)
         return
     for text in _closing_lines(result):
         console.print(text, soft_wrap=True)

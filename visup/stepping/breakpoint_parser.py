@@ -25,33 +25,7 @@ from visup.stepping.breakpoints import (
     rule_names,
     stage_names,
 )
-
-EVENT_KINDS = (
-    "entry",
-    "noticed",
-    "exit",
-    "occlusion",
-    "reappearance",
-    "coupled",
-    "decoupled",
-    "relation",
-    "identified",
-    "question",
-    "answer",
-    "alert",
-    "alert_closed",
-    "health",
-    "invariant_broken",
-    "stage_started",
-    "stage_progressing",
-    "stage_stalled",
-    "stage_failing",
-    "stage_failed",
-    "stage_done",
-    "stage_unknown",
-    "verdict",
-)
-"""What visup itself tells; plug-ins may tell more."""
+from visup.wording import EVENT_KINDS
 
 
 def parse_condition(what: str | Phase | Predicate | StopCondition, mind: Mind) -> StopCondition:

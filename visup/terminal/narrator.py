@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +12,7 @@ from rich.text import Text
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import event_record
+from visup.terminal.console import echo_json
 from visup.wording import prose, worded_once
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
@@ -57,7 +57,7 @@ class Narrator:
     def print_event(self, event: Event) -> None:
         """Print one event."""
         if self.as_json:
-            print(json.dumps(event_record(event), ensure_ascii=False, sort_keys=True), flush=True)
+            echo_json(event_record(event), ensure_ascii=False, sort_keys=True)
         else:
             self.console.print(event_row(event))
 

@@ -71,13 +71,13 @@ def views_closing(figures: Figures) -> Iterator[RenderableType]:
 
 def machines_closing(figures: Figures) -> Iterator[RenderableType]:
     """The baseline's figures, where it watched, and how many verdicts are right."""
-    from visup.commands.eval.tables import figures_table
+    from visup.commands.eval.figures_table import figures_tables
 
     if "baseline" in figures:
         rows = {n: i["baseline"] for n, i in figures["items"].items()}
         keys = ("verdict", "verdicts_right", "stage_f1", "actors", "contact_f1", "move_f1", "ms")
         told = {"items": rows, "total": figures["baseline"]}
-        yield figures_table("baseline: CSRT on the taught boxes", told, keys)
+        yield from figures_tables("baseline: CSRT on the taught boxes", told, keys)
     total = figures["total"]
     yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
