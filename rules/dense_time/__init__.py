@@ -8,7 +8,7 @@ operator makes of pieces), `lines.py` (signals that are straight between samples
 `monitor.py` (what users call).
 """
 
-from visup.rules.dense_time.monitor import DenseTimeMonitor, judge_recording
+from visup.rules.dense_time.monitor import DenseTimeMonitor, Ends, judge_recording
 from visup.rules.dense_time.sweep import Piece
 
-__all__ = ["DenseTimeMonitor", "Piece", "judge_recording"]
+__all__ = ["DenseTimeMonitor", "Ends", "Piece", "judge_recording"]

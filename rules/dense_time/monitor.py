@@ -23,6 +23,26 @@ NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
+class Ends:
+    """What is outside a recording, and how long a sample is believed.
+
+    Attributes:
+        before: What is before the first sample: not known, or no part of any window ('cut').
+        after: What is after the last one, once the recording is over: not known, no part of any
+            window, or as it was last ('lasting').
+        hold_s: How long a sample is believed when no other comes, seconds; of straight signals how
+            far apart two may be to be joined.
+    """
+
+    before: Before = "unknown"
+    after: After = "unknown"
+    hold_s: float = inf
+
+
+UNKNOWN_ENDS = Ends()
+
+
+@dataclass(frozen=True, slots=True)
 class TimedVerdict:
     """What a formula is in a stretch of time.
 
@@ -42,7 +62,7 @@ class DenseTimeMonitor:
 
     >>> from visup.rules.language.parser import parse_formula
     >>> from visup.rules.predicates.vocabulary import signals
-    >>> monitor = DenseTimeMonitor(parse_formula("x() > 1 within 0.2 s", signals("x")), before="cut")
+    >>> monitor = DenseTimeMonitor(parse_formula("x() > 1 within 0.2 s", signals("x")), ends=Ends("cut"))
     >>> [monitor.step(t, {"x": x}) for t, x in ((0.0, 3.0), (0.25, 0.0))]
     [[], [TimedVerdict(begin_s=0.0, end_s=0.25, robustness=(2.0, 2.0))]]
     >>> monitor.step(0.6, {"x": 2.0})[-1]
@@ -53,11 +73,7 @@ class DenseTimeMonitor:
         reading: 'held': a sample's value stands until the next one. 'linear': values lie straight
             between samples; verdicts are then exact, and robustness is infinite. 'samples': as
             'held', but `since` and `until` ask sample by sample, as `Monitor` does.
-        hold_s: How long a sample is believed when no other comes, seconds; of 'linear' how far
-            apart two may be to be joined.
-        before: What is before the first sample: not known, or no part of any window ('cut').
-        after: What is after the last one, once `finish` is called: not known, no part of any
-            window, or as it was last ('lasting').
+        ends: What is outside the recording.
 
     Attributes:
         delay: How many seconds at most a verdict waits for the future; also for the next sample.
@@ -70,16 +86,13 @@ class DenseTimeMonitor:
         self,
         formula: Formula,
         reading: Reading = "held",
-        *,
-        hold_s: float = inf,
-        before: Before = "unknown",
-        after: After = "unknown",
+        ends: Ends = UNKNOWN_ENDS,
     ) -> None:
         compiler = PieceCompiler(reading)
         self._at = compiler.formula(formula)
         self._program = compiler.program
-        self._linear, self._before, self._after = reading == "linear", before, after
-        self._hold = inf if hold_s == inf else ticks(hold_s)
+        self._linear, self._before, self._after = reading == "linear", ends.before, ends.after
+        self._hold = inf if ends.hold_s == inf else ticks(ends.hold_s)
         self.delay = horizon(formula) / TICKS
         self._begin, self._end = 0, 0
         self._then: int | None = None
@@ -198,10 +211,7 @@ def judge_recording(
     formula: Formula,
     samples: Iterable[tuple[float, Signals]],
     reading: Reading = "held",
-    *,
-    hold_s: float = inf,
-    before: Before = "unknown",
-    after: After = "unknown",
+    ends: Ends = UNKNOWN_ENDS,
     end_s: float | None = None,
 ) -> list[TimedVerdict]:
     """What a formula is at every moment of a recording; arguments as of `DenseTimeMonitor` and its `finish`.
@@ -209,7 +219,7 @@ def judge_recording(
     Returns:
         Stretches of time that follow each other, neighbours with different values.
     """
-    monitor = DenseTimeMonitor(formula, reading, hold_s=hold_s, before=before, after=after)
+    monitor = DenseTimeMonitor(formula, reading, ends)
     found = [v for time, values in samples for v in monitor.step(time, values)]
     return _merged([*found, *monitor.finish(end_s)])
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.oracles.peers.translation import NotExpressibleError, Translator, walk, word
 from visup.agent.model.errors import VisupError
-from visup.rules.dense_time import judge_recording
+from visup.rules.dense_time import Ends, judge_recording
 from visup.rules.dense_time.monitor import After, Before, Reading, TimedVerdict
 from visup.rules.language.parser import parse_formula
 from visup.rules.monitoring.intervals import Interval
@@ -66,13 +66,13 @@ def judge(case: Case) -> list[TimedVerdict]:
     source = translated(case, last - times[0] + 1)
     formula = parse_formula(source, signals(*map(word, case["signals"])))
     before, after = ends(case)
+    if after == "unknown" and max(asked, default=0) > times[-1]:
+        after = "lasting"  # so a peer that tells of moments after the last sample takes it
     return judge_recording(
         formula,
         [(t, _values(case, t)) for t in times],
         reading_of(case),
-        before=before,
-        # A peer that tells of moments after the last sample takes that to last.
-        after="lasting" if after == "unknown" and max(asked, default=0) > times[-1] else after,
+        Ends(before, after),
         end_s=last,
     )
 

@@ -19,7 +19,7 @@ from tests.oracles.dense_oracle import CELL_MS, DenseOracle
 from tests.oracles.reasoning.rule_scenes import FPS, minds, twenty_rules
 from visup.agent import Mind, Observation
 from visup.evaluation.figures import Progress, silent
-from visup.rules.dense_time import judge_recording
+from visup.rules.dense_time import Ends, judge_recording
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula, shipped_rules
@@ -113,8 +113,7 @@ def _against_dense_oracle(count: int, seed: int) -> dict[str, Any]:
         told = judge_recording(
             formula,
             [(k * CELL_MS / 1000, _numpy(v)) for k, v in drawn],
-            before=ends,
-            after=ends,
+            ends=Ends(ends, ends),
             end_s=len(truth) * CELL_MS / 1000,
         )
         moments = (k * CELL_MS / 1000 for k in range(len(truth)))

@@ -11,7 +11,7 @@ from tests.oracles.dense_formulas import dense_formula, held, random_recording
 from tests.oracles.dense_oracle import CELL_MS, DenseOracle
 from tests.oracles.reasoning.rules import alike
 from visup.agent.model.errors import RuleError, SettingsError
-from visup.rules.dense_time import DenseTimeMonitor, judge_recording
+from visup.rules.dense_time import DenseTimeMonitor, Ends, judge_recording
 from visup.rules.dense_time.monitor import TimedVerdict
 from visup.rules.language.parser import parse_formula
 from visup.rules.monitoring.intervals import Interval, verdict
@@ -35,8 +35,7 @@ def test_random_formulas_are_what_the_oracle_says_in_every_cell(block: int) -> N
         told = judge_recording(
             formula,
             [(k * CELL_MS / 1000, v) for k, v in samples],
-            before=ends,
-            after=ends,
+            ends=Ends(ends, ends),
             end_s=len(truth) * CELL_MS / 1000,
         )
         mine = [at(told, k * CELL_MS / 1000) for k in range(len(truth))]
@@ -76,7 +75,7 @@ TEXTS = {
 @pytest.mark.parametrize("text", TEXTS)
 def test_what_changes_between_samples_is_told_to_the_microsecond(text: str) -> None:
     samples = [(0.0, {"x": -1}), (0.7, {"x": 1}), (0.8, {"x": -1}), (2.0, {"x": -1})]
-    told = judge_recording(parse_formula(text, signals("x")), samples, before="cut", after="cut")
+    told = judge_recording(parse_formula(text, signals("x")), samples, ends=Ends("cut", "cut"))
     for begin, end, truth in TEXTS[text]:
         for moment in (begin, end - 1e-6):
             assert (verdict(at(told, moment)).value == "true") is truth, (begin, end)
@@ -97,17 +96,17 @@ def test_a_straight_signal_changes_its_verdict_where_it_crosses() -> None:
 )
 def test_the_end_of_a_recording_is_read_as_one_chooses(ends: str, expected: str) -> None:
     formula = parse_formula("eventually[1 s .. 2 s] x() > 0", signals("x"))
-    told = judge_recording(formula, [(0.0, {"x": 1}), (0.5, {"x": -1})], after=ends)  # type: ignore[arg-type]
+    told = judge_recording(formula, [(0.0, {"x": 1}), (0.5, {"x": -1})], ends=Ends(after=ends))  # type: ignore[arg-type]
     assert verdict(at(told, 0.5)).value == expected
     always = parse_formula("henceforth[1 s .. 2 s] x() > 0", signals("x"))
-    weak = judge_recording(always, [(0.0, {"x": 1}), (0.5, {"x": 1})], after=ends)  # type: ignore[arg-type]
+    weak = judge_recording(always, [(0.0, {"x": 1}), (0.5, {"x": 1})], ends=Ends(after=ends))  # type: ignore[arg-type]
     assert verdict(at(weak, 0.5)).value == {"unknown": "unknown"}.get(ends, "true")
 
 
 def test_a_formula_stays_decided_in_a_silence_while_its_window_decides_it() -> None:
     formula = parse_formula("(x() > 0 within 3 s) for 1 s", signals("x"))
     samples = [(0.0, {"x": 1}), (1.0, {"x": -1}), (5.0, {"x": -1})]
-    told = judge_recording(formula, samples, hold_s=0.5)
+    told = judge_recording(formula, samples, ends=Ends(hold_s=0.5))
     values = [verdict(at(told, t)).value for t in (1.5, 2.5, 4.0)]
     assert values == ["true", "true", "unknown"]
 
