@@ -10,9 +10,9 @@ from math import inf
 from visup.agent.model.errors import RuleError
 from visup.rules.dense_time.lines import LineComparison, combined, refused
 from visup.rules.dense_time.operators import (
-    Hold,
     Latch,
     Operator,
+    PieceHold,
     Pointwise,
     PreviousPiece,
     SinceWindow,
@@ -121,7 +121,7 @@ class PieceCompiler:
                 sides = self.formula(left), self.formula(right)
                 return self._step(UntilWindow(*_bounds(window), self._samples), *sides)
             case Last(part=part, duration=age):
-                return self._step(Hold(ticks(age.base)), self.formula(part))
+                return self._step(PieceHold(ticks(age.base)), self.formula(part))
             case Previous(part=part) if self._samples:
                 return self._step(PreviousPiece(), self.formula(part))
         raise RuleError(
@@ -160,7 +160,7 @@ class PieceCompiler:
         span, part = ticks(node.duration.base), self.term(node.part)
         match node.name:
             case "last":
-                return self._step(Hold(span), part)
+                return self._step(PieceHold(span), part)
             case "before":
                 return self._window("always", -span, -span, part)
             case "lowest" | "highest":

@@ -223,7 +223,7 @@ class Latch:
         return []
 
 
-class Hold:
+class PieceHold:
     """`last(f, 0.5 s)`: what was known last, while that is no older.
 
     Args:
