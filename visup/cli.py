@@ -21,6 +21,7 @@ from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
+from visup.terminal.console import complain, echo
 from visup.version import __version__
 
 BAD_INPUT = 2
@@ -54,7 +55,7 @@ app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"visup {__version__}")
+        echo(f"visup {__version__}")
         raise typer.Exit
 
 
@@ -72,19 +73,12 @@ def main() -> None:
     try:
         app()
     except VisupError as error:
-        _complain(str(error))
+        complain(str(error))
         sys.exit(BAD_INPUT)
     except BrokenPipeError:
         # The reader (such as `head`) went away; nothing more can be said to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
-
-
-def _complain(message: str) -> None:
-    from rich.console import Console
-    from rich.text import Text
-
-    Console(stderr=True, soft_wrap=True).print(Text("error: ", style="bold red") + Text(message))
 
 
 if __name__ == "__main__":

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from visup.agent import Event, Severity
+
+DANGEROUS = re.compile(
+    "[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff\\ufeff]+"
+)
+"""What a terminal obeys instead of showing it: control characters but for tabs and ends of line, marks that
+turn the reading order, and halves of characters, which cannot be printed."""
 
 EVENT_KINDS: Mapping[str, str] = {
     "entry": "an object comes into view over the border",
@@ -71,3 +80,25 @@ def prose(text: str) -> str:
     "Stage 'captured' is failing."
     """
     return text.replace("`", "'")
+
+
+def printable(text: str) -> str:
+    r"""A text without what a terminal, or a reader, would be led astray by.
+
+    >>> printable("the \x1b[2Jarm\u202e")
+    'the [2Jarm'
+    """
+    return DANGEROUS.sub("", text)
+
+
+def escaped_json(value: Any, **options: Any) -> str:
+    """A value as JSON; what `printable` takes out stands in it as an escape, so that nothing is lost.
+
+    Args:
+        value: JSON-like.
+        options: As of `json.dumps`.
+    """
+    return DANGEROUS.sub(
+        lambda found: "".join(f"\\u{ord(c):04x}" for c in found.group()),
+        json.dumps(value, **options),
+    )

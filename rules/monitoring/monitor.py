@@ -7,12 +7,10 @@ in `_interval_jit` and in `operators`, for this and for the loops over all choic
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import inf, isfinite
-from typing import Any, SupportsFloat
+from typing import Any
 
-from visup.agent.model.errors import SettingsError
 from visup.rules.formula.nodes import Formula
-from visup.rules.formula.units import TICKS, ticks
+from visup.rules.formula.units import TICKS
 from visup.rules.monitoring import _interval_jit as on_intervals
 from visup.rules.monitoring.compiler import Compiler, Operation
 from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval, Scalars
@@ -25,10 +23,8 @@ from visup.rules.monitoring.operators import (
     Unbounded,
 )
 from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD, Update
+from visup.rules.monitoring.signals import Signals, known_interval, later
 
-SignalValue = SupportsFloat | Interval | None
-"""A number of Python or NumPy, an interval, or None where nothing is known."""
-Signals = Mapping[str, SignalValue]
 Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
 """(values of the operations before, states before, states after, microseconds, signals) -> value."""
 
@@ -76,7 +72,7 @@ class Monitor:
                 reversed interval.
         """
         then, before = self.state
-        now = _later(time, then)
+        now = later(time, then)
         after, found = list(before), list[Interval]()
         for run in self._runs:
             found.append(run(found, before, after, now, values))
@@ -92,7 +88,7 @@ def _run(step: Operation, slot: int) -> Run:
         return _remembering(_update(step.operator), slot, one, other)
     if step.node is not None:
         name = step.node.name
-        return lambda v, before, after, now, signals: _known(signals.get(name))
+        return lambda v, before, after, now, signals: known_interval(signals.get(name))
     if step.kind == "number":
         return lambda v, before, after, now, signals: (first, first)
     function = _FUNCTIONS[step.kind]
@@ -113,37 +109,6 @@ def _remembering(update: Update, slot: int, one: int, other: int) -> Run:
         return value
 
     return single if other < 0 else pair
-
-
-def _later(time: float, before: int | None) -> int:
-    """The moment of a sample in microseconds, which must come after the one before."""
-    if not isfinite(time):
-        raise SettingsError(
-            f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
-        )
-    now = ticks(time)
-    if before is not None and now <= before:
-        what = f"a sample at {time:.6g} s comes after one at {before / TICKS:.6g} s"
-        raise SettingsError(what, expected="times that increase", hint="sort samples by their time")
-    return now
-
-
-_LEAVE_OUT = "leave samples without a time out"
-
-
-def _known(value: SignalValue) -> Interval:
-    """What a signal says, in Python's floats: those of NumPy are slower and warn."""
-    if type(value) is float and value == value:  # NaN is not equal to itself
-        return (value, value)
-    if value is None:
-        return UNKNOWN
-    low, high = value if isinstance(value, tuple) else (value, value)
-    low, high = float(low), float(high)
-    low, high = -inf if low != low else low, inf if high != high else high
-    if low > high:
-        what = f"a signal is the interval ({low:g}, {high:g})"
-        raise SettingsError(what, expected="the lower bound first")
-    return (low, high)
 
 
 def _plain(function: Any) -> Callable[..., Any]:

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import sqlite3
-import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

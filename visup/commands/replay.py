@@ -10,6 +10,7 @@ import typer
 
 from visup.commands.options import REPLAYED, Given, takes
 from visup.runs.settings import Option, WatchSettings
+from visup.terminal.console import make_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -55,10 +56,9 @@ def replay(
     from visup.runs.replay import replay as reason_again
     from visup.runs.replay import settings_for
     from visup.runs.runner import fresh_folder
-    from visup.terminal.console import PatientConsole
     from visup.terminal.narrator import Narrator
 
-    console, comparison = PatientConsole(highlight=False), ReplayComparison(**compared)
+    console, comparison = make_console(), ReplayComparison(**compared)
     recording = Recording.open(run)
     other = comparison.other(recording)
     settings = settings_for(recording, **setting)

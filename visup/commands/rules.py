@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ import typer
 
 from visup.commands.options import Given, takes
 from visup.runs.settings import WatchSettings
+from visup.terminal.console import echo, echo_json
 
 if TYPE_CHECKING:
     from visup.agent import Mind
@@ -39,9 +39,9 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
         except VisupError as error:
             faults.append(error)
         else:
-            typer.echo(f"{file}: ok")
+            echo(f"{file}: ok")
             for rule in found:
-                typer.echo(f"  {rule.name}: {_cost(rule)}")
+                echo(f"  {rule.name}: {_cost(rule)}")
     raise_errors(faults)
 
 
@@ -66,11 +66,11 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
                     "text": str(rule),
                 }
             )
-        typer.echo(json.dumps(rows, indent=2))
+        echo_json(rows, indent=2)
         return
     width = max((len(r.name) for r in found), default=0)
     for rule in found:
-        typer.echo(f"{rule.name:{width}}  {rule.severity.name.lower():8}  {_cost(rule)}")
+        echo(f"{rule.name:{width}}  {rule.severity.name.lower():8}  {_cost(rule)}")
 
 
 @app.command()
@@ -98,7 +98,7 @@ def explain(
         raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
     told = explanations(mind, rule)
     for text in told or [f"at {mind.time:g} s too few objects are in view for any choice"]:
-        typer.echo(text)
+        echo(text)
 
 
 def explanations(mind: Mind, only: str | None) -> list[str]:

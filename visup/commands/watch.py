@@ -12,6 +12,7 @@ import typer
 
 from visup.commands.options import Given, SettingsFile, takes
 from visup.runs.settings import Option, RunOptions, WatchSettings
+from visup.terminal.console import echo_json, make_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -148,10 +149,9 @@ def run_and_report(
     from visup.runs.operator import HumanOperator, typed_lines
     from visup.runs.runner import Audience, fresh_folder, supervise
     from visup.story import Detail, Narrative
-    from visup.terminal.console import PatientConsole
     from visup.terminal.narrator import Narrator
 
-    console = PatientConsole(highlight=False)
+    console = make_console()
     narrative = Narrative(Detail.ALL if shown.verbose else Detail.USUAL)
     narrator = Narrator(console, shown.as_json, narrative)
     folder = past.recording.path.parent if past else fresh_folder(shown.out, settings.source)
@@ -203,9 +203,7 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
 
 def _print_result(console: Console, result: RunResult, *, as_json: bool) -> None:
     if as_json:
-        import json
-
-        console.out(json.dumps(_as_json(result), sort_keys=True), highlight=False)
+        echo_json(_as_json(result), sort_keys=True)
         return
     for text in _closing_lines(result):
         console.print(text, soft_wrap=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 
 from rich.console import Console
@@ -14,6 +13,7 @@ from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import event_record
 from visup.runs.result import RunResult
 from visup.story import Narrative, summary_lines
+from visup.terminal.console import echo_json
 from visup.wording import prose
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
@@ -68,13 +68,12 @@ class Narrator:
     def print_event(self, event: Event) -> None:
         """Print one event."""
         if self.as_json:
-            line = json.dumps(event_record(event), ensure_ascii=False, sort_keys=True)
-            self.console.out(line, highlight=False)
+            echo_json(event_record(event), ensure_ascii=False, sort_keys=True)
         elif self.console.is_terminal:
             self.console.print(event_row(event))
         else:
             # A file or a pipe has no width: one line for each event, for whoever searches in them.
-            self.console.out(event_line(event), highlight=False)
+            self.console.print(Text(event_line(event)), soft_wrap=True)
 
 
 def event_line(event: Event) -> str:

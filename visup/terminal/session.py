@@ -15,6 +15,7 @@ from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
 from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
+from visup.terminal.console import make_console
 from visup.terminal.narrator import event_row
 from visup.terminal.session_commands import COMMANDS
 from visup.terminal.session_views import VIEWS, number_in, refusal, usage
@@ -43,7 +44,7 @@ class Session:
         console: Console | None = None,
     ) -> None:
         self.timelines = [Stepper(agent, frames)]
-        self.console = console or Console(highlight=False)
+        self.console = console or make_console()
         self._marks: dict[str, Bookmark] = {}
 
     @property

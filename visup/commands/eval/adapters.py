@@ -149,6 +149,17 @@ def rules_differ(figures: Figures) -> bool:
     return any(item.get("different") for item in figures["items"].values())
 
 
+def peers_closing(figures: Figures) -> Iterator[str]:
+    """The first cases that do not come out as the peer's."""
+    for case in figures["differing"][:20]:
+        yield f"{case['outcome'].replace('_', ' ')}: {case['id']} ({case['of']})"
+
+
+def peers_differ(figures: Figures) -> bool:
+    """Whether a case differs beyond what is said of semantics."""
+    return bool(figures["total"]["differ"])
+
+
 def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Figures:
     """Recognition of random tasks, with its bars."""
     from visup.evaluation.oracles import oracle

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 from html import escape
 from importlib.resources import files
@@ -16,7 +18,7 @@ from visup.report.page.figures import Figure, presence_figure, stage_figure, vot
 from visup.report.page.summary import title_of, verdict_words
 from visup.report.page.task_trees import courses
 from visup.report.records import RunData
-from visup.wording import prose
+from visup.wording import printable, prose
 
 
 def write_report(run: RunData, path: Path) -> None:
@@ -58,6 +60,8 @@ def report_page(run: RunData) -> str:
     distances, votes = distance_figures(run), vote_figures(run)
     drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
     own = files("visup.report.page")
+    plotly = plotly_source() if drawn else ""
+    script = (own / "report.js").read_text(encoding="utf-8")
     page = Template((own / "report.html").read_text(encoding="utf-8"))
     text = {
         "title": escape(title_of(run)),
@@ -80,11 +84,18 @@ def report_page(run: RunData) -> str:
         "figures": embedded(drawn),
     }
     return page.substitute(
-        {name: prose(words) for name, words in text.items()},
+        {name: printable(prose(words)) for name, words in text.items()},
         style=(own / "report.css").read_text(encoding="utf-8"),
-        plotly=plotly_source() if drawn else "",
-        script=(own / "report.js").read_text(encoding="utf-8"),
+        plotly=plotly,
+        script=script,
+        scripts_allowed=" ".join(map(script_hash, (plotly, script))),
     )
+
+
+def script_hash(script: str) -> str:
+    """A script as a content security policy allows it, and no other."""
+    digest = hashlib.sha256(script.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
 def embedded(figures: list[Figure]) -> str:
