@@ -2,8 +2,8 @@
 
 Names of models, texts of tasks, a server's answer may hold anything, also sequences that clear the
 screen, set its title, or turn the reading order round. `tests/terminal/test_console.py` sees to it that
-nothing else in visup prints. Nobody has to read it either: when the reader goes away (`visup watch ... | head -1`),
-what is said from then on is lost, and a supervisor goes on.
+nothing else in visup prints. Nobody has to read it either: when the reader goes away (as in
+`visup watch ... | head -1`), what is said from then on is lost, and a supervisor goes on.
 """
 
 from __future__ import annotations
