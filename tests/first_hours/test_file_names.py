@@ -33,4 +33,4 @@ def test_any_file_name_can_be_watched_recorded_and_replayed(
             [sys.executable, "-m", "visup.cli", *words], env=env, capture_output=True, check=False
         )
         assert done.returncode == 0, done.stderr
-    assert {os.fsdecode(n) for n in os.listdir(run)} >= {"annotated.webm", "report.html"}
+    assert {p.name for p in Path(os.fsdecode(run)).iterdir()} >= {"annotated.webm", "report.html"}
