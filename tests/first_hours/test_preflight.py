@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli import Call
 from visup.runs.demo import demo_settings
-from visup.runs.preflight import unrecognisable
+from visup.runs.inputs.preflight import unrecognisable
 from visup.tasks import parse_task
 
 MODELS = demo_settings().models

@@ -25,7 +25,7 @@ def check(
     and the actors of each task are looked for among the models. Exit code: 0 when a run can begin, 2 when it
     cannot.
     """
-    from visup.runs.preflight import check_cast, readiness
+    from visup.runs.inputs.preflight import check_cast, readiness
     from visup.runs.wiring import build_agent, open_video
     from visup.terminal.console import echo
 

@@ -14,8 +14,8 @@ from visup.agent.model.step import Observer, Step
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
+from visup.runs.inputs.preflight import check_cast
 from visup.runs.monotonic_clock import MonotonicFrames
-from visup.runs.preflight import check_cast
 from visup.runs.recorder import Recorder, recorder_state
 from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
