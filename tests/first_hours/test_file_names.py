@@ -28,7 +28,8 @@ def test_any_file_name_can_be_watched_recorded_and_replayed(
     shutil.copy(os.fsencode(clip), source)
     known = {k: v for k, v in os.environ.items() if k not in ("LANG", "LC_CTYPE")}
     env = {**known, **surroundings, "PYTHONPATH": str(ROOT)}
-    for words in (["watch", source, "--out", run], ["replay", run]):
+    commands: list[list[str | bytes]] = [["watch", source, "--out", run], ["replay", run]]
+    for words in commands:
         done = subprocess.run(
             [sys.executable, "-m", "visup.cli", *words], env=env, capture_output=True, check=False
         )
