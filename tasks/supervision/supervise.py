@@ -18,6 +18,7 @@ from visup.agent import (
     Observation,
     Outcome,
     Presence,
+    Reasoner,
     Severity,
     TaskBelief,
     Verdict,
@@ -74,7 +75,7 @@ def task_reasoner(
     tasks: Sequence[Task],
     settings: TaskSettings = DEFAULT_SETTINGS,
     actions: Mapping[str, ActionDefinition] | None = None,
-) -> TaskReasoner:
+) -> Reasoner:
     """The reasoner that supervises some tasks.
 
     Args:
