@@ -9,6 +9,7 @@ reasoned about again without its video. Read next: `journal_reader.py`, which re
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 import zlib
 from contextlib import closing
@@ -336,8 +337,14 @@ def _alert_row(a: Alert) -> tuple[Any, ...]:
 
 
 def _text(value: Any) -> str:
-    """Plain values as JSON, the same values as the same text."""
-    return _TEXT.encode(value)
+    """Plain values as JSON, the same values as the same text.
+
+    File names that are not UTF-8 hold what no file can; it stands in the text as escapes.
+    """
+    return _SURROGATE.sub(lambda found: f"\\u{ord(found[0]):04x}", _TEXT.encode(value))
+
+
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 _TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)
