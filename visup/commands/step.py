@@ -37,11 +37,12 @@ def step(
     Commands are read from the terminal, or from a pipe: one a line, see `help`. Exit code: 0; from a pipe 2
     when a command could not be obeyed.
     """
+    from visup.agent.storage.journal_reader import is_run
     from visup.terminal.prompt import read_commands
     from visup.terminal.session import Session
 
     with ExitStack() as stack:
-        if _is_run(source):
+        if is_run(source):
             agent, frames = _recorded(Path(source), setting, settings_file)
         else:
             agent, frames = _live(watch_settings(source, setting, settings_file), stack)
@@ -50,13 +51,6 @@ def step(
         code = session.run(read_commands(session))
     # At a prompt a slip is put right by the next line; from a pipe nobody would know of it.
     raise typer.Exit(0 if at_prompt else code)
-
-
-def _is_run(source: str) -> bool:
-    from visup.agent.storage.journal_reader import JOURNAL
-
-    path = Path(source)
-    return (path / JOURNAL).is_file() or (path.is_file() and path.name == JOURNAL)
 
 
 def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
