@@ -143,7 +143,7 @@ def test_a_name_typed_before_the_question_could_be_read_is_no_answer() -> None:
         return ["guitar\n"] if new else []
 
     agent.observers = (HumanOperator(typed=typed, tell=lambda text: None).attend(agent),)
-    last = steps(agent, 0, 60)[-1]
+    last = steps(agent, 0, 120)[-1]
     assert asked
     assert not last.mind.answers
 
