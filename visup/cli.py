@@ -15,6 +15,7 @@ from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
 from visup.commands.models import app as models_app
+from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
@@ -42,6 +43,7 @@ app = typer.Typer(
 app.command("watch")(watch)
 app.command("demo")(demo)
 app.command("check")(check)
+app.command("presets")(presets)
 app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)
