@@ -7,6 +7,7 @@ import os
 import re
 import sqlite3
 import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
