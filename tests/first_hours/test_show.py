@@ -22,6 +22,8 @@ def test_the_same_picture_is_shown_live_and_of_the_run(
         assert done.code == 0, done.out
         assert f"{name}: 96 x 72 pixels" in done.out
     live, run = (cv2.imread(str(tmp_path / n)) for n in ("live.png", "run.png"))
+    assert live is not None
+    assert run is not None
     np.testing.assert_array_equal(live, run)
     raw = cv2.VideoCapture(str(clip))
     assert not any(np.array_equal(live, raw.read()[1]) for _ in range(40))  # something is drawn
