@@ -8,12 +8,14 @@ from typing import Annotated
 
 import typer
 
-from visup.agent.model.errors import VisupError
+from visup.agent.model.errors import SettingsError, VisupError
 from visup.commands.behaviours import app as behaviours_app
+from visup.commands.check import check
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
 from visup.commands.models import app as models_app
+from visup.commands.presets import presets
 from visup.commands.render import render
 from visup.commands.replay import replay
 from visup.commands.rules import app as rules_app
@@ -21,9 +23,15 @@ from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
+from visup.terminal.console import complain, echo
 from visup.version import __version__
 
 BAD_INPUT = 2
+
+LEAST_MEMORY_MB = 1200
+MEMORY_A_CORE_MB = 100
+"""Address space that libraries take when they are loaded: measured with 2 cores at 1.2 GB; each core has
+threads, which have stacks."""
 
 # Small matrices are many here: threads of the linear algebra library cost more than they bring.
 # Set before NumPy is imported; whoever set it otherwise is obeyed.
@@ -39,6 +47,8 @@ app = typer.Typer(
 )
 app.command("watch")(watch)
 app.command("demo")(demo)
+app.command("check")(check)
+app.command("presets")(presets)
 app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)
@@ -54,7 +64,7 @@ app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"visup {__version__}")
+        echo(f"visup {__version__}")
         raise typer.Exit
 
 
@@ -70,9 +80,11 @@ def options(
 def main() -> None:
     """Run the command; every error that is the user's to mend is one message and exit code 2."""
     try:
+        if not {"-h", "--help", "--version"} & set(sys.argv):
+            _check_memory()
         app()
     except VisupError as error:
-        _complain(str(error))
+        complain(str(error))
         sys.exit(BAD_INPUT)
     except BrokenPipeError:
         # The reader (such as `head`) went away; nothing more can be said to it.
@@ -80,11 +92,25 @@ def main() -> None:
         sys.exit(0)
 
 
-def _complain(message: str) -> None:
-    from rich.console import Console
-    from rich.text import Text
+def _check_memory() -> None:
+    """Libraries that cannot have the memory that they take end the program without a word.
 
-    Console(stderr=True, soft_wrap=True).print(Text("error: ", style="bold red") + Text(message))
+    Raises:
+        SettingsError: A limit is set (`ulimit -v`), and it is too low.
+    """
+    try:
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    except (ImportError, OSError):
+        return
+    least = LEAST_MEMORY_MB + MEMORY_A_CORE_MB * (os.cpu_count() or 1)
+    if limit != resource.RLIM_INFINITY and limit < least * 2**20:
+        raise SettingsError(
+            f"this process may use {limit >> 20} MB of memory, which visup cannot work with",
+            expected=f"{least} MB or more",
+            hint="raise the limit: ulimit -v unlimited",
+        )
 
 
 if __name__ == "__main__":

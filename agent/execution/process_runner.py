@@ -1,48 +1,38 @@
 """A behaviour in a process of its own: hard limits of time and memory, whatever it does.
 
-The frame goes over shared memory, everything else as messages. The process is started by a server
-that has the libraries loaded already where the platform has one (`forkserver`), else afresh
-(`spawn`). A process that hangs or dies is replaced by a new one, whose behaviour is as it was when
-it was plugged in: what it had learnt is lost. `worker.py` is the other end.
-
-Both ends are pickled through a pipe that nobody else can open. Loading what comes back may run code of the
-behaviour's, which importing its file here has done before: isolation is for mishaps, not for malice.
+Images go over a file in memory, everything else as messages, which are data (`messages.py`): nothing that
+the process sends can run here. A process that hangs or dies is replaced by a new one, whose behaviour is as
+it was when it was plugged in: what it had learnt is lost. `sandbox.py` says how the process is started and
+ended, `worker.py` is what runs in it.
 """
 
 from __future__ import annotations
 
-import multiprocessing as mp
-import pickle
+import base64
+import os
 import sys
-import weakref
-from collections.abc import Sequence
-from multiprocessing.connection import Connection
-from multiprocessing.context import BaseContext
-from multiprocessing.process import BaseProcess
-from multiprocessing.shared_memory import SharedMemory
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
 from visup.agent.contract.limits import Limits
+from visup.agent.execution.messages import Channel, Message, MessageError
 from visup.agent.execution.runners import ProcessDiedError, RunTimeoutError, duration_text
+from visup.agent.execution.sandbox import LARGEST_OUTPUT_BYTES, Sandbox
 from visup.agent.execution.validation import check_percepts, collect_percepts
-from visup.agent.execution.worker import (
-    EXCEPTIONS,
-    PackedBehaviour,
-    RunReply,
-    RunRequest,
-    pickled,
-    serve,
-)
+from visup.agent.execution.worker import EXCEPTIONS
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Observation, Percept
+from visup.agent.plugins.isolated import IsolatedBehaviour
+from visup.agent.storage.checkpoint import StateError, dump_state, loaded_modules, state_of
+from visup.agent.storage.codec import decode_percept, encode, to_document
 
-LARGEST_REPLY_BYTES = 256 * 2**20
-"""Bytes of one answer; what is larger is refused unread."""
+PLUG_IN = "visup_plugin_"
 
 
 class ProcessRunner:
@@ -60,8 +50,10 @@ class ProcessRunner:
     def __init__(self, behaviour: Behaviour, contract: Contract, limits: Limits) -> None:
         self._contract = contract
         self._limits = limits
-        self._parcel = pack_behaviour(behaviour, contract)
-        self._child: _ChildProcess | None = None
+        memory_mb = limits.megabytes(contract)
+        self._origin = {"do": "start", "memory_mb": memory_mb, **origin_of(behaviour, contract)}
+        self._child: ChildProcess | None = None
+        self._replaces = False
         self._sent = -1
 
     def maintain(self) -> bool:
@@ -79,107 +71,90 @@ class ProcessRunner:
     ) -> tuple[Percept, ...]:
         """See `Runner`."""
         child = self._ready(seconds)
-        try:
-            answer = child.ask(self._request(child, frame, observation, directives), seconds)
-        except (RunTimeoutError, ProcessDiedError):
-            child.kill()
-            raise
-        if answer.fault is not None:
-            kind, said = answer.fault
+        answer = child.ask(self._request(child, frame, observation, directives), seconds)
+        if "fault" in answer:
+            kind, said = _fault(answer)
             if kind == MemoryError.__name__:
                 child.kill()  # what it holds is given back
             raise EXCEPTIONS.get(kind, BehaviourError)(said)
-        percepts = collect_percepts(self._contract, answer.percepts)
+        percepts = collect_percepts(self._contract, _percepts(answer))
         check_percepts(self._contract, percepts, frame, observation)
         return percepts
 
     def close(self) -> None:
         """End the process."""
         if self._child is not None:
-            self._child.end()
+            self._child.close()
             self._child = None
 
-    def _start(self, old: _ChildProcess | None = None) -> _ChildProcess:
+    def _start(self, old: ChildProcess | None = None) -> ChildProcess:
         if old is not None:
-            old.end()
+            old.close()
+        self._replaces = old is not None
         self._sent = -1
-        memory_mb = self._limits.megabytes(self._contract)
-        return _ChildProcess(self._parcel, memory_mb, replaces=old is not None)
+        return ChildProcess(self._origin)
 
-    def _ready(self, seconds: float | None) -> _ChildProcess:
+    def _ready(self, seconds: float | None) -> ChildProcess:
         """The process, once its behaviour has started."""
         child = self._child = self._child or self._start()
         # A budget says how long a step may wait; without one, waiting keeps runs repeatable.
-        patient = not self._limits.budgets or not child.replaces
+        patient = not self._limits.budgets or not self._replaces
         try:
             child.await_start(self._limits.start_s if patient else seconds)
         except BehaviourError as fault:
             if not isinstance(fault, RunTimeoutError) or patient:
                 self._child = None
-                child.end()
+                child.close()
             raise
         return child
 
     def _request(
         self,
-        child: _ChildProcess,
+        child: ChildProcess,
         frame: Frame,
         observation: Observation,
         directives: Sequence[Directive],
-    ) -> RunRequest:
-        news = tuple(p for p in observation.past if p.frame.index > self._sent)
+    ) -> Message:
+        news = [p for p in observation.past if p.frame.index > self._sent]
         if observation.past:
             self._sent = observation.past[-1].frame.index
-        without = Observation(
-            observation.frame_index, observation.time, observation.frame_size, observation.reports
-        )
-        return RunRequest(
-            frame.index, frame.time, *child.place(frame.image), without, tuple(directives), news
-        )
+        placed = child.place([frame.image, *(p.frame.image for p in news)])
+        return {
+            "index": frame.index,
+            "time": frame.time,
+            "image": next(placed),
+            "observation": to_document(observation),
+            "directives": [encode(d) for d in directives],
+            "past": [
+                {
+                    "index": p.frame.index,
+                    "time": p.frame.time,
+                    "image": image,
+                    "observation": to_document(p.observation),
+                }
+                for p, image in zip(news, placed, strict=True)
+            ],
+        }
 
 
-def pack_behaviour(behaviour: Behaviour, contract: Contract) -> PackedBehaviour:
-    """A behaviour as it is sent to a process.
+class ChildProcess:
+    """A process with a behaviour.
 
-    Raises:
-        BehaviourError: It cannot be sent.
+    Args:
+        first: What it is told at once: which behaviour to start, or whose contracts are wanted.
     """
-    module = sys.modules.get(type(behaviour).__module__)
-    file = str(getattr(module, "__file__", "") or "")
-    own = module is not None and module.__name__.startswith("visup_plugin_")
-    try:
-        packed = pickled(behaviour)
-    except Exception as fault:
-        raise BehaviourError(
-            f"behaviour '{contract.name}' cannot be sent to a process of its own: {fault}",
-            expected="attributes that can be pickled",
-            hint="open models, sockets and devices in its method `start`, not in `__init__`",
-        ) from fault
-    return PackedBehaviour(packed, file if own else "", tuple(sys.path), contract)
 
-
-class _ChildProcess:
-    """A process with a behaviour, and the memory shared with it."""
-
-    def __init__(self, sent: PackedBehaviour, memory_mb: float, *, replaces: bool) -> None:
-        context = _context()
-        here, there = context.Pipe()
-        process = context.Process(  # type: ignore[attr-defined]
-            target=serve, args=(there, sent, memory_mb), name="visup behaviour", daemon=True
-        )
-        process.start()
-        there.close()
-        self.replaces = replaces
-        self._process: BaseProcess = process
-        self._pipe: Connection = here
-        self.killed = False
-        self._shared: list[SharedMemory] = []
+    def __init__(self, first: Message) -> None:
+        self._sandbox = Sandbox()
+        self._channel = Channel(self._sandbox.end)
         self._started = False
-        self.end = weakref.finalize(self, _end, process, here, self._shared)
+        self.killed = False
+        self.close = self._sandbox.close
+        self._channel.send(first)
 
     def kill(self) -> None:
         """Stop it at once; it is cleared away later."""
-        self._process.kill()
+        self._sandbox.kill()
         self.killed = True
 
     def await_start(self, seconds: float | None) -> None:
@@ -190,62 +165,128 @@ class _ChildProcess:
         """
         if self._started:
             return
-        answer = self._receive(seconds, "it did not start")
-        if answer.fault is not None:
-            kind, said = answer.fault
+        answer = self.receive(seconds, "it did not start")
+        if "fault" in answer:
+            kind, said = _fault(answer)
             raise BehaviourError(f"it does not start: {f'{kind}: ' if kind else ''}{said}")
         self._started = True
 
-    def ask(self, request: RunRequest, seconds: float | None) -> RunReply:
-        """Send a request and wait for the answer."""
-        try:
-            self._pipe.send_bytes(pickled(request))
-        except OSError as fault:
-            raise self._lost() from fault
-        return self._receive(seconds, "it gave no answer")
+    def ask(self, request: Message, seconds: float | None) -> Message:
+        """Send a request and wait for the answer; a process that gives none is killed.
 
-    def place(self, image: np.ndarray[Any, np.dtype[np.uint8]]) -> tuple[str, tuple[int, ...]]:
-        """Put an image where the process finds it: name of the shared memory, shape."""
-        if not self._shared or self._shared[0].size < image.nbytes:
-            _release(self._shared)
-            self._shared.append(SharedMemory(create=True, size=max(1, image.nbytes)))
-        block = self._shared[0]
-        np.ndarray(image.shape, np.uint8, block.buf)[:] = image
-        return block.name, image.shape
-
-    def _receive(self, seconds: float | None, what: str) -> RunReply:
+        Raises:
+            BehaviourError: It gave none in time, or ended, or its answer makes no sense.
+        """
         try:
-            if not self._pipe.poll(seconds):
-                raise RunTimeoutError(f"{what} within {duration_text(seconds or 0.0)}")
-            answer: RunReply = pickle.loads(self._pipe.recv_bytes(LARGEST_REPLY_BYTES))
+            try:
+                self._channel.send(request, seconds)
+            except TimeoutError as fault:
+                raise RunTimeoutError("it does not listen") from fault
+            except OSError as fault:
+                raise self._lost() from fault
+            return self.receive(seconds, "it gave no answer")
+        except BehaviourError:
+            self.kill()
+            raise
+
+    def receive(self, seconds: float | None, what: str) -> Message:
+        """The next message.
+
+        Raises:
+            BehaviourError: None came in time, or the process ended, or it makes no sense.
+        """
+        try:
+            answer = self._channel.receive(seconds)
+        except TimeoutError as fault:
+            raise RunTimeoutError(f"{what} within {duration_text(seconds or 0.0)}") from fault
         except (EOFError, OSError) as fault:
             raise self._lost() from fault
+        except MessageError as fault:
+            raise ProcessDiedError(str(fault)) from fault
+        if not isinstance(answer, Mapping):
+            raise ProcessDiedError("its answer is no message")
         return answer
 
+    def place(self, images: Sequence[NDArray[np.uint8]]) -> Iterator[list[int]]:
+        """Put images where the process finds them: offset and shape of each."""
+        # Written to, not mapped: a process that cuts the file off harms nobody but itself.
+        offset, placed = 0, []
+        for image in images:
+            data = np.ascontiguousarray(image).data.cast("B")
+            done = 0
+            while done < len(data):
+                done += os.pwrite(self._sandbox.frames, data[done:], offset + done)
+            placed.append([offset, *image.shape])
+            offset += len(data)
+        return iter(placed)
+
     def _lost(self) -> ProcessDiedError:
-        self._process.join(1.0)
-        code = self._process.exitcode
-        how = f"by signal {-code}" if code is not None and code < 0 else f"with exit code {code}"
-        return ProcessDiedError(f"its process ended {how}")
+        how = self._sandbox.how_it_ended()
+        if self._sandbox.output.exceeded:
+            how = f"wrote more than {LARGEST_OUTPUT_BYTES >> 20} MB to its output and was ended"
+        return ProcessDiedError(f"its process {how}")
 
 
-def _end(process: BaseProcess, pipe: Connection, shared: list[SharedMemory]) -> None:
-    process.kill()
-    process.join(5.0)
-    pipe.close()
-    _release(shared)
+def _fault(answer: Message) -> tuple[str, str]:
+    told = answer["fault"]
+    if isinstance(told, list) and len(told) == 2 and all(isinstance(t, str) for t in told):
+        return told[0], " ".join(told[1].split())[:1000]
+    raise ProcessDiedError("its answer is no message")
 
 
-def _release(shared: list[SharedMemory]) -> None:
-    while shared:
-        block = shared.pop()
-        block.close()
-        block.unlink()
+def _percepts(answer: Message) -> list[Percept]:
+    try:
+        return [decode_percept(p) for p in answer["percepts"]]
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as fault:
+        raise BehaviourError(f"what it reported cannot be read ({error_text(fault)})") from fault
 
 
-def _context() -> BaseContext:
-    if "forkserver" not in mp.get_all_start_methods():
-        return mp.get_context("spawn")
-    context = mp.get_context("forkserver")
-    context.set_forkserver_preload(["visup.agent.execution.worker"])
-    return context
+def error_text(fault: Exception) -> str:
+    """An exception's own words, short."""
+    return " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
+
+
+def origin_of(behaviour: Behaviour, contract: Contract) -> Message:
+    """How a process makes a behaviour: from its file, or again as it was made here.
+
+    Raises:
+        BehaviourError: It cannot be made there.
+    """
+    if isinstance(behaviour, IsolatedBehaviour):
+        name = contract.name
+        settings = {name: dict(behaviour.settings)} if behaviour.settings else {}
+        return {"where": behaviour.where, "name": name, "settings": settings}
+    kind = type(behaviour)
+    module = sys.modules.get(kind.__module__)
+    file = str(getattr(module, "__file__", "") or "")
+    own = kind.__module__.startswith(PLUG_IN) or kind.__module__ == "__main__"
+    attributes = state_of(behaviour)
+    settings = _own_settings(kind, attributes.get("settings"))
+    if settings is not None:
+        del attributes["settings"]
+    try:
+        if "<locals>" in kind.__qualname__:
+            raise StateError("a class inside a function")
+        packed = dump_state(attributes)
+    except StateError as fault:
+        raise BehaviourError(
+            f"behaviour '{contract.name}' cannot be sent to a process of its own: it holds {fault}",
+            expected="attributes that are plain values, arrays and records of visup",
+            hint="open models, sockets and devices in its method `start`, not in `__init__`",
+        ) from fault
+    return {
+        "object": kind.__qualname__,
+        "module": kind.__module__,
+        "file": file if own else "",
+        "modules": loaded_modules(packed),
+        "attributes": base64.b64encode(packed).decode(),
+        "own_settings": settings,
+    }
+
+
+def _own_settings(kind: type, given: Any) -> Any:
+    """Settings of a plug-in's own model as JSON values, or None."""
+    model = getattr(kind, "Settings", None)
+    if isinstance(model, type) and isinstance(given, model) and hasattr(given, "model_dump"):
+        return given.model_dump(mode="json")
+    return None

@@ -1,20 +1,23 @@
-"""The other end of `process_runner.py`: what runs in the process of an isolated behaviour."""
+"""The other end of `process_runner.py`: what runs in the process of an isolated behaviour.
+
+Started by `sandbox.py` as `python -m visup.agent.execution.worker`. The first message says whose contracts
+are wanted, or which behaviour is to be started; those that follow are frames. Answers are data
+(`messages.py`).
+"""
 
 from __future__ import annotations
 
+import base64
+import importlib
 import os
-import pickle
 import signal
+import socket
 import sys
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from io import BytesIO
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import parent_process
-from multiprocessing.shared_memory import SharedMemory
+from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -23,10 +26,19 @@ import numpy as np
 
 from visup.agent.contract.behaviour import Behaviour
 from visup.agent.contract.contract import Contract
+from visup.agent.execution.messages import Channel, Message
+from visup.agent.execution.resource_limits import limit_at_start, limit_memory
 from visup.agent.execution.runners import error_line, run_behaviour, start_behaviour
-from visup.agent.model.events import Directive
-from visup.agent.model.records import Frame, Observation, PastFrame, Percept
-from visup.agent.plugins.factory import import_file
+from visup.agent.model.errors import BehaviourError, ErrorGroup, VisupError
+from visup.agent.model.records import Frame, Observation, PastFrame
+from visup.agent.plugins.factory import as_behaviour, import_file, load_behaviours
+from visup.agent.storage.checkpoint import load_state
+from visup.agent.storage.codec import (
+    UnsupportedTypeError,
+    decode,
+    encode_percept,
+    from_document,
+)
 
 _SOME = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)
 _MORE = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
@@ -35,166 +47,159 @@ EXCEPTIONS: Mapping[str, type[Exception]] = MappingProxyType(
 )
 """Exceptions that are told by their own names; all others come as `BehaviourError`."""
 
+LONGEST_REFUSAL = 100
+"""Faults of settings that are told at most."""
 
-@dataclass(frozen=True, slots=True)
-class PackedBehaviour:
-    """A behaviour on its way to a process.
 
-    Attributes:
-        packed: The behaviour, pickled.
-        file: The file of the user's own in which its class stands, or ''.
-        paths: Where modules are found.
-        contract: Its contract.
+def main(channel: Channel, frames: int) -> None:
+    """Serve the supervisor until it closes its end.
+
+    Args:
+        channel: To the supervisor.
+        frames: Descriptor of the file with the images.
     """
-
-    packed: bytes
-    file: str
-    paths: tuple[str, ...]
-    contract: Contract
-
-
-@dataclass(frozen=True, slots=True)
-class RunRequest:
-    """A frame to run on.
-
-    Attributes:
-        index: Of the frame.
-        time: Of the frame, seconds.
-        shared: Name of the shared memory with its image.
-        shape: Of the image, uint8.
-        observation: What others reported of it.
-        directives: What the last step asked for.
-        past: Past frames that were not sent before.
-    """
-
-    index: int
-    time: float
-    shared: str
-    shape: tuple[int, ...]
-    observation: Observation
-    directives: tuple[Directive, ...]
-    past: tuple[PastFrame, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class RunReply:
-    """What came of it: percepts, or the kind and the words of a fault."""
-
-    percepts: tuple[Percept, ...] = ()
-    fault: tuple[str, str] | None = None
-
-
-def serve(pipe: Connection, parcel: PackedBehaviour, memory_mb: float) -> None:
-    """Start a behaviour and run it on the frames that come, until the other end is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides when to stop
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    try:
-        behaviour = _unpacked(parcel)
-        start_behaviour(behaviour)
-        _limit(memory_mb)
-    except BaseException as fault:
-        _send(pipe, _failure_reply(fault))
-        return
-    _send(pipe, RunReply())
-    past: deque[PastFrame] = deque(maxlen=parcel.contract.history)
-    with suppress(EOFError):
+    with suppress(EOFError, OSError):
+        first = channel.receive()
+        if first["do"] == "contracts":
+            _answer(channel, lambda: _contracts(first))
+            return
+        started = _answer(channel, lambda: _started(first))
+        if started is None:
+            return
+        past: deque[PastFrame] = deque(maxlen=started.contract.history)
         while True:
-            request: RunRequest = pickle.loads(pipe.recv_bytes())
-            _send(pipe, _answer(behaviour, parcel.contract, request, past))
+            request = channel.receive()
+            _answer(channel, lambda r=request: _run(started, r, past, frames))  # type: ignore[misc]
 
 
-def _answer(
-    behaviour: Behaviour, contract: Contract, request: RunRequest, past: deque[PastFrame]
-) -> RunReply:
+def _answer(channel: Channel, does: Callable[[], tuple[Message, Any]]) -> Any:
+    """Do something and answer what came of it; what it made, or None where it failed."""
+    made = None
     try:
-        past.extend(request.past)
-        frame = Frame(request.index, request.time, _image(request))
-        observation = replace(request.observation, past=tuple(past))
-        return RunReply(run_behaviour(behaviour, contract, frame, observation, request.directives))
+        message, made = does()
     except BaseException as fault:
         # Whatever it is, it is the behaviour's failure; the supervisor decides what comes of it.
-        return _failure_reply(fault)
+        message = _failure(fault)
+    try:
+        channel.send(message)
+    except ValueError as fault:
+        channel.send({"fault": ["", f"what it reported cannot be sent: {error_line(fault)}"]})
+    return made
 
 
-def _failure_reply(fault: BaseException) -> RunReply:
+def _contracts(asked: Message) -> tuple[Message, None]:
+    """The contracts of a file or module, once its behaviours are made with their settings."""
+    limit_at_start(0.0)
+    made = load_behaviours(asked["where"], asked["settings"])
+    return {"contracts": [contract_document(b.contract) for b in made]}, None
+
+
+def _started(asked: Message) -> tuple[Message, Behaviour]:
+    limit_at_start(asked["memory_mb"])
+    behaviour = _rebuilt(asked) if "object" in asked else _loaded(asked)
+    start_behaviour(behaviour)
+    limit_memory(asked["memory_mb"])
+    return {}, behaviour
+
+
+def _loaded(asked: Message) -> Behaviour:
+    """The behaviour of a name in a file or module."""
+    for made in load_behaviours(asked["where"], asked["settings"]):
+        if made.contract.name == asked["name"]:
+            return made
+    raise BehaviourError(f"there is no behaviour called '{asked['name']}'", where=asked["where"])
+
+
+def _rebuilt(asked: Message) -> Behaviour:
+    """A behaviour that was made in the supervisor, with the attributes that it had there."""
+    for name in asked["modules"]:
+        importlib.import_module(name)
+    file = asked["file"]
+    kind: Any = import_file(Path(file)) if file else importlib.import_module(asked["module"])
+    for part in asked["object"].split("."):
+        kind = getattr(kind, part)
+    made = object.__new__(kind)
+    for name, value in load_state(base64.b64decode(asked["attributes"])).items():
+        object.__setattr__(made, name, value)
+    if asked["own_settings"] is not None:
+        object.__setattr__(made, "settings", kind.Settings.model_validate(asked["own_settings"]))
+    return as_behaviour(made, asked["object"])
+
+
+def _run(
+    behaviour: Behaviour, request: Message, past: deque[PastFrame], frames: int
+) -> tuple[Message, None]:
+    contract = behaviour.contract
+    for one in request["past"]:
+        image = _image(one["image"], frames)
+        seen = from_document(one["observation"])
+        past.append(PastFrame(Frame(one["index"], one["time"], image), seen))
+    frame = Frame(request["index"], request["time"], _image(request["image"], frames))
+    told = from_document(request["observation"])
+    observation = Observation(
+        told.frame_index, told.time, told.frame_size, told.reports, tuple(past)
+    )
+    directives = tuple(decode(d) for d in request["directives"])
+    percepts = run_behaviour(behaviour, contract, frame, observation, directives)
+    try:
+        return {"percepts": [encode_percept(p) for p in percepts]}, None
+    except UnsupportedTypeError as fault:
+        raise BehaviourError(
+            f"what it reported cannot be sent: {fault}",
+            expected="plain values, arrays, and records of visup",
+        ) from fault
+
+
+def _failure(fault: BaseException) -> Message:
     if isinstance(fault, SystemExit | GeneratorExit | KeyboardInterrupt):
-        return RunReply(fault=("", f"it called for an exit ({type(fault).__name__})"))
+        return {"fault": ["", f"it called for an exit ({type(fault).__name__})"]}
     kind, said = type(fault).__name__, error_line(fault)
+    refused = [_refusal(f) for f in _single_faults(fault)[:LONGEST_REFUSAL]]
     if kind in EXCEPTIONS:
-        return RunReply(fault=(kind, said.removeprefix(f"{kind}: ")))
-    return RunReply(fault=("", said))
+        return {"fault": [kind, said.removeprefix(f"{kind}: ")], "refused": refused}
+    return {"fault": ["", said], "refused": refused}
 
 
-def _send(pipe: Connection, answer: RunReply) -> None:
-    try:
-        sent = pickled(answer)
-    except Exception as fault:
-        # A value that cannot be sent is a fault of what was perceived.
-        said = f"what it reported cannot be sent: {type(fault).__name__}: {fault}"
-        sent = pickled(RunReply(fault=("", said[:1000])))
-    with suppress(OSError):
-        pipe.send_bytes(sent)
+def _single_faults(fault: BaseException) -> list[VisupError]:
+    if isinstance(fault, ErrorGroup):
+        return list(fault.errors)
+    return [fault] if isinstance(fault, VisupError) else []
 
 
-def pickled(value: object) -> bytes:
-    """A value pickled; read-only mappings, which records hold, are among what can be."""
-    into = BytesIO()
-    _Pickler(into, pickle.HIGHEST_PROTOCOL).dump(value)
-    return into.getvalue()
+def _refusal(fault: VisupError) -> Message:
+    where = None if fault.where is None else str(fault.where)
+    return {
+        "kind": type(fault).__name__,
+        "what": fault.what,
+        "where": where,
+        "expected": fault.expected,
+        "hint": fault.hint,
+    }
 
 
-def _read_only(values: dict[Any, Any]) -> Mapping[Any, Any]:
-    return MappingProxyType(values)
+def contract_document(contract: Contract) -> Message:
+    """A contract as JSON values."""
+    return {f.name: getattr(contract, f.name) for f in fields(contract)}
 
 
-class _Pickler(pickle.Pickler):
-    def reducer_override(self, obj: Any) -> Any:
-        if isinstance(obj, MappingProxyType):
-            return _read_only, (dict(obj),)
-        return NotImplemented
+def _image(placed: list[int], frames: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    """A copy of its own: the behaviour may keep frames, the file is written over."""
+    offset, *shape = placed
+    data = os.pread(frames, int(np.prod(shape)), offset)
+    return np.frombuffer(data, np.uint8).reshape(shape)  # of bytes, and so read-only
 
 
-_attached: dict[str, SharedMemory] = {}
+def _end_with_supervisor(lifeline: int) -> None:
+    """A supervisor that was killed leaves no process behind, where nothing else sees to that."""
+    while os.read(lifeline, 1):
+        pass
+    os._exit(1)
 
 
-def _image(request: RunRequest) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    """A copy of its own: the behaviour may keep frames, the shared memory is written over."""
-    block = _attached.get(request.shared)
-    if block is None:
-        for old in _attached.values():
-            old.close()
-        _attached.clear()
-        block = _attached[request.shared] = SharedMemory(request.shared)
-    image = np.array(np.ndarray(request.shape, np.uint8, block.buf))
-    image.flags.writeable = False
-    return image
-
-
-def _unpacked(parcel: PackedBehaviour) -> Behaviour:
-    sys.path[:] = parcel.paths
-    if parcel.file:
-        import_file(Path(parcel.file))
-    behaviour: Behaviour = pickle.loads(parcel.packed)
-    return behaviour
-
-
-def _limit(memory_mb: float) -> None:
-    """Bound the memory of this process, where the platform can: what it has now and so much more."""
-    try:
-        import resource
-
-        pages = int(Path("/proc/self/statm").read_text().split()[5])
-        most = pages * resource.getpagesize() + int(memory_mb * 2**20)
-        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        if hard == resource.RLIM_INFINITY or most < hard:
-            resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-    except (ImportError, OSError, ValueError):
-        return
-
-
-def _end_with_parent() -> None:
-    """A supervisor that was killed leaves no process behind, not even one that hangs."""
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides when to stop
+    connection, memory, lifeline_end = map(int, sys.argv[1:4])
+    for handle in (connection, memory, lifeline_end):
+        os.set_inheritable(handle, False)
+    threading.Thread(target=_end_with_supervisor, args=(lifeline_end,), daemon=True).start()
+    main(Channel(socket.socket(fileno=connection)), memory)

@@ -33,6 +33,22 @@ class Registry:
         """Names in alphabetical order."""
         return sorted(self._offers)
 
+    def where(self, name: str) -> str:
+        """Where the behaviour of that name is found, `package.module:Class`; nothing is imported.
+
+        Raises:
+            BehaviourError: No such name.
+        """
+        if name not in self._offers:
+            raise self._unknown(name)
+        found = self._offers[name]
+        return found.where if isinstance(found, BehaviourFactory) else found.value
+
+    def _unknown(self, name: str) -> BehaviourError:
+        return BehaviourError(
+            f"there is no behaviour called '{name}'", expected=f"one of: {', '.join(self.names())}"
+        )
+
     def factory(self, name: str) -> BehaviourFactory:
         """What makes the behaviour of that name; an entry point is imported now.
 
@@ -40,10 +56,7 @@ class Registry:
             BehaviourError: No such name, or it cannot be imported.
         """
         if name not in self._offers:
-            raise BehaviourError(
-                f"there is no behaviour called '{name}'",
-                expected=f"one of: {', '.join(self.names())}",
-            )
+            raise self._unknown(name)
         found = self._offers[name]
         if isinstance(found, BehaviourFactory):
             return found

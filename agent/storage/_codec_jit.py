@@ -9,7 +9,7 @@ from visup.compiled import compiled
 
 LARGEST = 2.0**24
 """float32 knows all whole numbers below."""
-NO_DIGIT = 9
+NO_DIGIT = 9  # the same as in codec.py, which must not import this file at once
 
 
 @compiled

@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
@@ -103,6 +104,8 @@ class _StateWriter:
             return ["dict" if kind is dict else "frozendict", pairs]
         if kind is np.ndarray or isinstance(value, np.generic):
             return ["array" if kind is np.ndarray else "scalar", self._array(value)]
+        if isinstance(value, Path):
+            return ["path", str(value)]
         if kind is bytes:
             return ["bytes", self._array(np.frombuffer(value, np.uint8))]
         if kind.__qualname__ == "csr_matrix" and kind.__module__.startswith("scipy.sparse"):
@@ -115,7 +118,7 @@ class _StateWriter:
             return ["named", name, [self.node(v) for v in value]]
         if isinstance(value, _BUILT_IN):
             raise StateError(f"a {kind.__qualname__}")
-        return ["object", name, [[n, self.node(v)] for n, v in _attributes(value).items()]]
+        return ["object", name, [[n, self.node(v)] for n, v in state_of(value).items()]]
 
     def _array(self, value: NDArray[Any] | np.generic) -> int:
         whole = np.asarray(value)
@@ -145,12 +148,25 @@ def _name(kind: type) -> str:
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
-def _attributes(value: Any) -> dict[str, Any]:
+def state_of(value: Any) -> dict[str, Any]:
+    """The attributes of an object, also those in slots.
+
+    Raises:
+        StateError: It is no plain object.
+    """
     if isinstance(value, FunctionType | ModuleType | type):
         raise StateError(f"a {type(value).__qualname__}")
     slots = [n for k in type(value).__mro__ for n in getattr(k, "__slots__", ())]
     found = {n: getattr(value, n) for n in slots if n[:2] != "__" and hasattr(value, n)}
     return {**found, **getattr(value, "__dict__", {})}
+
+
+def loaded_modules(data: bytes) -> list[str]:
+    """The modules whose classes a state needs, so that another process can load them first."""
+    _, size, _, _ = _HEAD.unpack_from(data)
+    table, _, _ = json.loads(data[_HEAD.size : _HEAD.size + size])
+    named = {node[1] for node in table if node[0] in ("object", "enum", "named")}
+    return sorted({name.partition(":")[0] for name in named})
 
 
 @dataclass(slots=True)
@@ -210,6 +226,7 @@ _MAKERS: Mapping[str, Callable[..., Any]] = {
     "scalar": lambda r, number: r.arrays[number][()],
     "bytes": lambda r, number: r.arrays[number].tobytes(),
     "object": _StateReader.made,
+    "path": lambda r, text: Path(text),
     "enum": _StateReader.enum,
     "csr": _StateReader.csr,
     "named": _StateReader.named,

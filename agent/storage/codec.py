@@ -28,13 +28,25 @@ from pydantic_core import from_json, to_json
 from visup.agent.model import events, mind, object_beliefs, records, task_beliefs
 from visup.agent.model.errors import OutputError
 from visup.agent.model.records import Observation, Percept, Region, Report, ReportState
-from visup.agent.storage._codec_jit import NO_DIGIT, chain_digits, chain_points, run_lengths
+from visup.agent.storage.mask_codec import (
+    chain_to_contour,
+    check_room,
+    contour_to_chain,
+    mask_to_runs,
+    room,
+    runs_to_mask,
+)
 
 LARGEST_STEP_BYTES = 256 * 2**20
 """No step is larger, bytes uncompressed: a damaged file must not fill the memory."""
+LARGEST_REPORT_BYTES = 32 * 2**20
+"""Of a step that is too large, reports that take more are left out."""
+MOST_BITS = 1024
+"""Whole numbers are no longer: they could not be read back."""
 
 _LEVEL = 1  # of zlib: higher levels save a few per cent and take several times as long
-_PLAIN = frozenset({type(None), bool, int, float, str})
+_PLAIN = frozenset({type(None), bool, float, str})
+"""What is written as it is; so are whole numbers, but for those that could not be read back."""
 _LEFT_OUT = (records.Frame, records.Observation, mind.Mind)
 _TYPES: Mapping[str, type] = MappingProxyType(
     {
@@ -50,6 +62,10 @@ _TYPES: Mapping[str, type] = MappingProxyType(
 _FIELDS = {k: tuple(f.name for f in fields(k)) for k in _TYPES.values() if is_dataclass(k)}
 
 
+UNREADABLE = (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError)
+"""What reading a document that is not as it should be raises."""
+
+
 class UnsupportedTypeError(TypeError):
     """A value is of a type that the codec does not know."""
 
@@ -63,7 +79,36 @@ def pack_observation(observation: Observation) -> bytes:
     Returns:
         A compressed JSON document.
     """
-    return zlib.compress(to_json(to_document(observation), inf_nan_mode="constants"), _LEVEL)
+    document = to_document(observation)
+    try:
+        text = _checked_text(document)
+    except ValueError:
+        text = _checked_text({**document, "reports": [_as_lost(r) for r in document["reports"]]})
+    return zlib.compress(text, _LEVEL)
+
+
+def _checked_text(document: Any) -> bytes:
+    """A document as text that can be read back.
+
+    Raises:
+        ValueError: It could not be.
+    """
+    text = to_json(document, inf_nan_mode="constants")
+    if len(text) > LARGEST_STEP_BYTES:
+        raise ValueError(f"it takes more than {LARGEST_STEP_BYTES >> 20} MB")
+    check_room(text)
+    return text
+
+
+def _as_lost(report: dict[str, Any]) -> dict[str, Any]:
+    """A report as it is, or without its percepts where they could not be read back."""
+    try:
+        if len(_checked_text(report)) <= LARGEST_REPORT_BYTES:
+            return report
+        lost = "more than a step has room for"
+    except ValueError as fault:
+        lost = f"what cannot be written ({str(fault)[:80]})"
+    return {k: v for k, v in report.items() if k != "percepts"} | {"lost": lost}
 
 
 def unpack_observation(data: bytes, where: str = "") -> Observation:
@@ -77,8 +122,9 @@ def unpack_observation(data: bytes, where: str = "") -> Observation:
         text = inflater.decompress(data, LARGEST_STEP_BYTES)
         if not inflater.eof:
             raise ValueError("it is cut off or too large")
+        check_room(text)
         return from_document(from_json(text))
-    except (zlib.error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as fault:
+    except (zlib.error, *UNREADABLE) as fault:
         raise OutputError(
             f"a recorded step cannot be read ({fault})",
             where=where or None,
@@ -99,11 +145,10 @@ def to_document(observation: Observation) -> dict[str, Any]:
 def from_document(written: Mapping[str, Any]) -> Observation:
     """The observation of a document; reports whose values could not be recorded have rested."""
     width, height = written["frame_size"]
+    with room():
+        reports = tuple(_report_of(r) for r in written["reports"])
     return Observation(
-        int(written["frame_index"]),
-        float(written["time"]),
-        (int(width), int(height)),
-        tuple(_report_of(r) for r in written["reports"]),
+        int(written["frame_index"]), float(written["time"]), (int(width), int(height)), reports
     )
 
 
@@ -112,14 +157,29 @@ def _report(r: Report) -> dict[str, Any]:
     if r.error:
         out["error"] = r.error
     try:
-        out["percepts"] = [_percept(p) for p in r.percepts]
+        out["percepts"] = [encode_percept(p) for p in r.percepts]
     except UnsupportedTypeError as fault:
         out["lost"] = str(fault)
     return out
 
 
-def _percept(p: Percept) -> list[Any]:
+def encode_percept(p: Percept) -> list[Any]:
+    """A percept as JSON values.
+
+    Raises:
+        UnsupportedTypeError: Its value is, or holds, something that is not known here.
+    """
     return [p.kind, encode(p.value), encode(p.time), p.source, encode(p.confidence)]
+
+
+def decode_percept(written: list[Any]) -> Percept:
+    """The percept that was encoded; whether it makes sense is not looked at.
+
+    Raises:
+        ValueError, TypeError, KeyError: It was not.
+    """
+    kind, value, time, source, confidence = written
+    return Percept(str(kind), decode(value), decode(time), str(source), decode(confidence))
 
 
 def _report_of(written: Mapping[str, Any]) -> Report:
@@ -127,10 +187,7 @@ def _report_of(written: Mapping[str, Any]) -> Report:
     if "lost" in written:
         error = f"its percepts were not recorded: {written['lost']}"
         return Report(str(written["behaviour"]), ReportState.RESTED, gives, error=error)
-    percepts = tuple(
-        Percept(str(kind), decode(value), decode(time), str(source), decode(confidence))
-        for kind, value, time, source, confidence in written["percepts"]
-    )
+    percepts = tuple(decode_percept(p) for p in written["percepts"])
     state = ReportState(written["state"])
     return Report(str(written["behaviour"]), state, gives, percepts, str(written.get("error", "")))
 
@@ -144,6 +201,8 @@ def encode(value: Any) -> Any:
     kind = type(value)
     if kind in _PLAIN:
         return value
+    if kind is int:
+        return _whole(value)
     if kind is Region:
         return _region(value)
     if kind in _FIELDS:
@@ -158,6 +217,8 @@ def encode(value: Any) -> Any:
         return {"$": kind.__name__, "of": value.value}
     if kind is dict or kind is MappingProxyType:
         return _mapping(value)
+    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "biufc":
+        return {"$": "masked", "of": _array(value.filled(0)), "hidden": _array(_hidden(value))}
     if isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biufc":
         return _array(value)
     if kind is frozenset or kind is set:
@@ -175,7 +236,7 @@ def decode(value: Any) -> Any:
         ValueError, TypeError, KeyError: It was not.
     """
     kind = type(value)
-    if kind in _PLAIN:
+    if kind in _PLAIN or kind is int:
         return value
     if kind is list:
         return [decode(v) for v in value]
@@ -187,6 +248,12 @@ def decode(value: Any) -> Any:
     if tag in _TYPES:
         return _record_of(_TYPES[tag], value)
     return _OTHERS[tag](value)
+
+
+def _whole(value: int) -> int:
+    if value.bit_length() > MOST_BITS:
+        raise UnsupportedTypeError(f"a whole number of {value.bit_length()} bits")
+    return value
 
 
 def _record(kind: type, value: Any) -> dict[str, Any]:
@@ -223,6 +290,14 @@ def _array(value: NDArray[Any] | np.generic) -> dict[str, Any]:
     }
 
 
+def _hidden(value: Any) -> NDArray[np.bool_]:
+    return np.ma.getmaskarray(value)
+
+
+def _masked_of(written: Mapping[str, Any]) -> Any:
+    return np.ma.MaskedArray(_array_of(written["of"]), _array_of(written["hidden"]))
+
+
 def _array_of(written: Mapping[str, Any]) -> NDArray[Any]:
     dtype = np.dtype(str(written["dtype"]))
     if dtype.kind not in "biufc":
@@ -240,6 +315,7 @@ _OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
     "frozenmap": lambda written: MappingProxyType({decode(k): decode(v) for k, v in written["of"]}),
     "bytes": lambda written: base64.b64decode(written["of"]),
     "array": _array_of,
+    "masked": _masked_of,
     "scalar": lambda written: _array_of(written)[()],
 }
 
@@ -252,7 +328,7 @@ def _region(r: Region) -> dict[str, Any]:
         "$": "Region",
         "bbox": [int(n) for n in r.bbox],
         "mask": mask_to_runs(r.mask),
-        "contour": _chain(r.contour),
+        "contour": contour_to_chain(r.contour) or encode(r.contour),
     }
     for name in _SHOWN:
         held = getattr(r, name)
@@ -269,53 +345,4 @@ def _region_of(written: Mapping[str, Any]) -> Region:
     )
 
 
-def mask_to_runs(mask: NDArray[np.bool_]) -> list[int]:
-    """Lengths of the runs of a mask in reading order, that of False first (0 when there is none)."""
-    lengths: list[int] = run_lengths(np.ascontiguousarray(mask).reshape(-1)).tolist()
-    return lengths
-
-
-def runs_to_mask(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """The mask of runs, of shape (height, width).
-
-    Raises:
-        ValueError: The runs are not of that many pixels.
-    """
-    counts = np.asarray(lengths, np.int64)
-    if counts.ndim != 1 or (counts < 0).any() or int(counts.sum()) != shape[0] * shape[1]:
-        raise ValueError("the runs of a mask do not fill its box")
-    return np.repeat(np.arange(len(counts)) % 2 == 1, counts).reshape(shape)
-
-
-_CHAIN = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)])
-_CODE = np.full(9, NO_DIGIT, np.uint8)
-"""The character of a move (dx, dy) at 3 (dx + 1) + dy + 1."""
-for _digit, (_dx, _dy) in enumerate(_CHAIN):
-    _CODE[3 * (_dx + 1) + _dy + 1] = ord("0") + _digit
-
-
-def _chain(contour: NDArray[np.float32]) -> Any:
-    """A contour that goes from pixel to neighbouring pixel as a chain code (Freeman, 1961).
-
-    Digits are directions in steps of 45 degrees, 0 to the right, 2 down. Any other contour is kept as
-    an array.
-    """
-    points = np.asarray(contour)
-    if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 2 or not len(points):
-        return encode(contour)
-    digits = chain_digits(np.ascontiguousarray(points), _CODE)
-    if len(digits) == len(points):
-        return encode(contour)
-    first = [int(points[0, 0]), int(points[0, 1])]
-    return {"$": "chain", "from": first, "of": digits.tobytes().decode()}
-
-
-def _contour_of_chain(written: Mapping[str, Any]) -> NDArray[np.float32]:
-    digits = np.frombuffer(written["of"].encode(), np.uint8) - ord("0")
-    if len(digits) and digits.max() > 7:
-        raise ValueError("a chain code has digits from 0 to 7")
-    x, y = written["from"]
-    return chain_points(int(x), int(y), digits, _CHAIN)
-
-
-_OTHERS["chain"] = _contour_of_chain
+_OTHERS["chain"] = chain_to_contour

@@ -1,7 +1,9 @@
 """The journal: what happened in a run, in SQLite files, written step by step.
 
 Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step
-up to the last one that was committed, and can be read while the run goes on. A run of days goes on in
+up to the last one that was committed, and can be read while the run goes on. What is told must also
+outlast the loss of power: a step with events or alerts is on the disk, with all before it, once it is
+recorded; quiet ones follow with the next. A run of days goes on in
 further files (segments) beside the first one. What was perceived is kept in full, so that a run can be
 reasoned about again without its video. Read next: `journal_reader.py`, which reads all this back.
 """
@@ -9,9 +11,12 @@ reasoned about again without its video. Read next: `journal_reader.py`, which re
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 import zlib
+from contextlib import closing
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +27,9 @@ from visup.agent.model.events import Alert, Event
 from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import TaskBelief
+from visup.agent.storage.atomic import sync
 from visup.agent.storage.codec import pack_observation
+from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.jsonable import event_record, object_summary, to_jsonable
 
 APPLICATION_ID = 0x56495355  # "VISU"
@@ -74,7 +81,8 @@ class Journal:
         last_frame: Number of the last frame that is recorded, or None.
 
     Raises:
-        OutputError: It cannot be written, or the one to go on with is of another version.
+        OutputError: It cannot be written, another process is writing it, or the one to go on with is
+            of another version.
     """
 
     def __init__(
@@ -86,17 +94,23 @@ class Journal:
         self._begun: float | None = None
         self._last_event = 0
         self._sizes: list[int] = []
-        if not resume:
-            self._open(path, 1)
-            return
-        old = segments(path)
-        begun = [one for one in old if self._take_over(one)]
-        self._db = _connected(begun[-1])
+        self._lock = acquire_lock(path, "this run")
+        try:
+            if resume:
+                begun = [one for one in segments(path) if self._take_over(one)]
+                self._db = _connected(begun[-1])
+                self._durable = False
+            else:
+                self._begin()
+        except BaseException:
+            self._lock.release()
+            raise
 
     def note(self, **facts: Any) -> None:
-        """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
+        """Store facts about the run (settings, source, verdict, ...), replacing older ones, on the disk."""
         rows = [(key, _text(to_jsonable(value))) for key, value in facts.items()]
-        self._write([("INSERT OR REPLACE INTO run VALUES (?, ?)", row) for row in rows])
+        sql = "INSERT OR REPLACE INTO run VALUES (?, ?)"
+        self._write([(sql, row) for row in rows], durable=True)
 
     def record(self, step: Step, frame: Frame | None = None) -> None:
         """Write one step, wholly or not at all.
@@ -118,7 +132,7 @@ class Journal:
         ]
         if self._is_full(step.time):
             self._next_segment()
-        self._write(statements)
+        self._write(statements, durable=bool(step.events or step.alerts))
         self._last_event += len(step.events)
         self.last_frame = step.frame_index
         self._begun = step.time if self._begun is None else self._begun
@@ -131,14 +145,27 @@ class Journal:
             self._db.close()
         except sqlite3.Error as fault:
             raise _unwritable(self.path, fault) from fault
+        finally:
+            self._lock.release()
+
+    def _begin(self) -> None:
+        if self.path.is_file() and self.path.stat().st_size:
+            raise OutputError(
+                "a run is recorded here already",
+                where=str(self.path),
+                hint="choose another folder, or delete this one",
+            )
+        self._open(self.path, 1)
 
     def _open(self, path: Path, number: int) -> None:
         try:
             self._db = _connected(path)
+            self._durable = False
             # One transaction: a run killed meanwhile leaves an empty file or a whole journal.
             marks = f"PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};"
             self._db.executescript(f"BEGIN;{SCHEMA}{marks}COMMIT;")
-        except sqlite3.Error as fault:
+            sync(path.parent)
+        except (sqlite3.Error, OSError) as fault:
             raise _unwritable(path, fault) from fault
         self._sizes.append(0)
         self._begun = None
@@ -199,8 +226,11 @@ class Journal:
                 db.close()
                 self._sizes[i] = 0
 
-    def _write(self, statements: list[Statement]) -> None:
+    def _write(self, statements: list[Statement], *, durable: bool) -> None:
         try:
+            if durable != self._durable:
+                self._db.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
+                self._durable = durable
             if len(statements) == 1:  # is a transaction by itself
                 self._db.execute(*statements[0])
                 return
@@ -222,7 +252,7 @@ def segment_path(path: Path, number: int) -> Path:
 def segments(path: Path) -> list[Path]:
     """The files of a journal, in order; the first one is always among them."""
     found = [path]
-    while (following := segment_path(path, len(found) + 1)).exists():
+    while (following := segment_path(path, len(found) + 1)).is_file():
         found.append(following)
     return found
 
@@ -230,6 +260,29 @@ def segments(path: Path) -> list[Path]:
 def is_empty(db: sqlite3.Connection) -> bool:
     """Whether a file is a segment that was not begun."""
     return db.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
+
+
+def check_schema(db: sqlite3.Connection, path: Path) -> None:
+    """Refuse a file whose tables are not those of a journal, before anything of them is read.
+
+    A view in the place of a table may be a program, and one without an end.
+
+    Raises:
+        OutputError: They are not.
+    """
+    db.execute("PRAGMA trusted_schema = OFF")
+    if sorted(db.execute(_SCHEMA_OF)) != _expected_schema():
+        raise OutputError("this is not a journal", where=str(path), expected="a run of visup")
+
+
+_SCHEMA_OF = "SELECT type, name, tbl_name, sql FROM sqlite_schema"
+
+
+@cache
+def _expected_schema() -> list[Any]:
+    with closing(sqlite3.connect(":memory:")) as db:
+        db.executescript(SCHEMA)
+        return sorted(db.execute(_SCHEMA_OF))
 
 
 def check_version(db: sqlite3.Connection, path: Path) -> None:
@@ -249,6 +302,7 @@ def check_version(db: sqlite3.Connection, path: Path) -> None:
             expected=f"version {VERSION}",
             hint="record the run again with this visup, or read it with the visup that wrote it",
         )
+    check_schema(db, path)
 
 
 def summary(step: Step) -> dict[str, Any]:
@@ -293,14 +347,20 @@ def _alert_row(a: Alert) -> tuple[Any, ...]:
 
 
 def _text(value: Any) -> str:
-    """Plain values as JSON, the same values as the same text."""
-    return _TEXT.encode(value)
+    """Plain values as JSON, the same values as the same text.
+
+    File names that are not UTF-8 hold what no file can; it stands in the text as escapes.
+    """
+    return _SURROGATE.sub(lambda found: f"\\u{ord(found[0]):04x}", _TEXT.encode(value))
+
+
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 _TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
-def _unwritable(path: Path, fault: sqlite3.Error) -> OutputError:
+def _unwritable(path: Path, fault: sqlite3.Error | OSError) -> OutputError:
     return OutputError(
         f"the journal cannot be written ({fault})",
         where=str(path),

@@ -44,6 +44,17 @@ class Predicate:
 
 
 @dataclass(frozen=True, slots=True)
+class Literal:
+    """`true` or `false`."""
+
+    value: bool
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return "true" if self.value else "false"
+
+
+@dataclass(frozen=True, slots=True)
 class Comparison:
     """`gap(a, b) < 20 px`; with `leave 25 px`, once true it ends only there (hysteresis)."""
 
@@ -128,6 +139,17 @@ class FutureOperator:
 
 
 @dataclass(frozen=True, slots=True)
+class Previous:
+    """`previous f`: f was so at the sample before."""
+
+    part: Formula
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"previous {_wrapped(self.part, *_LOOSER)}"
+
+
+@dataclass(frozen=True, slots=True)
 class Since:
     """`f since g`: g was true, and f has been ever after; with a window, g was so in it."""
 
@@ -209,12 +231,14 @@ class Quantified:
 
 Formula = (
     Predicate
+    | Literal
     | Comparison
     | Not
     | And
     | Or
     | PastOperator
     | FutureOperator
+    | Previous
     | Since
     | Until
     | MOfN
@@ -279,6 +303,7 @@ def children(node: Node) -> tuple[Node, ...]:
             return (part,)
         case (
             Last(part=part)
+            | Previous(part=part)
             | Quantified(part=part)
             | Negative(part=part)
             | WindowFunction(part=part)
@@ -308,7 +333,7 @@ def substituted(node: Node, names: Mapping[str, str]) -> Node:
     """The same tree with variables replaced by the names of objects."""
     if isinstance(node, Predicate | Measure):
         return replace(node, words=tuple(names.get(w, w) for w in node.words))
-    if isinstance(node, Number):
+    if isinstance(node, Number | Literal):
         return node
     changes: dict[str, Any] = {}
     if isinstance(node, And | Or | PointwiseFunction):
@@ -326,7 +351,7 @@ def placeholder(variable: str) -> str:
 
 
 _LOOSER = (And, Or, Since, Until)
-_PREFIXED = (Not, Quantified, FutureOperator, PastOperator)
+_PREFIXED = (Not, Quantified, FutureOperator, PastOperator, Previous)
 
 
 def _wrapped(formula: Formula, *loose: type) -> str:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from visup.rules.formula.units import NOWHERE, Number, Span
 
-POINTWISE = ("abs", "min", "max")
-"""Functions of quantities of one moment."""
+POINTWISE = ("abs", "min", "max", "sqrt", "exp", "power")
+"""Functions of quantities of one moment; of one quantity but for `min`, `max` and `power`."""
 OVER_WINDOW = ("rate", "before", "lowest", "highest", "last")
 """Functions of a quantity and of a time span."""
 

@@ -59,6 +59,11 @@ class Dimension:
             self.length - other.length, self.time - other.time, self.angle - other.angle
         )
 
+    @property
+    def powers(self) -> tuple[int, int, int]:
+        """Of length, time and angle."""
+        return self.length, self.time, self.angle
+
     def __str__(self) -> str:
         return DIMENSION_NAMES.get(self) or " ".join(
             f"{unit}^{power}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from functools import cached_property, lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -96,6 +97,19 @@ class PreparedOutline:
         plain = mask.flags.c_contiguous and mask.flags.writeable and mask.dtype == np.bool_
         return mask if plain else np.array(mask, dtype=np.bool_, order="C")
 
+    @cached_property
+    def hole_depth(self) -> NDArray[np.float32] | None:
+        """(h, w) pixels from what lies in a hole to the region, 0 elsewhere; None without holes."""
+        body = self.mask.astype(np.uint8)
+        # A margin joins all that lies outside, so that one fill from a corner reaches it.
+        outside = cv2.copyMakeBorder(1 - body, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
+        cv2.floodFill(outside, None, (0, 0), (0,))
+        holes = outside[1:-1, 1:-1]
+        if not holes.any():
+            return None
+        depth = cv2.distanceTransform(1 - body, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        return np.asarray(depth * holes, dtype=np.float32)
+
 
 @lru_cache(maxsize=CACHED_REGIONS)
 def prepared_outline(region: Region) -> PreparedOutline:
@@ -148,10 +162,11 @@ def _gap(a: Region, b: Region, near: float) -> float | None:
 
 
 def signed_distances(a: Region, b: Region) -> tuple[float, float]:
-    """How far the outline of one region lies outside another, nearest and farthest point.
+    """How far one region lies outside another, nearest and farthest point.
 
     Args:
-        a: A region; of its outline at most `MOST_POINTS` points are looked at.
+        a: A region; of its outline at most `MOST_POINTS` points are looked at, and what of it covers
+            holes of the other, of which its outline tells nothing.
         b: Another.
 
     Returns:
@@ -160,4 +175,21 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
     points, body = prepared_outline(a).closed, prepared_outline(b)
     step = -(-len(points) // MOST_POINTS)
     x, y, _, _ = b.bbox
-    return signed_extent(points, step, body.closed, body.closed_boxes, body.mask, x, y)
+    least, most = signed_extent(points, step, body.closed, body.closed_boxes, body.mask, x, y)
+    return least, max(most, _deepest_in_hole(a, b))
+
+
+def _deepest_in_hole(a: Region, b: Region) -> float:
+    """The farthest that a lies in a hole of b, pixels; minus infinity when it covers none."""
+    depth = prepared_outline(b).hole_depth
+    if depth is None:
+        return -np.inf
+    (ax, ay, aw, ah), (bx, by, bw, bh) = a.bbox, b.bbox
+    left, top = max(ax, bx), max(ay, by)
+    right, bottom = min(ax + aw, bx + bw), min(ay + ah, by + bh)
+    if left >= right or top >= bottom:
+        return -np.inf
+    covers = a.mask[top - ay : bottom - ay, left - ax : right - ax]
+    within = depth[top - by : bottom - by, left - bx : right - bx]
+    deepest = float((within * covers).max())
+    return deepest if deepest > 0.0 else -np.inf

@@ -31,9 +31,7 @@ def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault
     faults: list[Fault] = []
     left, right = (_measured(side, vocabulary, faults) for side in (node.left, node.right))
     yield from faults
-    if _constant(node.left) and _constant(node.right):
-        yield node.span, "two numbers are compared", "a quantity on one side", None
-    elif left and right and left != right:
+    if left and right and left != right:
         what = f"{_named(left)} is compared with {_named(right)}"
         wanted = right if _constant(node.left) else left
         yield node.span, what, units_of(wanted), _no_unit(node, left, right)
@@ -41,10 +39,18 @@ def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault
         yield from _leave(node, left)
 
 
+def check_constant(node: Comparison) -> Iterator[Fault]:
+    """A comparison that never changes: right in a calculation, in a rule a mistake."""
+    if _constant(node.left) and _constant(node.right):
+        yield node.span, "two numbers are compared", "a quantity on one side", None
+
+
 def _leave(node: Comparison, dimension: Dimension | None) -> Iterator[Fault]:
     leave = node.leave
     assert leave is not None
-    if dimension and leave.dimension != dimension:
+    if node.operator in ("==", "!="):
+        yield leave.span, f"'leave' has no sense behind '{node.operator}'", "<, <=, > or >=", None
+    elif dimension and leave.dimension != dimension:
         yield leave.span, f"'leave' wants {units_of(dimension)}", None, None
     elif not isinstance(node.right, Number):
         what = "'leave' needs a number before it too"
@@ -76,12 +82,57 @@ def _measured(term: Term, vocabulary: Vocabulary, faults: list[Fault]) -> Dimens
         case Arithmetic(left=one, operator=operator, right=other):
             word = "added to" if operator == "+" else "subtracted from"
             return _alike((one, other), word, term.span, vocabulary, faults)
+        case PointwiseFunction(name="sqrt" | "exp" | "power" as name, parts=parts):
+            return _powered(name, parts, term.span, vocabulary, faults)
         case PointwiseFunction(name=name, parts=parts):
             if not parts or (name == "abs") != (len(parts) == 1):
                 wanted = "abs(gap(a, b))" if name == "abs" else f"{name}(gap(a, b), 20 px)"
                 what = f"'{name}' does not take {len(parts)} quantities"
                 faults.append((term.span, what, f"such as {wanted}", None))
             return _alike(parts, "set beside", term.span, vocabulary, faults)
+
+
+_EXAMPLES = {
+    "sqrt": "sqrt(gap(a, b))",
+    "exp": "exp(speed(a) / 20 px/s)",
+    "power": "power(gap(a, b), 2)",
+}
+
+
+def _powered(
+    name: str, parts: tuple[Term, ...], span: Span, vocabulary: Vocabulary, faults: list[Fault]
+) -> Dimension | None:
+    """What a root, a power or an exponential measures."""
+    if len(parts) != (2 if name == "power" else 1):
+        what = f"'{name}' does not take {len(parts)} quantities"
+        faults.append((span, what, f"such as {_EXAMPLES[name]}", None))
+        return None
+    kinds = [_measured(p, vocabulary, faults) for p in parts]
+    if None in kinds:
+        return None
+    base, plain = kinds[0], kinds[-1]
+    assert base is not None
+    assert plain is not None
+    if name == "sqrt":
+        if any(power % 2 for power in base.powers):
+            what = f"{_named(base)} has no square root that could be measured"
+            faults.append((span, what, "a share, or the square of something", None))
+            return None
+        return Dimension(*(power // 2 for power in base.powers))
+    exponent = parts[-1]
+    if plain != SHARE:
+        what = f"an exponent is {_named(plain)}"
+        faults.append((span, what, "a number without a unit", "divide it by an amount of its unit"))
+        return None
+    if name == "exp" or base == SHARE:
+        return SHARE
+    if isinstance(exponent, Number) and exponent.base == int(exponent.base):
+        return Dimension(*(power * int(exponent.base) for power in base.powers))
+    what = f"{_named(base)} is raised to a power that is no whole number"
+    faults.append(
+        (span, what, f"such as {_EXAMPLES['power']}", "divide it by an amount of its unit")
+    )
+    return None
 
 
 def _alike(

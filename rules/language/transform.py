@@ -17,10 +17,12 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Literal,
     MOfN,
     Not,
     Or,
     PastOperator,
+    Previous,
     Quantified,
     Rule,
     Since,
@@ -42,6 +44,10 @@ from visup.rules.formula.units import TIME, Number, Span, Unit
 
 Fault = tuple[Span, str, str | None, str | None]
 """Place, what is wrong, what was expected, hint."""
+
+
+EDGES = ("rising", "falling")
+"""What is true at the sample at which a formula becomes true, or ceases to be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +85,8 @@ class CallResolver:
                 if spanned is None:
                     return Fact("", (), node.span)
                 return Last(self.formula(spanned[0]), spanned[1])
+            if node.name in EDGES:
+                return self._edge(node)
             if node.name in (*POINTWISE, *OVER_WINDOW):
                 what = f"'{node.name}' is a quantity, neither true nor false"
                 self.fault((node.span, what, None, "compare it with a number"))
@@ -110,6 +118,18 @@ class CallResolver:
         what = f"'{node}' is true or false, not a quantity"
         self.fault((_place(node), what, "a quantity or a number", None))
         return Number(0.0, span=_place(node))
+
+    def _edge(self, call: UnresolvedCall) -> Formula:
+        """`rising(f)` and `falling(f)`, of which the language is made no larger."""
+        if len(call.arguments) != 1:
+            what = f"'{call.name}' takes one formula"
+            self.fault((call.span, what, f"such as {call.name}(touching(a, b))", None))
+            return Fact("", (), call.span)
+        part = self.formula(self._unworded(call.arguments[0]))
+        before, now = Previous(part, call.span), part
+        if call.name == "rising":
+            return And((now, Not(before, call.span)), call.span)
+        return And((before, Not(now, call.span)), call.span)
 
     def _words(self, call: UnresolvedCall) -> tuple[str, ...]:
         for argument in call.arguments:
@@ -233,6 +253,31 @@ class _RuleBuilder(Transformer[Token, Any]):
     def not_(self, meta: Any, parts: list[Any]) -> Not:
         return Not(self.meaning.formula(parts[0]), _span_of(meta))
 
+    def implies(self, meta: Any, parts: list[Any]) -> Or:
+        first, second = map(self.meaning.formula, parts)
+        return Or((Not(first, _place(first)), second), _span_of(meta))
+
+    def iff(self, meta: Any, parts: list[Any]) -> Or:
+        first, second = map(self.meaning.formula, parts)
+        neither = And((Not(first, _place(first)), Not(second, _place(second))), _span_of(meta))
+        return Or((And((first, second), _span_of(meta)), neither), _span_of(meta))
+
+    def xor(self, meta: Any, parts: list[Any]) -> Or:
+        first, second = map(self.meaning.formula, parts)
+        one = And((first, Not(second, _place(second))), _span_of(meta))
+        return Or((one, And((Not(first, _place(first)), second), _span_of(meta))), _span_of(meta))
+
+    def release(self, meta: Any, parts: list[Any]) -> Not:
+        left, window, right = parts
+        one, other = (Not(f, _place(f)) for f in map(self.meaning.formula, (left, right)))
+        return Not(Until(one, other, window, _span_of(meta)), _span_of(meta))
+
+    def previous(self, meta: Any, parts: list[Any]) -> Previous:
+        return Previous(self.meaning.formula(parts[0]), _span_of(meta))
+
+    def literal(self, meta: Any, parts: list[Token]) -> Literal:
+        return Literal(str(parts[0]) == "true", _span_of(meta))
+
     def since(self, meta: Any, parts: list[Any]) -> Since:
         left, window, right = parts
         return Since(self.meaning.formula(left), self.meaning.formula(right), window)
@@ -258,9 +303,6 @@ class _RuleBuilder(Transformer[Token, Any]):
 
     def formula(self, meta: Any, parts: list[Any]) -> Formula:
         return self.meaning.formula(parts[0])
-
-    def span(self, meta: Any, parts: list[Number]) -> TimeWindow:
-        return TimeWindow(ZERO, parts[0])
 
     def window(self, meta: Any, parts: list[Any]) -> TimeWindow:
         low, high = parts

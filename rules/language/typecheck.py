@@ -25,7 +25,7 @@ from visup.rules.formula.terms import Measure, WindowFunction
 from visup.rules.formula.units import SHARE, TIME, Number, Span, Unit
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
 from visup.rules.language.diagnostics import Diagnostic, Source
-from visup.rules.language.dimensions import check_dimensions
+from visup.rules.language.dimensions import check_constant, check_dimensions
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import PERCEPT_KINDS, RULES, Vocabulary
@@ -60,6 +60,13 @@ KEYWORDS = frozenset(
         "ago",
         "may",
         "repeat",
+        "true",
+        "false",
+        "implies",
+        "iff",
+        "xor",
+        "release",
+        "previous",
     )
 )
 """Words of the language itself, which name nothing else."""
@@ -93,7 +100,7 @@ class TypeChecker:
 
     def formula(self, formula: Formula) -> Iterator[Diagnostic]:
         """The faults of a formula that stands by itself."""
-        for fault in _FormulaChecker(self.vocabulary, ()).node(formula):
+        for fault in _FormulaChecker(self.vocabulary, None).node(formula):
             yield self.fault(*fault)
 
     def rule(self, rule: Rule) -> Iterator[Diagnostic]:
@@ -138,9 +145,10 @@ class TypeChecker:
 class _FormulaChecker:
     """Goes through formulas; remembers which variables they use."""
 
-    def __init__(self, vocabulary: Vocabulary, variables: tuple[str, ...]) -> None:
+    def __init__(self, vocabulary: Vocabulary, variables: tuple[str, ...] | None) -> None:
         self.vocabulary = vocabulary
-        self.scope = variables
+        self.of_rule = variables is not None
+        self.scope = variables or ()
         self.used: set[str] = set()
 
     def node(self, node: Node) -> Iterator[Fault]:
@@ -152,6 +160,8 @@ class _FormulaChecker:
                 return
             case Comparison():
                 yield from check_dimensions(node, self.vocabulary)
+                if self.of_rule:
+                    yield from check_constant(node)
             case PastOperator(window=TimeWindow() as window):
                 yield from _window(window, "for" if node.kind == "always" else "within")
             case FutureOperator(window=window, span=span) | Until(window=window, span=span):
@@ -235,7 +245,7 @@ def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
     yield from _time(window.high, word)
     if window.low.dimension != TIME:
         yield window.low.span, f"'{word}' needs a time", "such as 2 s", None
-    elif window.high.dimension == TIME and 0 < window.high.base <= window.low.base:
+    elif window.high.dimension == TIME and 0 < window.high.base < window.low.base:
         what = f"a window from {window.low} to {window.high} is empty"
         yield window.high.span, what, "the shorter time first", None
 

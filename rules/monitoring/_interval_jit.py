@@ -7,11 +7,13 @@ constants of an operation.
 
 from __future__ import annotations
 
-from math import inf
+from math import exp, floor, inf, log, nan, sqrt
 
 from visup.compiled import compiled
 
 Pair = tuple[float, float]
+MOST_EXPONENT = 709.0
+"""Beyond it e to its power is no number."""
 
 
 @compiled
@@ -30,6 +32,54 @@ def mirrored(v: Pair, p: float, q: float) -> Pair:
 def absolute(v: Pair, p: float, q: float) -> Pair:
     """Of an interval that spans 0, all up to the farther bound."""
     return max(max(v[0], -v[1]), 0.0), max(-v[0], v[1])
+
+
+@compiled
+def rooted(v: Pair, p: float, q: float) -> Pair:
+    """The square root; of what is below 0 nothing is known."""
+    if v[1] < 0.0:
+        return -inf, inf
+    return sqrt(max(v[0], 0.0)), sqrt(v[1])
+
+
+@compiled
+def exponential(v: Pair, p: float, q: float) -> Pair:
+    """E to the power of it; what is too large for a number is infinite."""
+    return exp(v[0]) if v[0] < MOST_EXPONENT else inf, exp(v[1]) if v[1] < MOST_EXPONENT else inf
+
+
+@compiled
+def raised(base: float, exponent: float) -> float:
+    """One number to the power of another; NaN where it is no number, infinite where too large."""
+    if base == 0.0:
+        return inf if exponent < 0.0 else 1.0 if exponent == 0.0 else 0.0
+    if base < 0.0 and exponent != floor(exponent):
+        return nan
+    size = log(abs(base)) * exponent if exponent != 0.0 else 0.0
+    if size > MOST_EXPONENT:
+        value = inf
+    elif abs(exponent) < MOST_EXPONENT and abs(base) < inf:
+        value = abs(base) ** exponent
+    else:
+        value = exp(size)
+    return -value if base < 0.0 and exponent % 2.0 == 1.0 else value
+
+
+@compiled
+def powered(v: Pair, w: Pair, p: float) -> Pair:
+    """The power; unknown where some number of the intervals has none."""
+    # Of one exponent it is monotone on either side of 0; of a positive base in both.
+    whole = w[0] == w[1] and w[0] == floor(w[0]) and w[0] >= 0.0
+    if not (whole or v[0] > 0.0 or (v[0] == 0.0 and w[0] > 0.0) or (v[0] == v[1] and w[0] == w[1])):
+        return -inf, inf
+    one, two = raised(v[0], w[0]), raised(v[1], w[1])
+    three, four = raised(v[0], w[1]), raised(v[1], w[0])
+    low, high = min(min(one, two), min(three, four)), max(max(one, two), max(three, four))
+    if v[0] < 0.0 < v[1]:
+        low, high = min(low, raised(0.0, w[0])), max(high, raised(0.0, w[0]))
+    if low != low or high != high:
+        return -inf, inf
+    return low, high
 
 
 @compiled

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field
+from math import inf
 
 from visup.rules.formula.nodes import (
     And,
@@ -20,11 +21,13 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Literal,
     MOfN,
     Not,
     Or,
     PastOperator,
     Predicate,
+    Previous,
     Quantified,
     Rule,
     Since,
@@ -40,6 +43,12 @@ from visup.rules.formula.terms import (
     WindowFunction,
 )
 from visup.rules.formula.units import Number, ticks
+from visup.rules.monitoring.beside_windows import (
+    BegunWindow,
+    DelayedUnbounded,
+    EndedWindow,
+    PreviousSample,
+)
 from visup.rules.monitoring.intervals import EQUAL
 from visup.rules.monitoring.operators import (
     BooleanWindow,
@@ -143,6 +152,10 @@ class Compiler:
         match node:
             case Predicate():
                 return self._called(node, scope, certain=True)
+            case Literal(value=value):
+                number = inf if value else -inf
+                step = Operation("number", numbers=(number,))
+                return ValueRef(self.program.add(("number", number), step), certain=True)
             case Comparison():
                 return self._comparison(node, scope)
             case Not(part=part):
@@ -152,6 +165,9 @@ class Compiler:
                 return self._joined(join, [self.formula(p, scope) for p in parts])
             case PastOperator(kind=kind, part=part, window=window):
                 return self._past(kind, window, self.formula(part, scope))
+            case Previous(part=part):
+                at = self.formula(part, scope)
+                return self._operator(PreviousSample(), at, certain=at.certain)
             case Since(left=left, right=right, window=window):
                 sides = self._together([self.formula(left, scope), self.formula(right, scope)])
                 return self._since(window, *sides)
@@ -183,8 +199,10 @@ class Compiler:
                 return self._map("not", self.term(part, scope))
             case Arithmetic(left=left, operator=operator, right=right):
                 return self._map(operator, self.term(left, scope), self.term(right, scope))
-            case PointwiseFunction(name="abs", parts=(part,)):
-                return self._map("abs", self.term(part, scope))
+            case PointwiseFunction(name="abs" | "sqrt" | "exp" as name, parts=(part,)):
+                return self._map(name, self.term(part, scope))
+            case PointwiseFunction(name="power", parts=(base, exponent)):
+                return self._map("power", self.term(base, scope), self.term(exponent, scope))
             case PointwiseFunction(name=name, parts=parts):
                 join = "least" if name == "min" else "most"
                 return self._joined(join, [self.term(p, scope) for p in parts])
@@ -233,19 +251,32 @@ class Compiler:
     def _past(self, kind: str, window: TimeWindow | None, at: ValueRef) -> ValueRef:
         if window is not None:
             return self._slid(kind, ticks(window.low.base), ticks(window.high.base), 0, at)
-        return self._operator(Unbounded(kind), at, certain=at.certain)
+        return self._unbounded(kind, at)
+
+    def _unbounded(self, kind: str, *at: ValueRef) -> ValueRef:
+        delay = at[0].delay
+        operator = DelayedUnbounded(kind, delay) if delay else Unbounded(kind)
+        return self._operator(operator, *at, certain=all(p.certain for p in at))
 
     def _since(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         if window is None:
-            certain = left.certain and right.certain
-            return self._operator(Unbounded("since"), left, right, certain=certain)
-        return self._slid("since", 0, ticks(window.high.base), 0, left, right)
+            return self._unbounded("since", left, right)
+        low, high = ticks(window.low.base), ticks(window.high.base)
+        found = self._slid("since", low, high, 0, left, right)
+        if not low:
+            return found
+        # What came after the window must have been so, too.
+        return self._map("least", found, self._operator(BegunWindow(low), left))
 
     def _until(self, window: TimeWindow | None, left: ValueRef, right: ValueRef) -> ValueRef:
         assert window is not None
         left, right = self._together([left, right])
-        span = ticks(window.high.base)
-        return self._slid("until", 0, span, span, left, right)
+        low, high = ticks(window.low.base), ticks(window.high.base)
+        found = self._slid("until", 0, high - low, high, left, right)
+        if not low:
+            return found
+        before = self._operator(EndedWindow(high - low, high), left, delay=high)
+        return self._map("least", found, before)
 
     def _recalled(self, age: Number, at: ValueRef) -> ValueRef:
         return self._operator(SampleAndHold(ticks(age.base)), at, certain=at.certain)
@@ -258,6 +289,11 @@ class Compiler:
         return self._operator(HysteresisLatch(), entered, left)
 
     def _compared(self, operator: str, left: Term, right: Term, scope: Scope) -> ValueRef:
+        if operator in ("==", "!="):
+            apart = self._map("abs", self._map("-", *self._sides(left, right, scope)))
+            if operator == "==":
+                return self._map("below", apart, numbers=(0.0, EQUAL))
+            return self._map("above", apart, numbers=(0.0, -EQUAL))
         by = EQUAL if "=" in operator else -EQUAL
         more, less = (left, right) if operator[0] == ">" else (right, left)
         # With a number on one side nothing can fail to be a number, and half the work is saved.
@@ -265,8 +301,10 @@ class Compiler:
             return self._map("above", self.term(more, scope), numbers=(-less.base, by))
         if isinstance(more, Number):
             return self._map("below", self.term(less, scope), numbers=(more.base, by))
-        sides = self.term(more, scope), self.term(less, scope)
-        return self._map("compare", *sides, numbers=(by,))
+        return self._map("compare", *self._sides(more, less, scope), numbers=(by,))
+
+    def _sides(self, left: Term, right: Term, scope: Scope) -> tuple[ValueRef, ValueRef]:
+        return self.term(left, scope), self.term(right, scope)
 
     def _over_time(self, node: WindowFunction, at: ValueRef) -> ValueRef:
         span = ticks(node.duration.base)

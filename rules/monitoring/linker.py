@@ -23,16 +23,14 @@ from visup.rules.monitoring.intervals import (
     Interval,
 )
 from visup.rules.monitoring.operators import (
-    LONG_AGO,
-    SAMPLE_HOLD,
     BooleanWindow,
     HysteresisLatch,
     PointOperator,
     SampleAndHold,
-    SlidingCount,
-    SlidingWindow,
     Unbounded,
+    WindowOperator,
 )
+from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD
 from visup.rules.monitoring.states import PointSlot, StateLayout, States, WindowSlot
 from visup.rules.monitoring.vm import Codes, Floats, bits
 
@@ -50,6 +48,9 @@ _KINDS = {
     "*": vm.TIMES,
     "/": vm.OVER,
     "rate": vm.RATE,
+    "sqrt": vm.ROOT,
+    "exp": vm.EXP,
+    "power": vm.POWER,
     "exists": vm.SOME,
     "forall": vm.EVERY,
     "number": vm.NUMBER,
@@ -150,7 +151,7 @@ class LinkedProgram:
         """Say how a step is done."""
         cells = self.n ** len(step.axes)
         stage = max((self._ready[r] for r in step.reads), default=0)
-        if isinstance(step.operator, SlidingWindow | SlidingCount):
+        if isinstance(step.operator, WindowOperator):
             self._stage(stage).windows.append(len(self._windows))
             reads = tuple(self._wide(r, step.axes) for r in step.reads)
             self._windows.append(

@@ -10,23 +10,21 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from visup.rules.formula.nodes import Formula
-from visup.rules.formula.units import TICKS, ticks
+from visup.rules.formula.units import TICKS
 from visup.rules.monitoring import _interval_jit as on_intervals
 from visup.rules.monitoring.compiler import Compiler, Operation
 from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Interval, Scalars
 from visup.rules.monitoring.operators import (
-    LONG_AGO,
-    SAMPLE_HOLD,
     BooleanWindow,
     HysteresisLatch,
     SampleAndHold,
     SlidingWindow,
     TemporalOperator,
     Unbounded,
-    Update,
 )
+from visup.rules.monitoring.samples import LONG_AGO, SAMPLE_HOLD, Update
+from visup.rules.monitoring.signals import Signals, known_interval, later
 
-Signals = Mapping[str, float | Interval | None]
 Run = Callable[[list[Interval], tuple[Any, ...], list[Any], int, Signals], Interval]
 """(values of the operations before, states before, states after, microseconds, signals) -> value."""
 
@@ -47,7 +45,8 @@ class Monitor:
 
     Attributes:
         delay: How many seconds late a verdict comes: what is reported at t is about t - delay.
-        state: All that is retained, an immutable value; put back an older one to go on from it.
+        state: All that is retained, an immutable value: microseconds of the last sample, or None
+            before it, and what the operators remember. Put back an older one to go on from it.
     """
 
     def __init__(self, formula: Formula) -> None:
@@ -56,7 +55,7 @@ class Monitor:
         self._runs = [_run(step, k) for k, step in enumerate(compiler.program.steps)]
         self._at = value.step
         self.delay = value.delay / TICKS
-        self.state: tuple[Any, ...] = (None,) * len(self._runs)
+        self.state: tuple[int | None, tuple[Any, ...]] = (None, (None,) * len(self._runs))
 
     def step(self, time: float, values: Signals) -> Interval:
         """Take in one sample.
@@ -67,12 +66,17 @@ class Monitor:
 
         Returns:
             The robustness interval of the formula; see `verdict`.
+
+        Raises:
+            SettingsError: The time is no number, or not later than the one before; a signal is a
+                reversed interval.
         """
-        now, before = ticks(time), self.state
+        then, before = self.state
+        now = later(time, then)
         after, found = list(before), list[Interval]()
         for run in self._runs:
             found.append(run(found, before, after, now, values))
-        self.state = tuple(after)
+        self.state = now, tuple(after)
         return found[self._at]
 
 
@@ -84,7 +88,7 @@ def _run(step: Operation, slot: int) -> Run:
         return _remembering(_update(step.operator), slot, one, other)
     if step.node is not None:
         name = step.node.name
-        return lambda v, before, after, now, signals: _known(signals.get(name))
+        return lambda v, before, after, now, signals: known_interval(signals.get(name))
     if step.kind == "number":
         return lambda v, before, after, now, signals: (first, first)
     function = _FUNCTIONS[step.kind]
@@ -107,15 +111,6 @@ def _remembering(update: Update, slot: int, one: int, other: int) -> Run:
     return single if other < 0 else pair
 
 
-def _known(value: float | Interval | None) -> Interval:
-    """What a signal says."""
-    if isinstance(value, tuple):
-        return value
-    if value is None or value != value:  # NaN is not equal to itself
-        return UNKNOWN
-    return (value, value)
-
-
 def _plain(function: Any) -> Callable[..., Any]:
     """The Python function that was compiled."""
     plain: Callable[..., Any] = function.py_func
@@ -135,6 +130,9 @@ _FUNCTIONS: Mapping[str, Callable[..., Interval]] = {
     "*": _plain(on_intervals.product),
     "/": on_intervals.quotient,
     "rate": _plain(on_intervals.rate),
+    "sqrt": _plain(on_intervals.rooted),
+    "exp": _plain(on_intervals.exponential),
+    "power": on_intervals.powered,
 }
 """What an operation without memory does: (interval, two numbers) or (two intervals, a number)."""
 

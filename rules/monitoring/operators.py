@@ -11,32 +11,18 @@ Those that retain no more than a few numbers for each choice of objects (`Boolea
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from visup.rules.formula.units import ticks
+from visup.rules.monitoring.beside_windows import (
+    BegunWindow,
+    DelayedUnbounded,
+    EndedWindow,
+    PreviousSample,
+)
 from visup.rules.monitoring.intervals import EQUAL, UNKNOWN, Algebra, Interval
+from visup.rules.monitoring.samples import SAMPLE_HOLD, SelectObjects, Update, max_samples
 from visup.rules.monitoring.sliding import Fold, Queue, SlidingState, initial, mapped, slide
-
-SAMPLE_HOLD = ticks(0.5)
-"""How long one sample speaks for what follows, microseconds."""
-MIN_SPACING = ticks(0.01)
-"""Samples closer than this are not taken in, which bounds what a window holds; microseconds."""
-LONG_AGO = -(2**62)
-
-Update = Callable[..., tuple[Any, Any]]
-"""(state before or None at the first sample, microseconds, intervals of the parts) -> (state after,
-the interval of the whole)."""
-
-
-def max_samples(span: int) -> int:
-    """Most samples of a span in microseconds, with one for each silence and one at either end."""
-    return span // MIN_SPACING + span // SAMPLE_HOLD + 2
-
-
-SelectObjects = Callable[[Any, Interval], Any]
-"""(intervals, what those of new objects are) -> intervals of the objects there are now."""
 
 
 @dataclass(frozen=True)
@@ -268,7 +254,9 @@ class HysteresisLatch:
 
 PointOperator = BooleanWindow | Unbounded | SampleAndHold | HysteresisLatch
 """Operators whose state is a few numbers for each choice of objects."""
-WindowOperator = SlidingWindow | SlidingCount
-"""Operators that retain a whole window."""
+WindowOperator = (
+    SlidingWindow | SlidingCount | DelayedUnbounded | BegunWindow | EndedWindow | PreviousSample
+)
+"""Operators that retain a whole window, or what `vm` has no loop for."""
 TemporalOperator = PointOperator | WindowOperator
 """What remembers something of one formula or quantity from sample to sample."""

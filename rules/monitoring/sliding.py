@@ -137,6 +137,20 @@ def slide(
     return SlidingState(now, current, front, back, newer, waiting, head), result
 
 
+def later(state: SlidingState, fold: Fold, nothing: Any) -> Any:
+    """The fold of what began after the window did, that is, without what stood where it begins.
+
+    Args:
+        state: After a sample.
+        fold: Joins values.
+        nothing: What it is when nothing began.
+    """
+    front = None if state.front is None else state.front[2]
+    if state.back is None:
+        return nothing if state.front is None else front
+    return state.fold if state.front is None else fold(front, state.fold)
+
+
 def _next(queue: Queue, limit: int) -> tuple[Queue, tuple[int, Any] | None]:
     """The oldest one, taken out, when it came up to a moment."""
     front, back = queue

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from visup.rules.monitoring.intervals import Interval, IntervalArray
 from visup.rules.monitoring.operators import (
-    SAMPLE_HOLD,
     BooleanWindow,
     PointOperator,
     Unbounded,
-    Update,
     WindowOperator,
 )
+from visup.rules.monitoring.samples import SAMPLE_HOLD, Update
 from visup.rules.monitoring.vm import Floats
 
 

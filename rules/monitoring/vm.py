@@ -18,12 +18,15 @@ from visup.rules.monitoring._interval_jit import (
     absolute,
     added,
     compared,
+    exponential,
     latched,
     mirrored,
+    powered,
     product,
     quotient,
     rate,
     recalled,
+    rooted,
     shifted,
     subtracted,
 )
@@ -41,9 +44,8 @@ CHOICE_BITS = 32
 """There are fewer choices of objects than 2 to that."""
 
 (FACT, SPREAD, NUMBER, NOT, ABS, LEAST, MOST, SHIFT, BELOW, COMPARE, PLUS, MINUS) = range(12)
-(TIMES, OVER, RATE, SOME, EVERY, ALWAYS, ONCE, SINCE, LASTS, HAPPENED, LATCH, RECALL) = range(
-    12, 24
-)
+(TIMES, OVER, RATE, ROOT, EXP, POWER, SOME, EVERY) = range(12, 20)
+(ALWAYS, ONCE, SINCE, LASTS, HAPPENED, LATCH, RECALL) = range(20, 27)
 
 
 @compiled
@@ -123,6 +125,12 @@ def _arithmetic(op: int, c: int, a: int, b: int, p: float, out: int, arena: Floa
             v = compared(v, w, p)
         elif op == RATE:
             v = rate(v, w, p)
+        elif op == ROOT:
+            v = rooted(v, p, 0.0)
+        elif op == EXP:
+            v = exponential(v, p, 0.0)
+        elif op == POWER:
+            v = powered(v, w, p)
         elif op == TIMES:
             v = product(v, w, p)
         else:

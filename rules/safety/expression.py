@@ -24,7 +24,7 @@ from visup.rules.formula.nodes import Comparison, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_rules
 from visup.rules.monitoring.intervals import Interval, verdict
-from visup.rules.monitoring.operators import MIN_SPACING
+from visup.rules.monitoring.samples import MIN_SPACING
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import RULES

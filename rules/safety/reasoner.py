@@ -10,7 +10,7 @@ from visup.agent import AlertCondition, Mind, Observation, Outcome, TaskBelief
 from visup.agent.model.memory import MemoryKey
 from visup.rules.formula.nodes import Rule
 from visup.rules.formula.units import ticks
-from visup.rules.monitoring.operators import MIN_SPACING
+from visup.rules.monitoring.samples import MIN_SPACING
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.safety.alarm_condition import ActiveCondition, update

@@ -32,8 +32,6 @@ class ActionDefinition:
             than being over once it has held long enough (`coupled`).
         hold_s: Seconds for which it must have held to count as done, unless `for` says otherwise.
         entry: It is seen to begin when one of these is true; `holds` when empty.
-        while_not: A touch does not make it begin while one of these is still true: what draws
-            nearer has not met yet, however little lies between in the image.
         progress: Further relations that bring it nearer although it does not hold yet.
         contrary: Relations that say that it fails.
         expects: Further relations that are no reason for worry while it is asked for.
@@ -50,7 +48,6 @@ class ActionDefinition:
     lasts: bool = False
     hold_s: float = 1.0
     entry: tuple[str, ...] = ()
-    while_not: tuple[str, ...] = ()
     progress: tuple[str, ...] = ()
     contrary: tuple[str, ...] = ()
     expects: tuple[str, ...] = ()
@@ -127,7 +124,6 @@ _TABLE = (
         "coupled",
         holds=("coupled",),
         entry=("coupled", "in_contact"),
-        while_not=(),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),

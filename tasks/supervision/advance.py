@@ -124,9 +124,7 @@ class Advance:
         return skipped * hmm.unseen
 
     def _opens(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
-        """Whether all that a transition enters was seen to begin, and nothing says "not yet"."""
-        if any(self.observe(s).not_yet for s in transition.entered):
-            return False
+        """Whether all that a transition enters was seen to begin."""
         met = dict(hypothesis.met).get(transition.entered, -math.inf)
         return self.now - met <= self.steps.settings.contact_s
 

@@ -116,15 +116,20 @@ def done_stages(belief: TaskBelief) -> set[str]:
     return {s.stage for s in belief.stages if s.status is Status.DONE}
 
 
-def stage_concerns(belief: TaskBelief) -> Iterator[AlertCondition]:
+def stage_concerns(belief: TaskBelief, violated: str = "") -> Iterator[AlertCondition]:
     """A concern for each stage that is failing or has failed.
 
     A task that was interrupted is not expected to go on, so its stages are no concern any more.
+
+    Args:
+        belief: Of the task.
+        violated: The broken invariant by which the task has failed, or empty: it is a concern of its own,
+            and its stage none besides.
     """
     if belief.verdict is Verdict.INTERRUPTED:
         return
     for stage in belief.stages:
-        if stage.status in BAD:
+        if stage.status in BAD and not (violated and stage.evidence == violated):
             cause = stage_sentence("stage_failing", stage.stage, belief.task, stage.evidence)
             yield AlertCondition(
                 "stage_failing",
@@ -174,7 +179,7 @@ def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) 
 
 def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
     """The sentence with which a task begins: it says who is believed to take part."""
-    who = ", and ".join(describe(mind, i, n) for n, i in enumerate(_objects(belief)))
+    who = ", and ".join(describe(mind, i) for i in _objects(belief))
     return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from visup.agent import AlertCondition, Event, Mind, Severity, Truth
+from visup.agent import AlertCondition, Event, Mind, Severity, TaskBelief, Truth, Verdict
 from visup.tasks.automaton.derivatives import leaves
 from visup.tasks.grammar.conditions import action_of, facts_of
 from visup.tasks.grammar.nodes import Invariant
@@ -13,6 +13,7 @@ from visup.tasks.grammar.units import value
 from visup.tasks.supervision.events import played
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.supervision.sentences import verdict_sentence
 from visup.tasks.supervision.snapshot import TaskSnapshot
 
 
@@ -70,10 +71,22 @@ def violation(
         safety: Of those of safety, or of the others.
     """
     for invariant, since in zip(model.task.invariants, broken, strict=True):
-        lasted = since is not None and now - since >= patience(model, invariant)
-        if lasted and is_of_safety(model, invariant) is safety:
-            return f"`{invariant}` does not hold"
+        if since is None or now - since < patience(model, invariant):
+            continue
+        if is_of_safety(model, invariant) is safety:
+            return _reason(invariant, since)
     return ""
+
+
+def _reason(invariant: Invariant, since: float) -> str:
+    return f"`{invariant}` has not held since {since:.1f} s"
+
+
+def _told(model: MonitoredPhases, belief: TaskBelief, reason: str) -> str:
+    """What is said of a broken invariant: what the task has come to by it, in the verdict's own words."""
+    if reason == belief.evidence and belief.verdict in (Verdict.FAILED, Verdict.INTERRUPTED):
+        return verdict_sentence(model.task.name, belief.verdict, reason)
+    return f"Task `{model.task.name}`: {reason}."
 
 
 def patience(model: MonitoredPhases, invariant: Invariant) -> float:
@@ -90,7 +103,7 @@ def invariant_concerns(model: MonitoredPhases, memory: TaskMemory) -> Iterator[A
             facts = facts_of(invariant.condition)
             actors = (a for f in facts for a in fact_key(model.task, f)[1])
             objects = played(memory.belief, tuple(dict.fromkeys(actors)))
-            cause = f"`{invariant}` has not held since {since:.1f} s."
+            cause = _told(model, memory.belief, _reason(invariant, since))
             key = f"{model.task.name}: {invariant}"
             yield AlertCondition("invariant_broken", objects, Severity.CRITICAL, cause, (), key)
 
@@ -103,7 +116,7 @@ def invariant_events(
         must = patience(model, invariant)
         since = new.broken_since[i]
         if since is not None and memory.time - since < must <= new.time - since:
-            text = f"Task `{model.task.name}`: `{invariant}` has not held since {since:.1f} s."
+            text = _told(model, new.belief, _reason(invariant, since))
             yield Event(
                 "invariant_broken",
                 mind.time,

@@ -36,7 +36,6 @@ class ActionObservation:
         held_by: A true relation by which it holds, or None.
         helps: A true relation by which it holds or comes nearer, or None.
         entry: A true relation by which it begins, or None.
-        not_yet: Whether the entry does not count yet (`while_not`).
         contrary: A true relation that says that it fails, or None.
         stern: Whether the contrary counts although the action holds: the course itself says so.
         over: Whether what its course says of its end is seen; None when the course says nothing.
@@ -49,7 +48,6 @@ class ActionObservation:
     held_by: Relation | None = None
     helps: Relation | None = None
     entry: Relation | None = None
-    not_yet: bool = False
     contrary: Relation | None = None
     decisive: bool = False
     over: Truth | None = None
@@ -101,7 +99,11 @@ class RelationLookup:
         if meets and found is not None and self._passes_by(objects):
             return replace(found, truth=Truth.UNKNOWN)
         settled = found is not None and found.truth is not Truth.UNKNOWN
-        if found is not None and settled and (name != "moving_together" or found.truth is Truth.TRUE):
+        if (
+            found is not None
+            and settled
+            and (name != "moving_together" or found.truth is Truth.TRUE)
+        ):
             return found
         derive = DERIVED.get(name)
         derived = derive(self._mind, self, objects) if derive else None
@@ -204,8 +206,6 @@ def observe(
         held_by=held_by,
         helps=helps,
         entry=entry,
-        not_yet=holds is not Truth.TRUE
-        and relations.first_true(meaning.while_not, ids) is not None,
         contrary=contrary,
         observed=relations.known(known, ids),
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
@@ -233,7 +233,9 @@ def _decoupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> R
     return _opposite("decoupled", relations.find("coupled", ids))
 
 
-def _moving_together(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
+def _moving_together(
+    mind: Mind, relations: RelationLookup, ids: tuple[int, ...]
+) -> Relation | None:
     """Moving together when they are coupled and on the move, however much one of them sways."""
     coupled = relations.find("coupled", ids)
     if coupled.truth is not Truth.TRUE:

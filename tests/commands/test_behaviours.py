@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
 from visup.agent.model.errors import VisupError
 from visup.agent.plugins.factory import load_behaviours
+from visup.agent.plugins.isolated import IsolatedBehaviour
 from visup.cli import app
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
@@ -90,6 +92,11 @@ def test_settings_go_from_the_command_line_into_the_run(tmp_path: Path) -> None:
     )
     agent = build_agent(made)
     lamp = next(b for b in agent.behaviours if b.contract.name == "lamp")
+    # It runs in a process of its own, and so is never made in this one.
+    assert isinstance(lamp, IsolatedBehaviour)
+    assert lamp.settings == {"contrast": 7}
+    here = build_agent(replace(made, isolate=()))
+    lamp = next(b for b in here.behaviours if b.contract.name == "lamp")
     assert lamp.settings.contrast == 7  # type: ignore[attr-defined]
     assert (set(agent.limits.isolate), agent.limits.budgets) == ({"lamp"}, True)
 

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sqlite3
+import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
@@ -13,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli import Call, caller
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
-from visup.cli import main
 from visup.commands.doctor import EXTRAS, LIBRARIES
 
 MISTAKES = """\
@@ -26,12 +27,6 @@ MISTAKES = """\
 """
 
 
-class Result:
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-
-Call = Callable[..., Result]
 Make = Callable[[Path], list[object]]
 
 
@@ -40,19 +35,7 @@ def visup(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Call:
     monkeypatch.chdir(tmp_path)
-
-    def call(*words: object) -> Result:
-        monkeypatch.setattr(sys, "argv", ["visup", *map(str, words)])
-        capfd.readouterr()
-        try:
-            main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capfd.readouterr()
-        return Result(code, out, err)
-
-    return call
+    return caller(monkeypatch, capfd)
 
 
 @pytest.fixture
@@ -267,3 +250,22 @@ def test_the_doctor_knows_what_visup_depends_on() -> None:
 def bare(requirement: str) -> str:
     """The name of a library, without its version and extras."""
     return re.split(r"[\[>=]", requirement)[0]
+
+
+@pytest.mark.parametrize("megabytes", [400, 800, 1200])
+def test_too_little_memory_is_told_and_not_died_of(megabytes: int, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource", reason="this system has no limits of memory")
+    done = subprocess.run(
+        [sys.executable, "-m", "visup.cli", "watch", "clip.mp4"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        preexec_fn=lambda: resource.setrlimit(
+            resource.RLIMIT_AS, (megabytes << 20, megabytes << 20)
+        ),
+    )
+    assert done.returncode == 2, done.stderr
+    assert "memory" in done.stderr
+    assert "Traceback" not in done.stderr

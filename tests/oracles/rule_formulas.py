@@ -12,10 +12,12 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Literal,
     MOfN,
     Not,
     Or,
     PastOperator,
+    Previous,
     Since,
     TimeWindow,
     Until,
@@ -52,7 +54,12 @@ def random_formula(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Form
     def part() -> Formula:
         return random_formula(rng, depth - 1, words)
 
-    match rng.randrange(13):
+    # What depends on no object has no first sample of its own.
+    match rng.randrange(14 if words else 15):
+        case 13:
+            return Previous(part())
+        case 14:
+            return rng.choice((Literal(True), Literal(False)))
         case 0:
             return Not(part())
         case 1:
@@ -64,12 +71,12 @@ def random_formula(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Form
         case 5:
             return PastOperator(rng.choice(("always", "once")), part())
         case 6 | 7:
-            return Since(part(), part(), rng.choice((None, TimeWindow(ZERO, _span(rng)))))
+            return Since(part(), part(), rng.choice((None, _window(rng, 0.4))))
         case 8:
             kind = rng.choice(("eventually", "henceforth"))
             return FutureOperator(kind, part(), _window(rng, 0.5))
         case 9:
-            return Until(part(), part(), TimeWindow(ZERO, _span(rng)))
+            return Until(part(), part(), _window(rng, 0.4))
         case 10:
             of = rng.randint(1, 6)
             return MOfN(part(), Number(float(rng.randint(1, of))), Number(float(of)))
@@ -80,10 +87,10 @@ def random_formula(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Form
 
 
 def _comparison(rng: Random, words: tuple[str, ...]) -> Comparison:
-    operator = rng.choice(("<", "<=", ">", ">="))
+    operator = rng.choice(("<", "<=", ">", ">=", "==", "!="))
     bound = Number(rng.randint(-8, 8) / 4)
     leave = None
-    if rng.random() < 0.25:
+    if rng.random() < 0.25 and operator[0] in "<>":
         slack = rng.randint(0, 6) / 4 * (-1 if ">" in operator else 1)
         leave = Number(bound.value + slack)
     return Comparison(random_term(rng, rng.randint(0, 2), words), operator, bound, leave)
@@ -97,7 +104,11 @@ def random_term(rng: Random, depth: int, words: tuple[str, ...] = ()) -> Term:
     def part() -> Term:
         return random_term(rng, depth - 1, words)
 
-    match rng.randrange(7):
+    match rng.randrange(9):
+        case 7:
+            return PointwiseFunction(rng.choice(("sqrt", "exp")), (part(),))
+        case 8:
+            return PointwiseFunction("power", (part(), Number(float(rng.randint(0, 3)))))
         case 0 | 1:
             return Arithmetic(part(), rng.choice("+-*/"), part())
         case 2:
@@ -122,7 +133,7 @@ def _window(rng: Random, later: float) -> TimeWindow:
     high = _span(rng)
     if rng.random() >= later:
         return TimeWindow(ZERO, high)
-    return TimeWindow(Number(high.value * rng.choice((0.25, 0.5)), Unit.MS), high)
+    return TimeWindow(Number(high.value * rng.choice((0.25, 0.5, 1.0)), Unit.MS), high)
 
 
 def random_times(rng: Random, count: int) -> list[float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from math import inf, isnan
+from math import exp, inf, isnan
 
 from visup.rules.formula.nodes import (
     And,
@@ -17,10 +17,12 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Literal,
     MOfN,
     Not,
     Or,
     PastOperator,
+    Previous,
     Since,
     TimeWindow,
     Until,
@@ -89,6 +91,10 @@ class _Oracle:
         match f:
             case Comparison():
                 return self.comparison(f)
+            case Literal(value=value):
+                return Signal([(inf, inf) if value else (-inf, -inf)] * len(self.times))
+            case Previous(part=part):
+                return self.previous(self.formula(part))
             case Not(part=part):
                 s = self.formula(part)
                 return Signal([(-h, -low) for low, h in s.values], s.delay)
@@ -99,7 +105,10 @@ class _Oracle:
             case PastOperator(kind=kind, part=part, window=None):
                 s = self.formula(part)
                 join = _both if kind == "always" else _either
-                return Signal(self.each(lambda k: _fold(self.so_far(k, s), join)), s.delay)
+                return Signal(
+                    self.each(lambda k: _fold([p.value[0] for p in self.so_far(k, s)], join)),
+                    s.delay,
+                )
             case PastOperator(kind=kind, part=part, window=TimeWindow(low=low, high=high)):
                 join = _both if kind == "always" else _either
                 return self.past(self.formula(part), join, _micro(low), _micro(high))
@@ -115,8 +124,9 @@ class _Oracle:
                 return Signal(self.each(ahead), late)
             case Since(left=left, right=right, window=window):
                 return self.since(self.formula(left), self.formula(right), window)
-            case Until(left=left, right=right, window=TimeWindow(high=high)):
-                return self.until(self.formula(left), self.formula(right), _micro(high))
+            case Until(left=left, right=right, window=TimeWindow(low=low, high=high)):
+                a, b = _micro(low), _micro(high)
+                return self.until(self.formula(left), self.formula(right), a, b)
             case MOfN():
                 return self.often(f)
             case Last(part=part, duration=age):
@@ -143,8 +153,9 @@ class _Oracle:
         """Its values at all moments from `low` to `high`, _both included."""
         return [p.value[0] for p in self.pieces(k, signal) if p.start <= high and p.end > low]
 
-    def so_far(self, k: int, signal: Signal) -> Values:
-        return [p.value[0] for p in self.pieces(k, signal)[1:]]
+    def so_far(self, k: int, *signals: Signal) -> list[Piece]:
+        """The pieces that begin at the first sample or later."""
+        return [p for p in self.pieces(k, *signals) if p.start >= self.times[0]]
 
     def past(self, s: Signal, join: Join, a: int, b: int) -> Signal:
         def back(k: int) -> Interval:
@@ -173,18 +184,22 @@ class _Oracle:
         left, right = self.waited([left, right])
 
         def at(k: int) -> Interval:
-            pieces = self.pieces(k, left, right)
-            begin = self.times[k] - left.delay - (_micro(window.high) if window else 0)
-            inner = [p for p in pieces if p.end > begin] if window else pieces[1:]
+            pieces, now = self.pieces(k, left, right), self.times[k] - left.delay
+            if window is None:
+                pieces = self.so_far(k, left, right)
+                begin, end = -inf, inf
+            else:
+                begin, end = now - _micro(window.high), now - _micro(window.low)
             found = [
-                _fold([p.value[1], *(later.value[0] for later in inner[i + 1 :])], _both)
-                for i, p in enumerate(inner)
+                _fold([p.value[1], *(later.value[0] for later in pieces[i + 1 :])], _both)
+                for i, p in enumerate(pieces)
+                if p.end > begin and p.start <= end
             ]
             return _fold(found, _either)
 
         return Signal(self.each(at), left.delay)
 
-    def until(self, left: Signal, right: Signal, b: int) -> Signal:
+    def until(self, left: Signal, right: Signal, a: int, b: int) -> Signal:
         left, right = self.waited([left, right])
         late = left.delay + b
 
@@ -194,10 +209,18 @@ class _Oracle:
             found = [
                 _fold([p.value[1], *(earlier.value[0] for earlier in inner[:i])], _both)
                 for i, p in enumerate(inner)
+                if p.end > begin + a
             ]
             return _fold(found, _either)
 
         return Signal(self.each(at), late)
+
+    def previous(self, s: Signal) -> Signal:
+        def at(k: int) -> Interval:
+            heard = k > 0 and self.times[k] - self.times[k - 1] <= SPEAKS
+            return s.values[k - 1] if heard else ANYTHING
+
+        return Signal(self.each(at), s.delay)
 
     def often(self, f: MOfN) -> Signal:
         s = self.formula(f.part)
@@ -244,6 +267,15 @@ class _Oracle:
         return Signal(values)
 
     def compared(self, operator: str, left: Term, right: Term) -> Values:
+        if operator in ("==", "!="):
+            values = zip(self.term(left), self.term(right), strict=True)
+            apart = [
+                _absolute((_number(v[0] - w[1], -inf), _number(v[1] - w[0], inf)))
+                for v, w in values
+            ]
+            if operator == "!=":
+                return [(low - LEAST, high - LEAST) for low, high in apart]
+            return [(-high + LEAST, -low + LEAST) for low, high in apart]
         by = LEAST if "=" in operator else -LEAST
         more, less = (left, right) if ">" in operator else (right, left)
         values = zip(self.term(more), self.term(less), strict=True)
@@ -261,6 +293,13 @@ class _Oracle:
                 return [(-h, -low) for low, h in self.term(part)]
             case PointwiseFunction(name="abs", parts=(part,)):
                 return [_absolute(v) for v in self.term(part)]
+            case PointwiseFunction(name="sqrt", parts=(part,)):
+                roots = [(max(v[0], 0.0), v[1]) for v in self.term(part)]
+                return [ANYTHING if h < 0 else (low**0.5, h**0.5) for low, h in roots]
+            case PointwiseFunction(name="exp", parts=(part,)):
+                return [(_exp(low), _exp(h)) for low, h in self.term(part)]
+            case PointwiseFunction(name="power", parts=(part, Number(base=exponent))):
+                return [_power(v, exponent) for v in self.term(part)]
             case PointwiseFunction(name=name, parts=parts):
                 join = _both if name == "min" else _either
                 return [_fold(list(v), join) for v in zip(*map(self.term, parts), strict=True)]
@@ -284,6 +323,17 @@ class _Oracle:
         raise TypeError(f"the oracle knows signals, not objects: {t}")
 
 
+def _exp(x: float) -> float:
+    return inf if x > 700 else exp(x)
+
+
+def _power(v: Interval, whole: float) -> Interval:
+    """A whole power of an interval: of its ends, and of 0 where it lies between them."""
+    inner = [0.0] if v[0] < 0.0 < v[1] else []
+    found = [x**whole for x in (*v, *inner)]
+    return min(found), max(found)
+
+
 def _both(v: Interval, w: Interval) -> Interval:
     return min(v[0], w[0]), min(v[1], w[1])
 
@@ -293,7 +343,7 @@ def _either(v: Interval, w: Interval) -> Interval:
 
 
 def _fold(values: Values, join: Join) -> Interval:
-    return reduce(join, values)
+    return reduce(join, values) if values else ANYTHING
 
 
 def _micro(n: Number) -> int:

@@ -10,7 +10,7 @@ from tests.paths import ROOT
 from visup.rules.formula.units import TICKS, UNITS
 from visup.rules.language.cost import MAX_STATE, MAX_VARIABLES
 from visup.rules.language.parser import parse_rules, shipped_rules
-from visup.rules.monitoring.operators import MIN_SPACING, SAMPLE_HOLD
+from visup.rules.monitoring.samples import MIN_SPACING, SAMPLE_HOLD
 from visup.rules.predicates.certainty import KEEP_OUT
 from visup.rules.predicates.snapshot import SIGMAS
 from visup.rules.predicates.vocabulary import IMPLIED, PREDICATES, QUANTITIES

@@ -26,7 +26,8 @@ from visup.evaluation.runtime.soak import evaluate_soak, sinks_ratio
 from visup.runs.runner import fresh_folder, supervise
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.sinks import Outbox, Sinks, open_sink
-from visup.sinks.file_and_webhook import JsonLines, Webhook
+from visup.sinks.lines import JsonLines
+from visup.sinks.webhook import Webhook
 
 ALERT = Alert(3, "worry", Severity.WARNING, 1.0, 1.5, (1, 2), "This is a worry.", ("because",))
 FRAME = Frame(7, 1.5, np.zeros((4, 6, 3), np.uint8))
@@ -101,7 +102,9 @@ def test_a_sink_that_never_answers_does_not_hold_up_the_end() -> None:
     for n in range(10):
         box.offer(n)
     box.close(wait_s=0.2)
-    assert box.dropped >= 9
+    assert box.dropped == 10  # with the one that is in the sink's hands
+    box.close(wait_s=0.0)
+    assert box.dropped == 10
     slow.gate.set()
 
 
@@ -171,7 +174,7 @@ def test_a_webhook_is_tried_again_when_the_server_is_at_fault(
 
 def test_a_webhook_that_nobody_serves_fails_in_the_end() -> None:
     hook = Webhook("http://127.0.0.1:9/", wait=lambda s: None)
-    with pytest.raises(OSError, match=r"refused|urlopen"):
+    with pytest.raises(OSError, match="refused"):
         hook.deliver({})
 
 
@@ -306,3 +309,26 @@ def test_a_short_soak_is_flat_and_repeats(monkeypatch: pytest.MonkeyPatch) -> No
     assert figures["total"]["rss_grown_mb"] < 20
     with pytest.raises(SettingsError):
         evaluate_soak(10)
+
+
+@pytest.mark.parametrize(
+    ("surroundings", "name"),
+    [
+        ({}, "visup"),
+        ({"OTEL_SERVICE_NAME": "cell-7"}, "cell-7"),
+        ({"OTEL_RESOURCE_ATTRIBUTES": "service.name=cell-8"}, "cell-8"),
+    ],
+)
+def test_telemetry_tells_whose_it_is(
+    monkeypatch: pytest.MonkeyPatch, surroundings: dict[str, str], name: str
+) -> None:
+    pytest.importorskip("opentelemetry.sdk", reason="the extra visup[otel] is not installed")
+    from visup.sinks.telemetry import service_resource
+
+    for variable in ("OTEL_SERVICE_NAME", "OTEL_RESOURCE_ATTRIBUTES"):
+        monkeypatch.delenv(variable, raising=False)
+    for variable, value in surroundings.items():
+        monkeypatch.setenv(variable, value)
+    attributes = service_resource().attributes
+    assert attributes["service.name"] == name
+    assert attributes["service.version"]

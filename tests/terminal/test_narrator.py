@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 from rich.console import Console
 
@@ -13,11 +14,19 @@ def event(text: str, severity: Severity = Severity.INFO, kind: str = "entry") ->
     return Event(kind, 12.34, 308, text, severity=severity)
 
 
-def printed(*events: Event) -> str:
+def printed(*events: Event, terminal: bool = True) -> str:
     out = io.StringIO()
     for it in events:
-        Narrator(Console(file=out, width=80)).print_event(it)
+        console = Console(file=out, width=80, force_terminal=terminal, color_system=None)
+        Narrator(console).print_event(it)
     return out.getvalue()
+
+
+def test_a_pipe_is_given_one_line_for_each_event_neither_wrapped_nor_padded() -> None:
+    words = ("word " * 40).strip()
+    assert printed(event(words), event("It is."), terminal=False) == (
+        f"  12.3 s   {words}\n  12.3 s   It is.\n"
+    )
 
 
 def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:
@@ -28,6 +37,24 @@ def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:
         ("It fails.", Severity.WARNING),
         ("It rains.", Severity.INFO),
     ]
+
+
+def test_the_same_words_in_another_step_are_told_again() -> None:
+    again = replace(event("It is hidden."), frame_index=400)
+    assert len(worded_once([event("It is hidden."), again])) == 2
+
+
+def test_grave_events_of_one_reason_are_told_by_the_gravest() -> None:
+    told = worded_once(
+        [
+            event("Stage `a` has failed: it moved.", Severity.WARNING, "stage_failed"),
+            event("Task `t` has failed: it moved.", Severity.CRITICAL, "alert"),
+            event("Stage `b` is failing: it stood.", Severity.WARNING, "stage_failing"),
+            event("Task `u` is complete: it moved."),
+        ]
+    )
+    assert [e.text[:6] for e in told] == ["Task `", "Stage ", "Task `"]
+    assert told[0].severity is Severity.CRITICAL
 
 
 def test_long_sentences_go_on_below_themselves_within_80_columns() -> None:

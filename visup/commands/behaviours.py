@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.terminal.console import echo, make_console
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -52,13 +54,12 @@ class {title}:
 @app.command("list")
 def list_behaviours() -> None:
     """Installed behaviours: what they give, need and cost."""
-    from rich.console import Console
     from rich.table import Table
 
     from visup.agent.model.errors import BehaviourError
     from visup.agent.plugins.registry import discover_behaviours
 
-    registry, console = discover_behaviours(), Console(highlight=False)
+    registry, console = discover_behaviours(), make_console()
     table = Table(padding=(0, 0))
     for heading in ("name", "gives", "needs", "every", "budget", "found in"):
         table.add_column(heading, overflow="fold")
@@ -88,11 +89,9 @@ def check(
 
     Exit code: 0 when it does, 1 when it does not, 2 when it cannot be loaded.
     """
-    from rich.console import Console
-
     from visup.agent.plugins.settings import parse_settings
 
-    console, values = Console(highlight=False), parse_settings(setting or ())
+    console, values = make_console(), parse_settings(setting or ())
     kept = [_check(console, factory, values) for factory in _factories(where)]
     raise typer.Exit(0 if all(kept) else 1)
 
@@ -121,7 +120,7 @@ def new(
         raise OutputError("the file exists already", where=str(path)) from fault
     except OSError as fault:
         raise OutputError(f"cannot be written: {fault.strerror}", where=str(path)) from fault
-    typer.echo(f"{path}: change it, then\n  visup behaviours check {path}")
+    echo(f"{path}: change it, then\n  visup behaviours check {path}")
 
 
 def _factories(where: str) -> list[BehaviourFactory]:

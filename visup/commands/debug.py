@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.terminal.console import make_console
+
 if TYPE_CHECKING:
     from visup.percepts.video import VideoSource
     from visup.runs.runner import Progress
@@ -36,13 +38,11 @@ def motion(
     ] = None,
 ) -> None:
     """Write a video of how motion is seen: constraints, layers, labels, regions."""
-    from rich.console import Console
-
     from visup.commands.watch import progress_bar
     from visup.percepts.video import open_source
 
     target = checked_target(out or Path(f"{_name(source)}-motion.webm"))
-    console = Console(highlight=False, soft_wrap=True)
+    console = make_console(soft_wrap=True)
     with (
         open_source(video_of(source), every=every, fps=fps) as video,
         progress_bar(console, "seeing") as advance,

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import typer
 
+from visup.terminal.console import make_console
+
 LIBRARIES = {
     "numpy": "arrays",
     "numba": "compiled loops",
@@ -15,10 +17,12 @@ LIBRARIES = {
     "networkx": "shock graphs and task graphs",
     "pillow": "pictures with text",
     "lark": "grammars of tasks and rules",
+    "filelock": "one writer at a time for run folders and model databases",
     "pydantic": "settings and recorded files",
     "rich": "the terminal",
     "typer": "the command line",
     "prompt_toolkit": "the prompt of visup step",
+    "urllib3": "alerts to a webhook",
 }
 """What visup depends on, and what for; the same as `dependencies` in pyproject.toml."""
 
@@ -62,7 +66,6 @@ class CheckedPart:
 
 def doctor() -> None:
     """Show what is installed, what is missing, and versions. Exit code 2 when the core is broken."""
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -74,7 +77,7 @@ def doctor() -> None:
     for p in parts:
         state = Text(p.state, styles[p.state])
         table.add_row(Text(p.what), state, Text(p.detail), Text(p.purpose))
-    Console().print(table)
+    make_console().print(table)
     if any(p.state == "broken" for p in parts):
         raise typer.Exit(2)
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.terminal.console import echo, echo_json, make_console
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -132,7 +134,7 @@ def learn(
 
     lesson = learn_from(run, models, parse_things(thing or ()), source, views)
     for sentence in lesson.told:
-        typer.echo(sentence)
+        echo(sentence)
     out = out or models.with_name(f"{models.stem}-taught.png")
     write_picture(out, taught_picture(lesson.views))
 
@@ -142,7 +144,6 @@ def list_models(db: Db) -> None:
     """List the models of a database with their views."""
     from collections import Counter
 
-    from rich.console import Console
     from rich.table import Table
 
     from visup.percepts.shape.database.model_database import ModelDatabase
@@ -156,7 +157,7 @@ def list_models(db: Db) -> None:
         directions = sum(len(v.seen_from) for v in own)
         counts = (len(own), directions, sum(v.cut for v in own), taught[name])
         table.add_row(name, *map(str, counts))
-    Console().print(table)
+    make_console().print(table)
     _tell_size(database)
 
 
@@ -229,18 +230,17 @@ def write_picture(out: Path, picture: NDArray[np.uint8], quiet: bool = False) ->
     except OSError as e:
         raise OutputError(f"the picture cannot be written ({e.strerror})", where=str(out)) from e
     if not quiet:
-        typer.echo(f"{out}: {picture.shape[1]} x {picture.shape[0]} pixels")
+        echo(f"{out}: {picture.shape[1]} x {picture.shape[0]} pixels")
 
 
 def _tell_size(database: ModelDatabase) -> None:
     parts = [f"{len(database.names())} models, {len(database.views)} views"]
     if database.taught:
         parts.append(f"{len(database.taught)} taught outlines")
-    typer.echo(f"{database.path}: {', '.join(parts)}")
+    echo(f"{database.path}: {', '.join(parts)}")
 
 
 def _print_json(ranking: Ranking) -> None:
-    import json
 
     rows = [
         {
@@ -252,13 +252,12 @@ def _print_json(ranking: Ranking) -> None:
         }
         for m in ranking.matches
     ]
-    typer.echo(json.dumps({"matches": rows, "compared": ranking.compared}))
+    echo_json({"matches": rows, "compared": ranking.compared})
 
 
 def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
     import math
 
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title=image.name, title_justify="left")
@@ -272,7 +271,7 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
         terms = (m.similarity, m.likeness.of_graphs, m.likeness.of_outlines, m.likeness.of_areas)
         figures = (f"{t:.3f}" for t in terms)
         table.add_row(str(rank), m.view.name, str(m.view.number), *figures, turn + mirrored)
-    Console().print(table)
+    make_console().print(table)
     if any(m.likeness.mirrored for m in ranking.matches):
-        typer.echo("m: mirrored, as seen from behind")
-    typer.echo(f"{ranking.compared} of {views} views compared in full")
+        echo("m: mirrored, as seen from behind")
+    echo(f"{ranking.compared} of {views} views compared in full")

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from visup.terminal.console import make_console
+
 SIZE_FORM = "WIDTHxHEIGHT, such as 320x240"
 
 
@@ -49,7 +51,6 @@ def render(
 def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: str | None) -> None:
     from dataclasses import replace
 
-    from rich.console import Console
     from rich.progress import Progress
 
     from visup.render.worlds.kinds.catalogue import random_world
@@ -62,11 +63,10 @@ def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: s
         task = bar.add_task("frames", total=world.frames)
         truth = write_world(world, out, lambda done, _: bar.update(task, completed=done))
     told = f"{world.frames} frames of {kind}, which goes {truth['outcome']!r}, in {out}"
-    Console().print(told, highlight=False)
+    make_console().print(told, highlight=False)
 
 
 def _render_scenario(scenario: str, out: Path, container: str, size: str | None) -> None:
-    from rich.console import Console
     from rich.progress import Progress
 
     from visup.render.output.writer import write_mission
@@ -83,7 +83,7 @@ def _render_scenario(scenario: str, out: Path, container: str, size: str | None)
             f".{container.lstrip('.')}",
             lambda done, _: bar.update(task, completed=done),
         )
-    Console().print(f"{found.frame_count} frames of {found.name} in {out}", highlight=False)
+    make_console().print(f"{found.frame_count} frames of {found.name} in {out}", highlight=False)
 
 
 def needs_renderer() -> None:

@@ -10,6 +10,7 @@ import typer
 
 from visup.commands.options import REPLAYED, Given, takes
 from visup.runs.settings import Option, WatchSettings
+from visup.terminal.console import make_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,15 +52,13 @@ def replay(
     Exit code: with --diff or --against 0 when nothing changes and 1 when something does; else as of
     `visup watch`. 2 on bad input.
     """
-    from rich.console import Console
-
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import replay as reason_again
     from visup.runs.replay import settings_for
     from visup.runs.runner import fresh_folder
     from visup.terminal.narrator import Narrator
 
-    console, comparison = Console(highlight=False), ReplayComparison(**compared)
+    console, comparison = make_console(), ReplayComparison(**compared)
     recording = Recording.open(run)
     other = comparison.other(recording)
     settings = settings_for(recording, **setting)
@@ -70,21 +69,25 @@ def replay(
         recording,
         settings,
         folder,
-        None if silent else lambda step: narrator.print_events(step.events),
+        None if silent else narrator,
     )
+    if not silent:
+        narrator.finish()
     console.print(_speed(told), style="dim")
     if other is None:
-        raise typer.Exit(_print_verdict(console, told))
+        raise typer.Exit(_print_verdict(console, told, has_task=bool(settings.tasks)))
     raise typer.Exit(_print_changes(console, other, told, comparison.quiet))
 
 
-def _print_verdict(console: Console, told: Transcript) -> int:
+def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int:
     """Print how the replay ended; the exit code."""
     from visup.agent import Verdict
+    from visup.runs.result import RunResult
     from visup.terminal.narrator import verdict_line
 
-    console.print(verdict_line(Verdict(told.verdict) if told.verdict else None))
-    return int(told.failed)
+    verdict = Verdict(told.verdict) if told.verdict else None
+    console.print(verdict_line(verdict, has_task=has_task))
+    return RunResult(verdict, told.steps, has_task=has_task).exit_code
 
 
 def _print_changes(console: Console, other: Recording, told: Transcript, quiet: bool) -> int:

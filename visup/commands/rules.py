@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.options import Given, takes
+from visup.commands.options import REPLAYED, Given, takes
 from visup.runs.settings import WatchSettings
+from visup.terminal.console import echo, echo_json
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from visup.agent import Mind
     from visup.rules.formula.nodes import Rule
 
@@ -39,9 +41,9 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
         except VisupError as error:
             faults.append(error)
         else:
-            typer.echo(f"{file}: ok")
+            echo(f"{file}: ok")
             for rule in found:
-                typer.echo(f"  {rule.name}: {_cost(rule)}")
+                echo(f"  {rule.name}: {_cost(rule)}")
     raise_errors(faults)
 
 
@@ -66,11 +68,11 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
                     "text": str(rule),
                 }
             )
-        typer.echo(json.dumps(rows, indent=2))
+        echo_json(rows, indent=2)
         return
     width = max((len(r.name) for r in found), default=0)
     for rule in found:
-        typer.echo(f"{rule.name:{width}}  {rule.severity.name.lower():8}  {_cost(rule)}")
+        echo(f"{rule.name:{width}}  {rule.severity.name.lower():8}  {_cost(rule)}")
 
 
 @app.command()
@@ -78,27 +80,43 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
 def explain(
     setting: Given,
     source: Annotated[
-        str, typer.Argument(help="Video file, folder of images, camera index or URL.")
+        str, typer.Argument(help="Video file, folder of images, camera, URL, or a run folder.")
     ],
     at: Annotated[float, typer.Option("--at", min=0.0, help="Seconds of the video.")],
     rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
 ) -> None:
     """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
     from visup.agent.model.errors import SettingsError
-    from visup.runs.wiring import build_agent, open_video
 
-    settings = WatchSettings(source, **setting)
-    agent, mind = build_agent(settings), None
-    with open_video(settings) as video:
-        for frame in video:
-            mind = agent.step(frame).mind
-            if mind.time >= at:
-                break
+    mind = None
+    for mind in _minds(source, setting):
+        if mind.time >= at:
+            break
     if mind is None or mind.time < at:
         raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
     told = explanations(mind, rule)
     for text in told or [f"at {mind.time:g} s too few objects are in view for any choice"]:
-        typer.echo(text)
+        echo(text)
+
+
+def _minds(source: str, setting: Given) -> Iterator[Mind]:
+    """The mind after each step: of a video that is watched, or of a recorded run."""
+    from visup.agent.storage.journal_reader import Recording, is_run
+    from visup.runs.replay import settings_for
+    from visup.runs.wiring import build_agent, open_video, reasoning_agent
+
+    if is_run(source):
+        recording = Recording.open(Path(source))
+        given = {k: v for k, v in setting.items() if k in REPLAYED}
+        agent, answers = reasoning_agent(settings_for(recording, **given)), recording.answers()
+        for seen in recording.observations():
+            yield agent.reason(seen, answers.get(seen.frame_index, {})).mind
+        return
+    settings = WatchSettings(source, **setting)
+    agent = build_agent(settings)
+    with open_video(settings) as video:
+        for frame in video:
+            yield agent.step(frame).mind
 
 
 def explanations(mind: Mind, only: str | None) -> list[str]:

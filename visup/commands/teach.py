@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from visup.agent.model.errors import SettingsError
+from visup.terminal.console import echo
 
 if TYPE_CHECKING:
     from visup.teaching.clip_frames import ClipFrames
@@ -63,10 +64,10 @@ def teach(
         )
     lesson = _lesson(clip, models, frame, outline or [], brief, browser)
     if lesson is None:
-        typer.echo("Nothing was stored.")
+        echo("Nothing was stored.")
         return
     for sentence in lesson.told:
-        typer.echo(sentence)
+        echo(sentence)
     _draw(lesson, out or models.with_name(f"{models.stem}-taught.png"))
 
 
@@ -106,14 +107,14 @@ def _in_the_browser(frames: ClipFrames, frame: int, models: Path, browser: bool)
 
     frames.at(frame)
     with TeachingPage(frames, models, frame) as page:
-        typer.echo(f"Draw the outlines at {page.url}")
-        typer.echo("Ctrl-C ends.")
+        echo(f"Draw the outlines at {page.url}")
+        echo("Ctrl-C ends.")
         if browser:
             typer.launch(page.url)
         try:
             page.wait()
         except KeyboardInterrupt:
-            typer.echo("")
+            echo()
         return page.lesson
 
 

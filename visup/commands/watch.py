@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +12,7 @@ import typer
 
 from visup.commands.options import Given, SettingsFile, takes
 from visup.runs.settings import Option, RunOptions, WatchSettings
+from visup.terminal.console import echo_json, make_console
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,6 +36,9 @@ class Presentation:
 
     out: Annotated[Path | None, Option("Run folder (default: runs/NAME).", metavar="DIR")] = None
     quiet: Annotated[bool, Option("Print only the verdict.", "--quiet")] = False
+    verbose: Annotated[
+        bool, Option("Print every event, also of objects that nobody knows.", "--verbose")
+    ] = False
     as_json: Annotated[bool, Option("Print events as JSON, one per line.", "--json")] = False
     answers: Annotated[
         Mapping[int, str],
@@ -71,11 +75,12 @@ def watch(
 ) -> None:
     """Watch a video and say whether the work goes well.
 
-    Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
+    Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input,
+    3 when the task was still in progress, 4 when the source broke off, 130 when you stopped it.
     """
     past = None
     if resume:
-        past = _interrupted(resume, source, settings_file, setting, shown.get("out"))
+        past = _interrupted(resume, setting, source, settings_file, shown.get("out"))
         settings = past.settings
     elif source is None:
         raise typer.BadParameter("name a video, or a run with --resume", param_hint="SOURCE")
@@ -99,17 +104,18 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
     return WatchSettings(source, **given)
 
 
-def _interrupted(run: Path, *given: Any) -> InterruptedRun:
-    """The run that goes on; what it is about was settled when it began."""
+def _interrupted(run: Path, setting: Given, *given: Any) -> InterruptedRun:
+    """The run that goes on; what it is about was settled when it began, but for code of the user's own."""
     from visup.agent.model.errors import SettingsError
     from visup.runs.resume import interrupted_run
 
-    if any(given):
+    if any(given) or setting.keys() - {"behaviours", "plugins"}:
         raise SettingsError(
             "a resumed run keeps its settings: --resume takes no source, task or other settings",
+            expected="nothing else but the behaviours that it had (--behaviour, --plugin)",
             hint=f"visup watch --resume {run}",
         )
-    return interrupted_run(run)
+    return interrupted_run(run, **setting)
 
 
 @takes(WatchSettings, only=("every",), every=2)
@@ -138,30 +144,45 @@ def run_and_report(
     past: InterruptedRun | None = None,
 ) -> RunResult:
     """Run, print the narrative as it goes and the verdict last."""
-    from rich.console import Console
     from rich.markup import escape
 
     from visup.runs.operator import HumanOperator, typed_lines
     from visup.runs.runner import Audience, fresh_folder, supervise
+    from visup.story import Detail, Narrative
     from visup.terminal.narrator import Narrator
 
-    console = Console(highlight=False)
+    console = make_console()
+    narrative = Narrative(Detail.ALL if shown.verbose else Detail.USUAL)
+    narrator = Narrator(console, shown.as_json, narrative)
     folder = past.recording.path.parent if past else fresh_folder(shown.out, settings.source)
     silent = shown.quiet or shown.as_json
     # Whoever reads events from a pipe does not type answers.
     typed = None if silent or not console.is_terminal else typed_lines()
     with progress_bar(console, "watching", shown=not silent) as progress:
         audience = Audience(
-            observers=() if shown.quiet else (Narrator(console, shown.as_json),),
+            observers=() if shown.quiet else (narrator,),
             progress=progress,
             operator=HumanOperator(shown.all_answers(), typed, console.print),
             notice=None
             if shown.as_json
-            else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]"),
+            else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]", soft_wrap=True),
         )
-        result = supervise(settings, folder, audience=audience, options=options, past=past)
+        with no_empty_folder(folder):
+            result = supervise(settings, folder, audience=audience, options=options, past=past)
+    narrator.finish()
     _print_result(console, result, as_json=shown.as_json)
     return result
+
+
+@contextmanager
+def no_empty_folder(folder: Path) -> Iterator[None]:
+    """What is refused before its first frame leaves no folder behind."""
+    try:
+        yield
+    except Exception:
+        with suppress(OSError):
+            folder.rmdir()  # only what is empty can be removed so
+        raise
 
 
 @contextmanager
@@ -182,21 +203,26 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
         word,
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[rate]}"),
         progress.TimeRemainingColumn(),
         console=console,
         transient=True,
         disable=not (shown and console.is_terminal),
     )
     with bar:
-        task = bar.add_task(word, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task = bar.add_task(word, total=None, rate="")
+
+        def tell(done: int, total: int | None) -> None:
+            took = bar.tasks[0].elapsed or 0.0
+            rate = f"{done / took:.1f} frames/s" if took > 1.0 else ""
+            bar.update(task, completed=done, total=total, rate=rate)
+
+        yield tell
 
 
 def _print_result(console: Console, result: RunResult, *, as_json: bool) -> None:
     if as_json:
-        import json
-
-        print(json.dumps(_as_json(result), sort_keys=True))
+        echo_json(_as_json(result), sort_keys=True)
         return
     for text in _closing_lines(result):
         console.print(text, soft_wrap=True)
@@ -216,7 +242,7 @@ def _as_json(result: RunResult) -> dict[str, object]:
 def _closing_lines(result: RunResult) -> Iterator[str]:
     from rich.markup import escape
 
-    from visup.terminal.narrator import verdict_line
+    from visup.terminal.narrator import part_seen, verdict_line
 
     if result.problem:
         yield f"[yellow]The source: {escape(result.problem)}[/yellow]"
@@ -226,4 +252,4 @@ def _closing_lines(result: RunResult) -> Iterator[str]:
         yield f"Report:  {escape(str(result.report))}"
     elif result.folder:
         yield f"Run:     {escape(str(result.folder))}"
-    yield verdict_line(result.verdict)
+    yield verdict_line(result.verdict, has_task=result.has_task, part=part_seen(result))

@@ -8,6 +8,8 @@ import sys
 import time
 from pathlib import Path
 
+from visup.terminal.console import echo
+
 EVALUATIONS = (
     ("shapes", "shapes/kimia99"),
     ("shapes", "shapes/mpeg7-half"),
@@ -57,7 +59,7 @@ def main() -> int:
         if (given.only or "") in kind
     ]
     if not given.data.is_dir():
-        print(f"no data at {given.data}: nothing else to measure (see --data)")
+        echo(f"no data at {given.data}: nothing else to measure (see --data)")
     results += [
         _run(kind, given.data / folder, given.out)
         for kind, folder in EVALUATIONS
@@ -70,12 +72,12 @@ def _run(kind: str, folder: Path | None, out: Path) -> int:
     place = [] if folder is None else [str(folder)]
     name = kind if folder is None else f"{kind}-{folder.name}"
     target = out / f"{name}.json"
-    print(f"== visup eval {name.replace('-', ' ', 1)}", flush=True)
+    echo(f"== visup eval {name.replace('-', ' ', 1)}")
     begin = time.perf_counter()
     # A process each, so that the timing of one is not coloured by what another left behind.
     command = [sys.executable, "-m", "visup.cli", "eval", kind, *place, "--json", str(target)]
     code = subprocess.run(command, check=False).returncode
-    print(f"   {time.perf_counter() - begin:.0f} s, exit code {code}", flush=True)
+    echo(f"   {time.perf_counter() - begin:.0f} s, exit code {code}")
     return code
 
 

@@ -18,6 +18,7 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.cycle.answers import resolve_model
 from visup.agent.model.errors import SettingsError, VisupError
 from visup.agent.model.step import Observer, Step
+from visup.agent.storage.text_file import read_text_file
 
 
 def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, str]:
@@ -56,7 +57,7 @@ def read_answers(path: Path) -> dict[int, str]:
         SettingsError: It cannot be read, or a line is not of the form ID=NAME.
     """
     try:
-        return parse_answers(path.read_text(encoding="utf-8").splitlines(), str(path))
+        return parse_answers(read_text_file(path).splitlines(), str(path))
     except (OSError, UnicodeDecodeError) as fault:
         raise SettingsError(f"the answers cannot be read: {fault}", where=str(path)) from fault
 
@@ -129,13 +130,16 @@ class HumanOperator:
                     name = event.data["names"][0]
                     self.tell(f"Type an answer such as {event.objects[0]}={name} at any time.")
             for line in self.typed():
-                self._take(agent, line)
+                self._take(agent, line, step.time)
 
         return after
 
-    def _take(self, agent: Agent, line: str) -> None:
-        """A typed line: ID=NAME, or a name alone while one question waits."""
-        waiting = agent.mind.questions
+    def _take(self, agent: Agent, line: str, now: float) -> None:
+        """A typed line: ID=NAME, or a name alone while one question waits.
+
+        A name that was typed before the question could be read is no answer to it.
+        """
+        waiting = [q for q in agent.mind.questions if q.asked < now]
         if "=" not in line and line.strip() and len(waiting) == 1:
             line = f"{waiting[0].object_id}={line}"
         try:

@@ -8,7 +8,7 @@ one they look again at all frames. A camera's frames are gone: there behaviours 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -16,8 +16,9 @@ from typing import Any
 
 from visup.agent import Frame, Observation, Severity
 from visup.agent.cycle.agent import Agent
-from visup.agent.model.errors import OutputError, SourceError
+from visup.agent.model.errors import OutputError, SettingsError, SourceError
 from visup.agent.model.step import Step
+from visup.agent.plugins.factory import MODULE_PATH
 from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.journal_reader import Recording
 from visup.percepts.video import VideoSource
@@ -48,15 +49,36 @@ class InterruptedRun:
     grave: bool
     answers: Mapping[int, str]
 
+    def check_unchanged(self) -> None:
+        """See that nobody has gone on with the run since it was read.
 
-def interrupted_run(run: Path) -> InterruptedRun:
+        Raises:
+            OutputError: Somebody has.
+        """
+        if self.recording.count() != self.steps:
+            raise OutputError(
+                "somebody else has gone on with this run meanwhile",
+                where=str(self.recording.path.parent),
+                hint="resume it again, if it is not over",
+            )
+
+
+def interrupted_run(
+    run: Path, behaviours: Collection[Path | str] = (), plugins: Collection[str] = ()
+) -> InterruptedRun:
     """The past of a run.
+
+    What a run folder says is data. The behaviours of the user's own that it names are code, which may be
+    anybody's: they run only when they are named here again.
 
     Args:
         run: A run folder.
+        behaviours: Files or modules of behaviours of one's own that the run had, and that may run.
+        plugins: Names of installed behaviours that the run had, and that may run.
 
     Raises:
         OutputError: There is no run, or it is over, or nothing of it was recorded.
+        SettingsError: It had other behaviours than those that are named.
     """
     recording = Recording.open(run)
     facts = recording.facts()
@@ -80,9 +102,38 @@ def interrupted_run(run: Path) -> InterruptedRun:
         )
     told = recording.events()
     grave = any(e.get("severity") != Severity.INFO.name.lower() for e in told)
-    settings = recorded_settings(facts, str(run))
+    settings = _with_named_code(recorded_settings(facts, str(run)), run, behaviours, plugins)
     answers = _answers(facts, str(run))
     return InterruptedRun(recording, settings, state, why_none, recording.count(), grave, answers)
+
+
+def _with_named_code(
+    recorded: WatchSettings, run: Path, behaviours: Collection[Path | str], plugins: Collection[str]
+) -> WatchSettings:
+    """The settings of a run with the code that the user named, which must be that of the run."""
+    had = sorted(map(_code_name, recorded.behaviours)), sorted(recorded.plugins)
+    if had != (sorted(map(_code_name, behaviours)), sorted(plugins)):
+        wanted = (
+            *(f"--behaviour {where}" for where in recorded.behaviours),
+            *(f"--plugin {name}" for name in recorded.plugins),
+        )
+        raise SettingsError(
+            "this run had behaviours of its own, which are code: a run folder cannot have code run"
+            if wanted
+            else "this run had no behaviours of its own",
+            where=str(run),
+            expected=" ".join(wanted) or "neither --behaviour nor --plugin",
+            hint="if you trust them, name them again: "
+            + " ".join(("visup watch --resume", str(run), *wanted))
+            if wanted
+            else None,
+        )
+    return replace(recorded, behaviours=tuple(behaviours), plugins=tuple(plugins))
+
+
+def _code_name(where: Path | str) -> str:
+    """By what code is told to be that of the run: a module's path, or a file's name, wherever it is now."""
+    return str(where) if MODULE_PATH.fullmatch(str(where)) else Path(where).name
 
 
 def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, cast
 from visup.agent import Frame, Severity, Verdict
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
+from visup.agent.storage.atomic import sync
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
+from visup.runs.inputs.preflight import check_cast
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
 from visup.runs.result import RunResult
@@ -36,14 +38,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
     Raises:
         OutputError: It cannot be made, or holds a run already (what was recorded is never lost).
     """
-    if out is None:
-        stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
-        stem = stem or Path(source).resolve().parent.name or "run"
-        out = next(
-            p
-            for n in range(1, 10**6)
-            if not (p := Path("runs") / (stem if n == 1 else f"{stem}-{n}")).exists()
-        )
+    out = out or _numbered_folder(source)
     if (out / "journal.sqlite").exists():
         raise OutputError(
             "the folder holds a run already",
@@ -55,6 +50,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
         probe = out / ".writable"
         probe.touch()
         probe.unlink()
+        sync(out.parent)  # that there is a folder is to be known after the power was lost, too
     except OSError as fault:
         raise OutputError(
             f"the output folder cannot be written: {fault.strerror}",
@@ -62,6 +58,22 @@ def fresh_folder(out: Path | None, source: str) -> Path:
             hint="choose a folder that you may write to with --out",
         ) from fault
     return out
+
+
+def _numbered_folder(source: str) -> Path:
+    """`runs/<source>`, made new; numbered where that exists, so that no two runs are given the same."""
+    stem = Path(source).stem if Path(source).stem not in ("frames", "img1", "video") else ""
+    stem = stem or Path(source).resolve().parent.name or "run"
+    for n in range(1, 10**6):
+        folder = Path("runs") / (stem if n == 1 else f"{stem}-{n}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError:
+            break  # it is told when it is tried once more
+        return folder
+    return folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +151,8 @@ def _supervised(
 ) -> Generator[Step | None, None, RunResult]:
     """First None, once everything is open; then the steps."""
     with ExitStack() as stack:
-        run = _Run(settings, folder, options, past, stack)
+        answered = audience.operator is not None and bool(audience.operator.answers)
+        run = _Run(settings, folder, options, past, stack, answered=answered)
         frames = run.catch_up(past) if past else run.source
         run.connect(audience, past)
         timed = run.timed(frames, past)
@@ -158,11 +171,14 @@ class _Run:
         options: RunOptions,
         past: InterruptedRun | None,
         stack: ExitStack,
+        *,
+        answered: bool,
     ) -> None:
         self._faults = RuntimeFaults()
         self.source = stack.enter_context(open_video(settings))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
+        self._warnings = () if past else check_cast(settings, self._agent, answered=answered)
         # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
         actors = self._agent.mind.actors
         self._notes = _told_of_actors(settings.actors, actors)
@@ -175,6 +191,8 @@ class _Run:
         )
         if self._recorder:
             stack.callback(self._recorder.close)
+        if past:
+            past.check_unchanged()  # now that nobody else may write it
         self._sinks = Sinks(options.sinks, settings.source)
         stack.callback(self._sinks.close)
         self._checkpoints = CheckpointWriter(folder, options.state_every_s) if folder else None
@@ -200,12 +218,21 @@ class _Run:
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         others = (*audience.observers, self._sinks, *answering)
         self._agent.observers = (self._severity, *recording, *others)
+        for warning in self._warnings:
+            self._warn(warning, audience.notice)
         if self._recorder:
             self._faults.add_source(self._recorder.runtime_faults)
         self._faults.add_source(self._sinks.runtime_faults)
         if isinstance(self.source, LiveSource):
             self.source.notify = notify(self._sinks, audience.notice)
             self._faults.add_source(self.source.runtime_faults)
+
+    def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
+        """Say something before the first frame; who is told nothing then finds it among the notes."""
+        if notice:
+            notice(text)
+        else:
+            self._notes = (*self._notes, text)
 
     def timed(self, frames: Iterator[Frame], past: InterruptedRun | None) -> MonotonicFrames:
         """Frames in real time where that is wanted, and in any case with times that grow."""
@@ -222,7 +249,7 @@ class _Run:
     def watch(self, frames: Iterable[Frame], progress: Progress | None) -> Iterator[Step]:
         """Step through frames until they end or the user stops."""
         count = self.source.frame_count
-        total = None if count is None else -(-count // self._settings.every)
+        total = None if count is None else -(-count // self.source.every)
         try:
             for step in self._agent.steps(frames):
                 self._steps += 1
@@ -249,12 +276,26 @@ class _Run:
             *self._sinks.end(verdict, self._steps),
         )
         notes = (*self._notes, *filter(None, told))
-        result = RunResult(verdict, self._steps, problem, notes=notes)
+        result = RunResult(
+            verdict,
+            self._steps,
+            problem,
+            notes=notes,
+            has_task=bool(mind.tasks),
+            stopped=self._stopped,
+            seconds=mind.time,
+        )
         if self._recorder is None:
             return result
         ended = self.source.ended.value if self.source.ended and not self._stopped else "stopped"
         report, more = self._recorder.finish(result, ended, mind.tasks)
-        return replace(result, folder=self._folder, report=report, notes=(*notes, *more))
+        return replace(
+            result,
+            folder=self._folder,
+            report=report,
+            notes=(*notes, *more),
+            recorded=self._recorder.complete,
+        )
 
     def _attending(self, operator: HumanOperator, past: InterruptedRun | None) -> Observer:
         """The operator, who does not say again what was taken up before the run was killed."""

@@ -1,6 +1,6 @@
 """Sinks: alerts and figures for other programs, outside of the cycle.
 
-Read `outbox.py` (how nothing waits for a sink), then `file_and_webhook.py` (what needs only Python), and
+Read `outbox.py` (how nothing waits for a sink), then `lines.py` (files), `webhook.py`, and
 `registry.py` (what `--sink` means).
 """
 

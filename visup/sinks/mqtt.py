@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from visup.agent.model.errors import ExtraMissingError, SettingsError
-from visup.sinks.file_and_webhook import TIMEOUT_S, json_text
+from visup.sinks.lines import TIMEOUT_S, json_text
 
 PORT = 1883
 ONCE_AT_LEAST = 1

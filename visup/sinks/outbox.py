@@ -52,6 +52,8 @@ class Outbox:
         self.fault = ""
         self._queue: Queue[Any] = Queue(most)
         self._closing = threading.Event()
+        self._given_up = threading.Event()
+        self._taken = 0
         self._thread = threading.Thread(target=self._run, name=f"sink {sink.name}", daemon=True)
         self._thread.start()
 
@@ -61,12 +63,18 @@ class Outbox:
             self._queue.put_nowait(record)
         except Full:
             self.dropped += 1
+        else:
+            self._taken += 1
 
     def close(self, wait_s: float = CLOSING_S) -> None:
-        """Give the sink a last time to empty the queue; what then still waits is dropped."""
+        """Give the sink a last time to empty the queue; what it has not taken then is dropped."""
         self._closing.set()
         self._thread.join(wait_s)
-        self.dropped += self._queue.qsize()
+        if self._thread.is_alive() and not self._given_up.is_set():
+            # First it must take no more; what it has in its hands nobody knows to be delivered.
+            self._given_up.set()
+            self.dropped += self._taken - self.delivered - self.failed
+            self.fault = self.fault or "it did not answer in time"
 
     @property
     def note(self) -> str | None:
@@ -90,13 +98,14 @@ class Outbox:
             )
 
     def _run(self) -> None:
-        while True:
+        while not self._given_up.is_set():
             try:
                 record = self._queue.get(timeout=0.1)
             except Empty:
                 if self._closing.is_set():
                     break
                 continue
+            self._in_hand = 1
             self._deliver(record)
         try:
             self.sink.close()

@@ -8,7 +8,7 @@ from pathlib import Path
 from visup.agent import AlertCondition, Frame, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Observer, Step
-from visup.sinks.file_and_webhook import Webhook, to_file, to_stdout
+from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
 from visup.sinks.outbox import MOST_WAITING, Outbox, Sink
 
@@ -88,6 +88,12 @@ def _jsonl(wanted: str, place: str) -> Sink:
     return to_stdout()
 
 
+def _webhook(wanted: str, place: str) -> Sink:
+    from visup.sinks.webhook import Webhook
+
+    return Webhook(place)
+
+
 def _mqtt(wanted: str, place: str) -> Sink:
     from visup.sinks.mqtt import Mqtt
 
@@ -109,7 +115,7 @@ def _rerun(wanted: str, place: str) -> Sink:
 _MAKERS: dict[str, Callable[[str, str], Sink]] = {
     "jsonl": _jsonl,
     "file": lambda wanted, place: to_file(wanted, Path(place)),
-    "webhook": lambda wanted, place: Webhook(place),
+    "webhook": _webhook,
     "mqtt": _mqtt,
     "otel": _otel,
     "rerun": _rerun,

@@ -4,24 +4,27 @@
      "teach_own":   {"part": ...},
      "teach_extra": {"hand": ...}}
 
-`teach` outlines what plays a part in the task, where its family of clips was first filmed; `teach_own` does
-so in this clip itself, and takes its place where it is given; `teach_extra` outlines things that play none.
-A clip is a folder beside the brief's own that holds the video.
+`teach` outlines what plays a part in the task, where its family of clips was first filmed; `teach_own`
+outlines some or all of it in this clip itself, and takes its place name by name; `teach_extra` outlines
+things that play no part. A clip is a folder beside the brief's own that holds the video.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError
+from visup.agent.storage.text_file import read_text_file
 from visup.teaching.outlines import DrawnOutline
 
 VIDEOS = ("clip.mp4", "video.mp4")
 """Names of a clip's video in its folder."""
+
+LARGEST_BRIEF_BYTES = 16 * 2**20
 
 EXPECTED = '{"teach": {NAME: {"clip": FOLDER, "frame": N, "polygon": [[x, y], ...]}}}'
 
@@ -34,11 +37,18 @@ class Showing:
         outline: The outline.
         video: The clip's file.
         frame: Number of the frame, from 0.
+        plays_part: Whether it plays a part in the task; `teach_extra` does not.
     """
 
     outline: DrawnOutline
     video: Path
     frame: int
+    plays_part: bool = True
+
+    @property
+    def name(self) -> str:
+        """Of the thing."""
+        return self.outline.name
 
 
 def read_showings(brief: Path) -> tuple[Showing, ...]:
@@ -52,21 +62,29 @@ def read_showings(brief: Path) -> tuple[Showing, ...]:
     """
     path = brief / "brief.json" if brief.is_dir() else brief
     told = _read(path)
-    shown: list[Showing] = []
-    own, extra = told.get("teach_own", {}), told.get("teach_extra", {})
-    for key, part in (("teach", told.get("teach", {})), ("teach_own", own), ("teach_extra", extra)):
-        if not isinstance(part, Mapping):
-            raise _unusable(path, f'"{key}" is no mapping of names')
-        kept = {k: v for k, v in part.items() if key != "teach" or k not in own}
-        shown += _showings(path, key, kept)
+    family, own = _showings(path, told, "teach"), _showings(path, told, "teach_own")
+    extra = _showings(path, told, "teach_extra")
+    shown = (*(family | own).values(), *(replace(s, plays_part=False) for s in extra.values()))
     if not shown:
         raise _unusable(path, "it teaches nothing")
-    return tuple(shown)
+    return shown
+
+
+def clip_video(folder: Path) -> Path:
+    """The video of a clip that has a folder of its own.
+
+    Raises:
+        SettingsError: There is none.
+    """
+    for name in VIDEOS:
+        if (folder / name).is_file():
+            return folder / name
+    raise SettingsError("there is no video", where=str(folder), expected=" or ".join(VIDEOS))
 
 
 def _read(path: Path) -> Mapping[str, Any]:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = json.loads(read_text_file(path, LARGEST_BRIEF_BYTES))
     except OSError as e:
         raise SettingsError(
             f"the brief cannot be read ({e.strerror or e})", where=str(path), expected=EXPECTED
@@ -78,28 +96,35 @@ def _read(path: Path) -> Mapping[str, Any]:
     return told
 
 
-def _showings(path: Path, key: str, part: Mapping[str, Any]) -> Iterator[Showing]:
-    for name, shown in part.items():
-        try:
-            corners = tuple((float(x), float(y)) for x, y in shown["polygon"])
-            frame = int(shown.get("frame", 0))
-            clip = str(shown.get("clip", path.parent.name))
-        except (KeyError, TypeError, ValueError, AttributeError) as e:
-            fault = f"no {e}" if isinstance(e, KeyError) else str(e)
-            raise _unusable(path, f"\"{key}\" of '{name}': {fault}") from e
-        yield Showing(DrawnOutline(str(name), corners), _video(path, clip), frame)
+def _showings(path: Path, told: Mapping[str, Any], key: str) -> dict[str, Showing]:
+    """One part of a brief, by name."""
+    part = told.get(key, {})
+    if not isinstance(part, Mapping):
+        raise _unusable(path, f'"{key}" is no mapping of names')
+    return {str(name): _showing(path, f"\"{key}\" of '{name}'", name, part[name]) for name in part}
 
 
-def _video(path: Path, clip: str) -> Path:
+def _showing(path: Path, where: str, name: str, shown: Any) -> Showing:
+    try:
+        corners = tuple((float(x), float(y)) for x, y in shown["polygon"])
+        frame = int(shown.get("frame", 0))
+        clip = str(shown.get("clip", path.parent.name))
+    except (KeyError, TypeError, ValueError, AttributeError) as e:
+        fault = f"no {e}" if isinstance(e, KeyError) else str(e)
+        raise _unusable(path, f"{where}: {fault}") from e
+    return Showing(DrawnOutline(str(name), corners), _named_video(path, clip), frame)
+
+
+def _named_video(path: Path, clip: str) -> Path:
+    """The video of a clip that a brief names: a folder beside its own."""
     folder = path.resolve().parent.parent / clip
-    for name in VIDEOS:
-        if (folder / name).is_file():
-            return folder / name
-    raise SettingsError(
-        f"the clip '{clip}' is not there",
-        where=str(path),
-        expected=" or ".join(str(folder / name) for name in VIDEOS),
-    )
+    try:
+        return clip_video(folder)
+    except SettingsError as e:
+        expected = " or ".join(str(folder / name) for name in VIDEOS)
+        raise SettingsError(
+            f"the clip '{clip}' is not there", where=str(path), expected=expected
+        ) from e
 
 
 def _unusable(path: Path, what: str) -> SettingsError:

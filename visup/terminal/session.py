@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from visup.agent import Frame
 from visup.agent.cycle.agent import Agent
-from visup.agent.model.errors import VisupError
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.model.step import Step
+from visup.report.annotate import annotate
+from visup.report.pictures import png, text_picture
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
 from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
+from visup.terminal.console import make_console
 from visup.terminal.narrator import event_row
 from visup.terminal.session_commands import COMMANDS
-from visup.terminal.session_views import VIEWS, number_in, refusal, usage
+from visup.terminal.session_views import VIEWS, Refusal, number_in, refusal, usage
 from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
 from visup.wording import prose, worded_once
 
@@ -31,6 +38,7 @@ class Session:
         agent: The agent.
         frames: Where its frames come from, or a feed of what was perceived.
         console: Where to write; standard output by default.
+        picture: Gives the frame of a number, (H, W, 3) uint8 BGR, where frames can be had again.
 
     Attributes:
         timelines: The run, and the branches that were begun from one another; the last one is stepped.
@@ -41,9 +49,11 @@ class Session:
         agent: Agent,
         frames: Iterable[Frame] | ObservationSource,
         console: Console | None = None,
+        picture: Callable[[int], NDArray[np.uint8]] | None = None,
     ) -> None:
+        self._picture = picture
         self.timelines = [Stepper(agent, frames)]
-        self.console = console or Console(highlight=False)
+        self.console = console or make_console()
         self._marks: dict[str, Bookmark] = {}
 
     @property
@@ -69,10 +79,10 @@ class Session:
         """Obey commands until 'quit' or their end.
 
         Returns:
-            Exit code, 0.
+            Exit code: 0, or 2 when a command could not be obeyed.
         """
         self.console.print("[dim]'step' goes on by one frame, 'help' shows the commands.[/dim]")
-        last = "step"
+        last, refused = "step", False
         for entered in commands:
             command = entered.split(" #")[0].strip() or last
             if command.startswith("#"):
@@ -81,19 +91,23 @@ class Session:
                 break
             last = command
             answer = self.execute(command)
+            refused |= isinstance(answer, Refusal)
             if answer is not None:
                 self.console.print(answer)
-        return 0
+        return 2 if refused else 0
 
     def execute(self, command: str) -> Answer:
         """Carry out one command; a unique beginning of its name will do."""
-        word, *rest = command.split()
+        word, *rest = (
+            command.replace("?", "help ", 1).split() if command[0] == "?" else command.split()
+        )
         if word.endswith("!"):
             word, rest = word[:-1], ["!", *rest]
-        names = [n for n in _NAMES if n.startswith(word)]
+        names = [_SHORT[word]] if word in _SHORT else [n for n in _NAMES if n.startswith(word)]
         name = word if word in _NAMES else names[0] if len(names) == 1 else None
         if name is None:
-            meant = f" ({', '.join(names)}?)" if names else ""
+            near = did_you_mean(word, _NAMES)
+            meant = f" ({', '.join(names)}?)" if names else f" ({near})" if near else ""
             return refusal(f"'{word}' is not a command{meant}; 'help' lists them")
         try:
             if name in VIEWS:
@@ -114,7 +128,9 @@ class Session:
         return self._advance(None, what or _never)
 
     def _advance(self, count: int | None, what: str | Callable[[Step], bool]) -> Answer:
-        stop: StopCondition | None = parse_condition(what, self.stepper.mind) if what else None
+        stop: StopCondition | None = (
+            parse_condition(what, self.stepper.mind, self.stepper.names) if what else None
+        )
         if stop is not None and self._is_past(stop):
             return refusal(f"{stop.text} is past: 'go' and 'back' lead there")
         stopped = self.stepper.step(count, stop, self._tell)
@@ -183,6 +199,26 @@ class Session:
             return Text("\n".join(rows) or "no place is marked")
         self._marks[words[0]] = self.stepper.snapshot()
         return Text(f"step {self.stepper.at} is '{words[0]}'", style="dim")
+
+    def _show(self, words: Sequence[str]) -> Answer:
+        mind = self.stepper.mind
+        if mind.frame_index < 0:
+            return refusal("no step was taken yet")
+        if self._picture is None:
+            return refusal(
+                "the frames of this source cannot be had again, so that none can be shown"
+            )
+        image = annotate(self._picture(mind.frame_index), mind)
+        if self.console.is_terminal and not words:
+            return text_picture(image, self.console.width)
+        path = Path(words[0] if words else f"frame-{mind.frame_index:05d}.png")
+        try:
+            path.write_bytes(png(image))
+        except OSError as fault:
+            raise OutputError(
+                f"the picture cannot be written ({fault.strerror})", where=str(path)
+            ) from fault
+        return Text(f"{path}: {image.shape[1]} x {image.shape[0]} pixels")
 
     # Where to stop
 
@@ -275,6 +311,7 @@ _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProx
         "back": Session._back,
         "go": Session._go,
         "mark": Session._mark,
+        "show": Session._show,
         "break": Session._break,
         "delete": partial(Session._breakpoint, what="delete"),
         "disable": partial(Session._breakpoint, what="disable"),
@@ -291,6 +328,9 @@ _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProx
     }
 )
 """Commands that move the session or change something, by their names."""
+
+_SHORT = {"s": "step"}
+"""Beginnings that stay what they have long been, though another command begins alike."""
 
 _NAMES = tuple(name for name in COMMANDS if name in _ACTIONS or name in VIEWS)
 

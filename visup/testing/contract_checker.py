@@ -9,19 +9,20 @@ Give it to your own tests:
 from __future__ import annotations
 
 import copy
-import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from typing import cast
 
+from pydantic_core import to_json
+
 from visup.agent import Behaviour, Contract, Frame, Percept, ReportState
 from visup.agent.contract.limits import Limits
 from visup.agent.execution.pipeline import ordered_slots, perceive
-from visup.agent.execution.process_runner import pack_behaviour
-from visup.agent.execution.worker import pickled
+from visup.agent.execution.process_runner import origin_of
 from visup.agent.model.errors import BehaviourError, VisupError
 from visup.agent.plugins.factory import as_behaviour
+from visup.agent.storage.codec import UnsupportedTypeError, encode_percept
 from visup.rules.activation.activation import activation_rules
 from visup.testing.clips import CLIPS, LabelledFrame
 from visup.testing.scripted import Script, stub_behaviours
@@ -149,7 +150,7 @@ def _wakes(contract: Contract) -> CheckResult:
 def _sendable(make: Make) -> CheckResult:
     behaviour = make()
     try:
-        pack_behaviour(behaviour, behaviour.contract)
+        origin_of(behaviour, behaviour.contract)
     except BehaviourError as fault:
         return CheckResult("can be sent to a process of its own", False, str(fault))
     return CheckResult("can be sent to a process of its own", True)
@@ -185,8 +186,9 @@ def _packed(percepts: Sequence[Percept]) -> list[bytes]:
 
 def _bytes(percept: Percept) -> bytes:
     try:
-        return pickled(percept)
-    except (pickle.PicklingError, TypeError, AttributeError):
+        packed: bytes = to_json(encode_percept(percept), inf_nan_mode="constants")
+        return packed
+    except (UnsupportedTypeError, ValueError):
         return repr(percept).encode()
 
 

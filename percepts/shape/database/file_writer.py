@@ -5,10 +5,8 @@ Views are appended in blocks to a copy beside the file, which takes its place wh
 
 from __future__ import annotations
 
-import os
 import shutil
 import sqlite3
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from itertools import islice
@@ -17,6 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from visup.agent.model.errors import DatabaseError
+from visup.agent.storage.atomic import replacing
+from visup.agent.storage.file_lock import only_writer
 from visup.percepts.shape.database.file_format import (
     APPLICATION_ID,
     BLOCK,
@@ -44,6 +44,9 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.height_functions import outline_heights
 from visup.percepts.taught.view import TaughtView
 
+WHAT = "this model database"
+"""What the lock of a database's file is for."""
+
 
 def write_new(
     path: Path,
@@ -56,7 +59,11 @@ def write_new(
     Raises:
         DatabaseError: The file cannot be written; nothing is left behind.
     """
-    with _replacing(path) as temporary, closing(sqlite3.connect(temporary)) as file:
+    with (
+        only_writer(path, WHAT),
+        _replacing(path) as temporary,
+        closing(sqlite3.connect(temporary)) as file,
+    ):
         file.execute("PRAGMA page_size = 8192")
         file.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         file.execute(f"PRAGMA user_version = {VERSION}")
@@ -78,8 +85,8 @@ def write_more(
     Raises:
         DatabaseError: The file is no database that can be read, or cannot be written.
     """
-    before = read_contents(path)
-    with _replacing(path) as temporary:
+    with only_writer(path, WHAT), _replacing(path) as temporary:
+        before = read_contents(path)  # as it is once nobody else writes
         shutil.copyfile(path, temporary)
         with closing(sqlite3.connect(temporary)) as file:
             _renew(file)
@@ -97,24 +104,17 @@ def _renew(file: sqlite3.Connection) -> None:
 @contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
     """A temporary file beside the path that takes its place when all went well."""
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    except OSError as e:
+    if not path.parent.is_dir():
         raise DatabaseError(
-            f"the database cannot be written ({e.strerror})",
+            "the database cannot be written (there is no such folder)",
             where=str(path),
             expected="a folder that exists and can be written to",
-        ) from e
-    os.close(handle)
-    temporary = Path(name)
+        )
     try:
-        yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(path)
+        with replacing(path) as draft:
+            yield draft
     except (OSError, sqlite3.Error) as e:
         raise DatabaseError(f"the database cannot be written ({e})", where=str(path)) from e
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _insert(file: sqlite3.Connection, before: FileContents, views: Iterable[NewView]) -> None:

@@ -14,10 +14,11 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent.storage.file_lock import only_writer
 from visup.percepts.shape.database.catalogue import Shapes, Views
 from visup.percepts.shape.database.file_format import MeshRow, TaughtRow
 from visup.percepts.shape.database.file_reader import read_contents
-from visup.percepts.shape.database.file_writer import write_more, write_new
+from visup.percepts.shape.database.file_writer import WHAT, write_more, write_new
 from visup.percepts.shape.database.mesh_records import decoded_mesh
 from visup.percepts.shape.database.search import Ranking, SearchLimits, ViewMatch, ViewSearch
 from visup.percepts.shape.database.taught_records import decoded, encoded
@@ -96,7 +97,8 @@ class ModelDatabase:
         Raises:
             DatabaseError: What is there is no sound database, or none can be written there.
         """
-        return cls.open(path) if Path(path).exists() else cls.create(path)
+        with only_writer(Path(path), WHAT):
+            return cls.open(path) if Path(path).exists() else cls.create(path)
 
     @classmethod
     def create(
@@ -212,14 +214,16 @@ class ModelDatabase:
         Raises:
             DatabaseError: The file cannot be written, or a view is too large; it stays as it was.
         """
-        known = {row.checksum(0) for row in self._taught}
         new = {encoded(v).checksum(0): v for v in views}
-        fresh = [view for key, view in new.items() if key not in known]
-        if not fresh:
-            return self
-        seen = [taught_silhouette(v) for v in fresh] if silhouettes else []
-        write_more(self.path, [s for s in seen if s is not None], fresh)
-        return ModelDatabase.open(self.path)
+        with only_writer(self.path, WHAT):
+            # Somebody else may have taught the same since this database was opened.
+            known = {row.checksum(0) for row in read_contents(self.path).taught}
+            fresh = [view for key, view in new.items() if key not in known]
+            if not fresh:
+                return ModelDatabase.open(self.path)
+            seen = [taught_silhouette(v) for v in fresh] if silhouettes else []
+            write_more(self.path, [s for s in seen if s is not None], fresh)
+            return ModelDatabase.open(self.path)
 
     def query(
         self,

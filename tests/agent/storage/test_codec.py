@@ -34,11 +34,10 @@ from visup.agent.model.errors import OutputError
 from visup.agent.storage.codec import (
     decode,
     encode,
-    mask_to_runs,
     pack_observation,
-    runs_to_mask,
     unpack_observation,
 )
+from visup.agent.storage.mask_codec import mask_to_runs, runs_to_mask
 
 numbers = st.floats(allow_nan=False)
 masks = st.tuples(st.integers(1, 12), st.integers(1, 12)).flatmap(lambda s: arrays(bool, s))

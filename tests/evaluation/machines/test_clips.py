@@ -32,8 +32,9 @@ def write(folder: Path, **told: Any) -> None:
 def test_what_is_outlined_in_the_clip_itself_takes_the_place_of_what_is_taught_elsewhere(
     clip: Path,
 ) -> None:
-    write(clip, teach={"part": {**SHOWN, "frame": 8}}, teach_own={"part": SHOWN})
-    assert [o.frame for o in read_brief(clip).actors] == [3]
+    elsewhere = {**SHOWN, "frame": 8}
+    write(clip, teach={"part": elsewhere, "gripper": elsewhere}, teach_own={"part": SHOWN})
+    assert {s.name: s.frame for s in read_brief(clip).actors} == {"part": 3, "gripper": 8}
 
 
 def test_things_that_are_no_actors_are_taught_too_but_bound_to_nothing(clip: Path) -> None:
@@ -41,6 +42,12 @@ def test_things_that_are_no_actors_are_taught_too_but_bound_to_nothing(clip: Pat
     brief = read_brief(clip)
     assert [o.name for o in brief.others] == ["hand"]
     assert clip_settings(brief).actors == {"part": ("part",), "gripper": ("gripper",)}
+
+
+def test_a_brief_without_a_task_is_refused(clip: Path) -> None:
+    (clip / "brief.json").write_text(json.dumps({"teach": {"part": SHOWN}}), encoding="utf-8")
+    with pytest.raises(SettingsError, match='names no "task"'):
+        read_brief(clip)
 
 
 @pytest.mark.parametrize(

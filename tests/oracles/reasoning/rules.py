@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import time
 import tracemalloc
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import isclose
+from math import inf, isclose
 from random import Random
 from statistics import median
-from typing import Any
+from typing import Any, Literal
 
+import numpy as np
+
+from tests.oracles import dense_formulas, rule_oracle, rule_peer
 from tests.oracles import rule_formulas as drawn_formulas
-from tests.oracles import rule_oracle, rule_peer
+from tests.oracles.dense_oracle import CELL_MS, DenseOracle
 from tests.oracles.reasoning.rule_scenes import FPS, minds, twenty_rules
 from visup.agent import Mind, Observation
 from visup.evaluation.figures import Progress, silent
+from visup.rules.dense_time import Ends, judge_recording
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula, shipped_rules
@@ -49,13 +53,15 @@ def evaluate_rules(
         progress: Shows what is being done.
 
     Returns:
-        Items `oracle`, `rtamt` (left out when it is not installed), `window N`, `N objects` and
+        Items `oracle`, `dense time`, `rtamt` (left out when it is not installed), `window N`, `N objects` and
         `snapshots`; the total holds `slower`, what a window of 3000 costs over one of 30, and
         whether rtamt was there.
     """
     items: dict[str, dict[str, Any]] = {}
     progress("formulas against the oracle")
     items["oracle"] = _against_oracle(formulas, seed)
+    progress("dense time against its oracle")
+    items["dense time"] = _against_dense_oracle(formulas // 5, seed)
     peer = rule_peer.available()
     if peer:
         progress("formulas against rtamt")
@@ -93,6 +99,36 @@ def _against_oracle(count: int, seed: int) -> dict[str, Any]:
         samples += len(times)
         different += not all(map(alike, told, truth))
     return {"formulas": count, "samples": samples, "different": different}
+
+
+def _against_dense_oracle(count: int, seed: int) -> dict[str, Any]:
+    """Irregular samples, with values of NumPy, judged in all cells of time."""
+    samples = different = 0
+    for number in range(count):
+        rng = Random(f"{seed} dense {number}")
+        formula = dense_formulas.dense_formula(rng, rng.randint(1, 3))
+        drawn, cut = dense_formulas.random_recording(rng, rng.randint(2, 14)), rng.random() < 0.5
+        truth = DenseOracle(dense_formulas.held(drawn), cut).cells(formula)
+        ends: Literal["cut", "unknown"] = "cut" if cut else "unknown"
+        told = judge_recording(
+            formula,
+            [(k * CELL_MS / 1000, _numpy(v)) for k, v in drawn],
+            ends=Ends(ends, ends),
+            end_s=len(truth) * CELL_MS / 1000,
+        )
+        moments = (k * CELL_MS / 1000 for k in range(len(truth)))
+        mine = [next(v.robustness for v in told if v.begin_s <= t < v.end_s) for t in moments]
+        samples += len(drawn)
+        different += not all(map(alike, mine, truth))
+    return {"formulas": count, "samples": samples, "different": different}
+
+
+def _numpy(values: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    """The same values as NumPy gives them; what is not known is NaN."""
+    return {
+        n: np.float64("nan") if v == (-inf, inf) else (np.float64(v[0]), np.float64(v[1]))
+        for n, v in values.items()
+    }
 
 
 def _against_peer(count: int, seed: int) -> dict[str, Any]:

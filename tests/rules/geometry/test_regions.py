@@ -173,3 +173,20 @@ def test_outlines_of_an_l_hold_a_box_in_their_corner_that_their_boxes_do_not() -
     apart = outline_differences((hook, box), (0,))
     signs = signs_with_hysteresis(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
     assert RCC8[from_outline_signs(signs)[0]] == "disconnected"
+
+
+@pytest.mark.parametrize(
+    "box", [(30, 30, 40, 30), (18, 30, 34, 12), (22, 22, 56, 56), (32, 52, 9, 9)]
+)
+def test_rcc8_of_outlines_knows_the_hole_of_a_ring(box: tuple[int, ...]) -> None:
+    """What covers a part of the hole is no part of the ring, though its outline may lie on it."""
+    frame = np.ones((80, 80), dtype=bool)
+    frame[25:45, 25:45] = False
+    corners = np.array([(10, 10), (89, 10), (89, 89), (10, 89)], dtype=np.float32)
+    ring = Region(1, (10, 10, 80, 80), frame, corners, (50.0, 50.0), float(frame.sum()))
+    other = box_region(2, (float(box[0]), float(box[1]), float(box[2]), float(box[3])))
+    assert other is not None
+    for first, second in ((ring, other), (other, ring)):
+        apart = outline_differences((first, second), (0,))
+        signs = signs_with_hysteresis(apart, np.full((3, 1), UNKNOWN, dtype=np.int8), 2.5, 1.5)
+        assert RCC8[from_outline_signs(signs)[0]] == by_masks(first, second, 2)

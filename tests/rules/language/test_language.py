@@ -16,11 +16,13 @@ from visup.rules.formula.nodes import (
     Formula,
     FutureOperator,
     Last,
+    Literal,
     MOfN,
     Not,
     Or,
     PastOperator,
     Predicate,
+    Previous,
     Quantified,
     Rule,
     Since,
@@ -52,9 +54,10 @@ durations = st.builds(
     st.sampled_from([Unit.S, Unit.MS]),
 )
 windows = st.builds(lambda d: TimeWindow(ZERO, d), durations) | st.builds(
-    lambda n: TimeWindow(Number(n / 4, Unit.S), Number(n / 2, Unit.S)), st.integers(1, 20)
+    lambda n, m: TimeWindow(Number(n / 4, Unit.S), Number((n + m) / 4, Unit.S)),
+    st.integers(1, 20),
+    st.integers(0, 20),  # 0: a window of one moment
 )
-spans = st.builds(lambda d: TimeWindow(ZERO, d), durations)
 
 
 def arguments(takes: tuple[str, ...]) -> tuple[str, ...]:
@@ -74,9 +77,11 @@ def comparisons(draw: st.DrawFn) -> Comparison:
     dimension = QUANTITIES[name].dimension
     unit = draw(st.sampled_from([u for u, (d, _) in UNITS.items() if d == dimension]))
     bound = Number(draw(st.integers(-300, 300)) / 4, unit)
-    operator = draw(st.sampled_from(["<", "<=", ">", ">="]))
+    operator = draw(st.sampled_from(["<", "<=", ">", ">=", "==", "!="]))
     slack = draw(st.integers(0, 20)) / 2 * (-1 if ">" in operator else 1)
-    leave = Number(bound.value + slack, unit) if draw(st.booleans()) else None
+    leave = (
+        Number(bound.value + slack, unit) if draw(st.booleans()) and operator[0] in "<>" else None
+    )
     left = Measure(name, arguments(QUANTITIES[name].takes))
     terms: list[Term] = [
         left,
@@ -85,6 +90,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
         Arithmetic(Arithmetic(left, "/", Number(2.0)), "-", Arithmetic(left, "-", left)),
         PointwiseFunction("max", (left, Number(1.0, unit))),
         PointwiseFunction("abs", (left,)),
+        PointwiseFunction("sqrt", (PointwiseFunction("power", (left, Number(2.0))),)),
         WindowFunction("lowest", left, Number(2.0, Unit.S)),
     ]
     return Comparison(draw(st.sampled_from(terms)), operator, bound, leave)
@@ -101,8 +107,10 @@ def joined(inner: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:
         st.builds(Or, several),
         st.builds(PastOperator, kinds, inner, st.none() | windows),
         st.builds(FutureOperator, ahead, inner, windows),
-        st.builds(Since, inner, inner, st.none() | spans),
-        st.builds(Until, inner, inner, spans),
+        st.builds(Since, inner, inner, st.none() | windows),
+        st.builds(Until, inner, inner, windows),
+        st.builds(Previous, inner),
+        st.builds(lambda f, value: And((f, Literal(value))), inner, st.booleans()),
         st.builds(MOfN, inner, st.just(Number(60.0, Unit.PERCENT)), durations),
         st.builds(MOfN, inner, st.just(Number(3.0)), st.just(Number(5.0))),
         st.builds(Last, inner, durations),
@@ -195,6 +203,11 @@ BAD = [
     (wrap("touching(a, b)", "rule r(a, b) info"), "'info' does not belong", "':'", 1, 14),
     (wrap("touching(a, b)", "rul r(a, b): info"), "'rul' does not belong", "'rule'", 1, 1),
     (wrap("touching(a, b)", say="near"), "'near' does not belong", "double quotes", 3, 9),
+    (wrap("5 px > 3 px and touching(a, b)"), "two numbers are compared", "a quantity on one side", 2, 10),
+    (wrap("sqrt(gap(a, b)) < 3 px"), "has no square root", "square of something", 2, 10),
+    (wrap("exp(gap(a, b)) < 3"), "an exponent is a length", "divide it", 2, 10),
+    (wrap("gap(a, b) == 3 px leave 2 px"), "has no sense behind '=='", "<, <=, > or >=", 2, 34),
+    (wrap("rising(touching(a, b), 3)"), "'rising' takes one formula", "rising(touching", 2, 10),
     ("rule r(a): info\n    when seen(a)\n", "ends too early", "'say'", 2, 17),
     (wrap("gap(a, b) + 3 s < 3 px"), "a length is added to a time", "a length: px", 2, 10),
     (
@@ -249,6 +262,25 @@ def test_all_mistakes_of_a_file_are_told_at_once_in_the_order_of_the_text() -> N
         parse_rules(text, "my.rules")
     lines = [e.where.line for e in caught.value.errors if isinstance(e.where, SourceLocation)]
     assert lines == [2, 6, 8]
+
+
+@pytest.mark.parametrize(
+    ("sugar", "plain"),
+    [
+        ("x() > 0 implies y() > 0", "not x() > 0 or y() > 0"),
+        ("x() > 0 implies y() > 0 implies x() > 1", "not x() > 0 or (not y() > 0 or x() > 1)"),
+        ("x() > 0 iff y() > 0", "x() > 0 and y() > 0 or not x() > 0 and not y() > 0"),
+        ("x() > 0 xor y() > 0", "x() > 0 and not y() > 0 or not x() > 0 and y() > 0"),
+        ("x() > 0 release[2 s] y() > 0", "not (not x() > 0 until[2 s] not y() > 0)"),
+        ("rising(x() > 0)", "x() > 0 and not previous x() > 0"),
+        ("falling(x() > 0)", "previous x() > 0 and not x() > 0"),
+        ("x() > 1e-3", "x() > 0.001"),
+        ("once[2 s .. 2 s] x() > 0", "x() > 0 within 2 s to 2 s ago"),
+    ],
+)
+def test_what_is_sugar_reads_as_what_it_stands_for(sugar: str, plain: str) -> None:
+    known = signals("x", "y")
+    assert parse_formula(sugar, known) == parse_formula(plain, known)
 
 
 def test_two_rules_of_one_name_are_a_mistake() -> None:

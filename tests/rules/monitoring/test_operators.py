@@ -16,6 +16,7 @@ from tests.oracles.rule_formulas import (
     random_value,
 )
 from tests.oracles.rule_oracle import robustness
+from visup.agent.model.errors import SettingsError
 from visup.rules.formula.nodes import Formula, Predicate
 from visup.rules.formula.units import ticks
 from visup.rules.language.parser import parse_formula
@@ -23,7 +24,7 @@ from visup.rules.monitoring.compiler import Compiler
 from visup.rules.monitoring.intervals import Interval, verdict
 from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.monitor import Monitor
-from visup.rules.monitoring.operators import max_samples
+from visup.rules.monitoring.samples import max_samples
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.vocabulary import signals
 from visup.rules.safety.compiled_rules import CompiledRules
@@ -249,3 +250,45 @@ def test_a_verdict_of_the_future_comes_late_and_what_stands_beside_it_waits() ->
     assert monitor.delay == pytest.approx(0.2)
     told = [monitor.step(k / 10, {"x": x}) for k, x in enumerate((2.0, 0.0, 9.0, 0.0, 0.0))]
     assert [verdict(t).value for t in told] == ["unknown", "unknown", "true", "false", "true"]
+
+
+def test_what_looks_back_without_end_begins_with_the_first_sample_also_of_what_is_told_late() -> (
+    None
+):
+    falling = [(k / 10, {"x": 1.0 if k < 5 else -1.0}) for k in range(40)]
+    once = Monitor(parse_formula("once (eventually[1 s .. 2 s] x() > 0)", signals("x")))
+    told = [verdict(once.step(t, v)).value for t, v in falling]
+    assert told == ["unknown"] * 20 + ["false"] * 20
+    always = Monitor(parse_formula("always (henceforth[1 s] x() > 0)", signals("x")))
+    told = [verdict(always.step(k / 10, {"x": 1.0})).value for k in range(20)]
+    assert told == ["unknown"] * 10 + ["true"] * 10
+
+
+@pytest.mark.parametrize(
+    "nan", [float("nan"), np.float64("nan"), np.float32("nan"), (np.nan, np.nan), None]
+)
+def test_nan_of_any_kind_is_unknown_on_either_side(nan: Any) -> None:
+    for text in ("x() > 0 or y() > 0", "y() > 0 or x() > 0"):
+        monitor = Monitor(parse_formula(text, signals("x", "y")))
+        assert monitor.step(0.0, {"x": nan, "y": np.float32(-1)}) == (-1, inf)
+        assert monitor.step(0.1, {"x": nan, "y": 2}) == (2, inf)
+
+
+@pytest.mark.parametrize("value", [(2, 1), (inf, -inf)])
+def test_a_reversed_interval_is_refused(value: Interval) -> None:
+    monitor = Monitor(parse_formula("x() > 0", signals("x")))
+    with pytest.raises(SettingsError, match="interval"):
+        monitor.step(0.0, {"x": value})
+
+
+@pytest.mark.parametrize("times", [(0.0, 0.0), (1.0, 0.5), (0.0, inf), (float("nan"),), (-inf,)])
+def test_times_that_do_not_increase_are_refused_and_leave_the_monitor_as_it_was(
+    times: tuple[float, ...],
+) -> None:
+    monitor = Monitor(parse_formula("x() > 0 for 1 s", signals("x")))
+    for time in times[:-1]:
+        monitor.step(time, {"x": 1})
+    before = monitor.state
+    with pytest.raises(SettingsError, match="sample"):
+        monitor.step(times[-1], {"x": 1})
+    assert monitor.state is before

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from tests.tasks.scripted import Script, Spell, task_of, watch
+from tests.tasks.scripted import ARM, SATELLITE, Script, Spell, task_of, watch
 from visup.agent import Severity, Verdict
 from visup.tasks.supervision.supervise import finish
+from visup.wording import worded_once
 
 
 def spells(*named: tuple[str, float, float]) -> Script:
@@ -135,3 +138,20 @@ def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
     assert "`never touching(arm, satellite)` has not held since 5.0 s" in event.text
     assert [c.kind for c in played.outcomes[60].conditions] == ["invariant_broken"]
     assert not played.outcomes[80].conditions
+
+
+LEAVES = {ARM: (0.0, 6.0), SATELLITE: (0.0, 1e9)}
+
+
+@pytest.mark.parametrize("must", ["never touching(arm, satellite)", "always present(arm)"])
+def test_a_broken_invariant_is_told_once_with_what_the_task_comes_to(must: str) -> None:
+    text = f"<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 3 s\n{must}"
+    script = spells(("converging", 0, 5), ("keeping_distance", 5, 12), ("touching", 6, 9))
+    script = replace(script, objects=LEAVES) if "present" in must else script
+    played = watch(script, 12.0, text)
+    told = [e for step in played.outcomes for e in worded_once(step.events)]
+    grave = [e.text for e in told if e.severity > Severity.INFO]
+    assert len(grave) == 1
+    assert grave[0].startswith("Task `t` ")
+    causes = {c.cause for step in played.outcomes for c in step.conditions}
+    assert causes == set(grave)

@@ -71,13 +71,13 @@ def views_closing(figures: Figures) -> Iterator[RenderableType]:
 
 def machines_closing(figures: Figures) -> Iterator[RenderableType]:
     """The baseline's figures, where it watched, and how many verdicts are right."""
-    from visup.commands.eval.tables import figures_table
+    from visup.commands.eval.figures_table import figures_tables
 
     if "baseline" in figures:
         rows = {n: i["baseline"] for n, i in figures["items"].items()}
         keys = ("verdict", "verdicts_right", "stage_f1", "actors", "contact_f1", "move_f1", "ms")
         told = {"items": rows, "total": figures["baseline"]}
-        yield figures_table("baseline: CSRT on the taught boxes", told, keys)
+        yield from figures_tables("baseline: CSRT on the taught boxes", told, keys)
     total = figures["total"]
     yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
@@ -147,6 +147,17 @@ def rules_closing(figures: Figures) -> Iterator[str]:
 def rules_differ(figures: Figures) -> bool:
     """Whether any formula came out otherwise than the oracle says."""
     return any(item.get("different") for item in figures["items"].values())
+
+
+def peers_closing(figures: Figures) -> Iterator[str]:
+    """The first cases that do not come out as the peer's."""
+    for case in figures["differing"][:20]:
+        yield f"{case['outcome'].replace('_', ' ')}: {case['id']} ({case['of']})"
+
+
+def peers_differ(figures: Figures) -> bool:
+    """Whether a case differs beyond what is said of semantics."""
+    return bool(figures["total"]["differ"])
 
 
 def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Figures:

@@ -240,6 +240,23 @@ EVALUATIONS = (
         failed=adapters.rules_differ,
     ),
     EvaluationCommand(
+        "peers",
+        """Cases of other tools' own tests, temporal and qualitative: agree, unknown at ends, differ.
+
+        Exit code 1 when a case differs beyond the semantics that docs/coming-from.md states.
+        """,
+        "tests.oracles.peers.runner:evaluate_peers",
+        "judging",
+        (
+            *("cases", "agree", "unknown_at_ends", "other_semantics"),
+            *("differ", "not_expressible"),
+        ),
+        (),
+        folder_argument("Folder with temporal.json and qualitative.json."),
+        adapters.peers_closing,
+        adapters.peers_differ,
+    ),
+    EvaluationCommand(
         "reasoning",
         "Reasoning alone, on percepts made from the truth with noise: identity, events, verdicts.",
         f"{_ADAPTERS}:reasoning",

@@ -13,6 +13,7 @@ import typer
 
 from visup.commands.options import Given, Setting
 from visup.runs.settings import Option
+from visup.terminal.console import make_console
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -68,9 +69,8 @@ class EvaluationCommand:
         return run
 
     def _run(self, json_file: Path | None, given: Given) -> None:
-        from rich.console import Console
 
-        from visup.commands.eval.tables import figures_table
+        from visup.commands.eval.figures_table import figures_tables
         from visup.evaluation.oracles import evaluation_module
         from visup.evaluation.record import write_record
 
@@ -79,10 +79,10 @@ class EvaluationCommand:
         module, _, function = self.function.partition(":")
         with _progress_line(self.verb) as progress:
             figures = getattr(evaluation_module(module), function)(**given, progress=progress)
-        console = Console(highlight=False)
+        console = make_console()
         if self.keys:
             title = f"{self.name}: {folder}" if folder else self.name
-            console.print(figures_table(title, figures, self.keys))
+            console.print(*figures_tables(title, figures, self.keys))
         for text in self.closing(figures):
             console.print(text, soft_wrap=isinstance(text, str), markup=False)
         if json_file:
@@ -116,7 +116,5 @@ def _check_paths(folder: Path | None, json_file: Path | None) -> None:
 @contextmanager
 def _progress_line(verb: str) -> Iterator[Callable[[str], None]]:
     """A line on standard error that says what is being done, replaced as items are done."""
-    from rich.console import Console
-
-    with Console(stderr=True).status(verb) as status:
+    with make_console(stderr=True).status(verb) as status:
         yield lambda text: status.update(f"{verb}: {text}")

@@ -1,4 +1,4 @@
-"""How figures are drawn: tables that can be read at 80 columns, and the lines below them."""
+"""Tables of single evaluations, and the lines below them; `figures_table.py` draws those that all share."""
 
 from __future__ import annotations
 
@@ -11,57 +11,6 @@ from rich.text import Text
 Rows = Mapping[str, Mapping[str, Any]]
 
 _WORST = 6
-
-
-def figures_table(title: str, figures: Mapping[str, Any], keys: tuple[str, ...]) -> Table:
-    """Figures as a table that fits 80 columns.
-
-    Args:
-        title: Of the table.
-        figures: With `items` by name and `total`.
-        keys: Which figures, in order; those that no item has are left out.
-    """
-    rows: Rows = {**figures["items"], "total": figures["total"]}
-    shown = [k for k in keys if any(k in row for row in rows.values())]
-    # Many columns are told as many rows: a table must be readable at 80 columns.
-    tall = len(shown) > 8 and len(figures["items"]) <= 8
-    return _tall(title, rows, shown) if tall else _wide(title, rows, shown)
-
-
-def _wide(title: str, rows: Rows, keys: list[str]) -> Table:
-    table = Table(title=title, title_justify="left", padding=(0, 0))
-    table.add_column("", no_wrap=True)
-    for key in keys:
-        table.add_column(key, justify="right", no_wrap=True)
-    for name, row in rows.items():
-        if name == "total":
-            table.add_section()
-        table.add_row(name, *(_cell(row.get(k)) for k in keys))
-    return table
-
-
-def _tall(title: str, rows: Rows, keys: list[str]) -> Table:
-    """Figures as rows; items as numbered columns, whose names stand below."""
-    names = [name for name in rows if name != "total"]
-    table = Table(title=title, title_justify="left", caption_justify="left", padding=(0, 0))
-    table.add_column("", no_wrap=True)
-    for heading in (*(str(n) for n in range(1, len(names) + 1)), "total"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for key in keys:
-        table.add_row(key, *(_cell(row.get(key)) for row in rows.values()))
-    table.caption = ", ".join(f"{n} {name}" for n, name in enumerate(names, start=1))
-    return table
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, float):
-        return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
-    # Verdicts are long words for narrow columns.
-    return {"interrupted": "interr.", "in_progress": "in pr.", "succeeded": "succ."}.get(
-        str(value), str(value)
-    )
 
 
 def totals_table(figures: Mapping[str, Any]) -> Table:

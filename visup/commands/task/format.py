@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from visup.terminal.console import echo
+
 
 def format_files(
     files: Annotated[list[str], typer.Argument(help="Task files; `-` reads one and writes it.")],
@@ -25,12 +27,12 @@ def format_files(
         new = formatted_source(text, "<stdin>" if file == "-" else file)
         differ = differ or new != text
         if file == "-" and not only_check:
-            typer.echo(new, nl=False)
+            echo(new, nl=False)
         elif new != text and only_check:
-            typer.echo(f"{file}: not formatted")
+            echo(f"{file}: not formatted")
         elif new != text:
             _write(file, new)
-            typer.echo(f"{file}: formatted")
+            echo(f"{file}: formatted")
     raise typer.Exit(1 if only_check and differ else 0)
 
 

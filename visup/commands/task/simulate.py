@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from visup.terminal.console import echo
+
 if TYPE_CHECKING:
     from visup.tasks.grammar.nodes import Task
     from visup.tasks.tools.simulate import Moment, Position, Trace
@@ -40,9 +42,9 @@ def _list(task: Task, count: int) -> None:
 
     found = traces(task)
     for number, course in enumerate(islice(found, count), 1):
-        typer.echo(f"{number}. {_line(course)}")
+        echo(f"{number}. {_line(course)}")
     if next(found, None) is not None:
-        typer.echo("and more")
+        echo("and more")
 
 
 def _sample(task: Task, count: int, seed: int) -> None:
@@ -53,25 +55,25 @@ def _sample(task: Task, count: int, seed: int) -> None:
     rng = Random(seed)
     for number in range(1, count + 1):
         course, ended = sample(task, rng)
-        typer.echo(f"{number}. {_line(course)}{'' if ended else ', and so on'}")
+        echo(f"{number}. {_line(course)}{'' if ended else ', and so on'}")
 
 
 def _walk(task: Task) -> None:
     """Ask at every step which way to go on, until the task ends or the user does."""
     from visup.tasks.tools.simulate import initial_positions, successors
 
-    typer.echo(f"task {task.name}: choose the next step by number; q ends the walk")
+    echo(f"task {task.name}: choose the next step by number; q ends the walk")
     places = initial_positions(task)
     while True:
         for number, place in enumerate(places, 1):
-            typer.echo(f"  {number}) {_way(place)}")
+            echo(f"  {number}) {_way(place)}")
         chosen = _ask(places)
         if chosen is None:
             return
         if chosen.state is None:
-            typer.echo("the task is done")
+            echo("the task is done")
             return
-        typer.echo(f"now: {_said(chosen.moment)}")
+        echo(f"now: {_said(chosen.moment)}")
         places = successors(task, chosen)
 
 
@@ -80,7 +82,7 @@ def _ask(places: tuple[Position, ...]) -> Position | None:
         try:
             answer = input("> ").strip().lower()
         except (EOFError, KeyboardInterrupt):
-            typer.echo("")
+            echo()
             return None
         if answer in ("q", "quit", "exit"):
             return None
@@ -88,7 +90,7 @@ def _ask(places: tuple[Position, ...]) -> Position | None:
             return places[int(answer[:9]) - 1]
         if not answer and len(places) == 1:
             return places[0]
-        typer.echo(f"  a number from 1 to {len(places)}, or q")
+        echo(f"  a number from 1 to {len(places)}, or q")
 
 
 def _way(place: Position) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from visup.commands.task.format import format_files
 from visup.commands.task.simulate import simulate
+from visup.terminal.console import echo, echo_json, make_console
 
 if TYPE_CHECKING:
     from visup.agent.model.errors import VisupError
@@ -48,11 +48,11 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
             found[file] = [e]
     told = [e for errors in found.values() for e in errors]
     if as_json:
-        typer.echo(json.dumps({f: [_as_data(e) for e in es] for f, es in found.items()}, indent=2))
+        echo_json({f: [_as_data(e) for e in es] for f, es in found.items()}, indent=2)
         raise typer.Exit(2 if told else 0)
     for file, errors in found.items():
         if not errors:
-            typer.echo(f"{file}: ok")
+            echo(f"{file}: ok")
     raise_errors(told)
 
 
@@ -69,15 +69,13 @@ def show(
 
     for task in load_tasks(file):
         if form == "tree":
-            from rich.console import Console
-
             from visup.commands.task.tree import task_tree
 
-            Console().print(task_tree(task))
+            make_console().print(task_tree(task))
         else:
             from visup.tasks.tools.diagram import dot, flow_of, mermaid
 
-            typer.echo(mermaid(flow_of(task)) if form == "mermaid" else dot(flow_of(task)))
+            echo(mermaid(flow_of(task)) if form == "mermaid" else dot(flow_of(task)))
 
 
 @app.command("list")
@@ -87,11 +85,11 @@ def list_tasks(as_json: AsJson = False) -> None:
 
     about = {name: _first_comment(read_text(name)) for name in shipped_tasks()}
     if as_json:
-        typer.echo(json.dumps(about, indent=2))
+        echo_json(about, indent=2)
         return
     width = max(map(len, about), default=0)
     for name, words in about.items():
-        typer.echo(f"{name:{width}}  {words}")
+        echo(f"{name:{width}}  {words}")
 
 
 @app.command()
@@ -103,11 +101,11 @@ def actions(as_json: AsJson = False) -> None:
     said = {m.name: (written(m), m.about or m.text) for m in known_actions().values()}
     if as_json:
         data = {n: {"written": w, "about": a} for n, (w, a) in said.items()}
-        typer.echo(json.dumps(data, indent=2))
+        echo_json(data, indent=2)
         return
     width = max(len(w) for w, _ in said.values())
     for how, about in sorted(said.values()):
-        typer.echo(f"{how:{width}}  {about}")
+        echo(f"{how:{width}}  {about}")
 
 
 @app.command()
@@ -117,7 +115,7 @@ def explain(
     """Say what a code means, with a wrong and a right example."""
     from visup.tasks.diagnostics.explain import explain as explanation
 
-    typer.echo(str(explanation(code)))
+    echo(str(explanation(code)))
 
 
 @app.command()
@@ -125,7 +123,7 @@ def textmate() -> None:
     """Write the TextMate grammar of task files, for editors that colour text by one."""
     from visup.tasks.checks.files import textmate_grammar
 
-    typer.echo(textmate_grammar(), nl=False)
+    echo(textmate_grammar(), nl=False)
 
 
 @app.command()

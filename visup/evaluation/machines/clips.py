@@ -11,27 +11,10 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.machines.scores import Interval, MachineTruth, TrueBoxes
 from visup.evaluation.missions.files import read_json
 from visup.evaluation.missions.scores import TrueStage
+from visup.teaching.briefs import Showing, clip_video, read_showings
 
-VIDEOS = ("clip.mp4", "video.mp4")
 TOLERANCE_S = 0.7
 """No clip's times are held to be known better than so, seconds."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outline:
-    """A thing as a user outlines it once.
-
-    Attributes:
-        name: Of the thing.
-        video: The clip in which it is shown.
-        frame: Number of the frame.
-        corners: (x, y), pixels of that frame.
-    """
-
-    name: str
-    video: Path
-    frame: int
-    corners: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +35,14 @@ class Brief:
     video: Path
     family: str
     task: str
-    actors: tuple[Outline, ...]
-    others: tuple[Outline, ...] = ()
+    actors: tuple[Showing, ...]
+    others: tuple[Showing, ...] = ()
     fov_vertical_deg: float | None = None
+
+    @property
+    def shown(self) -> tuple[Showing, ...]:
+        """All that is outlined, actors first."""
+        return (*self.actors, *self.others)
 
 
 def clip_folders(folder: Path) -> list[Path]:
@@ -80,46 +68,23 @@ def read_brief(folder: Path) -> Brief:
         SettingsError: The brief or a video is missing, or the brief is not as it should be.
     """
     path = folder / "brief.json"
-    told = read_json(path)
-    try:
-        task = str(told["task"])
-        actors = told.get("teach_own") or told["teach"]
-        return Brief(
-            folder,
-            video_of(folder),
-            str(told.get("family", folder.name)),
-            str(folder / task) if (folder / task).is_file() else task,
-            tuple(_outlines(actors, folder)),
-            tuple(_outlines(told.get("teach_extra", {}), folder)),
-            told.get("fov_vertical_deg"),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as fault:
+    shown, told = read_showings(path), read_json(path)
+    if "task" not in told:
         raise SettingsError(
-            f"this brief cannot be used: {type(fault).__name__}: {fault}",
+            'this brief cannot be used: it names no "task"',
             where=str(path),
-            expected='"task", and "teach": {actor: {"clip": ..., "frame": ..., "polygon": [[x, y], ...]}}',
-        ) from fault
-
-
-def video_of(folder: Path) -> Path:
-    """The video of a clip.
-
-    Raises:
-        SettingsError: There is none.
-    """
-    for name in VIDEOS:
-        if (folder / name).is_file():
-            return folder / name
-    raise SettingsError("there is no video", where=str(folder), expected=" or ".join(VIDEOS))
-
-
-def _outlines(given: Mapping[str, Any], folder: Path) -> Iterator[Outline]:
-    """Outlines as a brief gives them; the clip that one names is a folder beside this one."""
-    for name, shown in given.items():
-        corners = tuple((float(x), float(y)) for x, y in shown["polygon"])
-        clip = str(shown.get("clip", folder.name))
-        video = video_of(folder.parent / clip)
-        yield Outline(str(name), video, int(shown["frame"]), corners)
+            expected="a file in the folder, or the name of a shipped task",
+        )
+    task = str(told["task"])
+    return Brief(
+        folder,
+        clip_video(folder),
+        str(told.get("family", folder.name)),
+        str(folder / task) if (folder / task).is_file() else task,
+        tuple(s for s in shown if s.plays_part),
+        tuple(s for s in shown if not s.plays_part),
+        told.get("fov_vertical_deg"),
+    )
 
 
 def read_truth(folder: Path) -> MachineTruth:

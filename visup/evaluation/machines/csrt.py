@@ -25,8 +25,8 @@ from visup.agent import (
 )
 from visup.agent.contract.behaviour import Contract
 from visup.evaluation.machines.clips import Brief
-from visup.evaluation.machines.teaching import taught_views
 from visup.percepts.taught.view import TaughtView
+from visup.teaching.lesson import views_of
 from visup.testing import region_of
 
 SIMILARITY = 0.9
@@ -120,10 +120,9 @@ def box_region(box: PixelBox, number: int, size: tuple[int, int]) -> Region | No
 
 def box_behaviour(brief: Brief) -> BoxRegions:
     """The baseline's eyes for a clip."""
-    outlines = (*brief.actors, *brief.others)
     own = brief.video.resolve()
     trackers = []
-    for outline, view in zip(outlines, taught_views(outlines), strict=True):
-        here = outline.video.resolve() == own
-        trackers.append(BoxTracker(view, outline.frame if here else 0, here))
+    for shown, view in zip(brief.shown, views_of(brief.shown), strict=True):
+        here = shown.video.resolve() == own
+        trackers.append(BoxTracker(view, shown.frame if here else 0, here))
     return BoxRegions(trackers)

@@ -23,10 +23,10 @@ from visup.evaluation.machines.csrt import box_behaviour
 from visup.evaluation.machines.mask_regions import has_masks, mask_behaviours
 from visup.evaluation.machines.recorder import MachineRecorder
 from visup.evaluation.machines.scores import MachineReport, machine_scores, machine_total
-from visup.evaluation.machines.teaching import taught_database
 from visup.runs.wiring import WatchSettings, build_agent, open_video, reasoning_agent
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import task_actors
+from visup.teaching.lesson import store, views_of
 
 
 def evaluate_machines(
@@ -86,7 +86,7 @@ def clip_settings(brief: Brief) -> WatchSettings:
     """
     wanted = {a for task in load_tasks(brief.task) for a in task_actors(task)}
     taught = [o.name for o in brief.actors if o.name in wanted]
-    others = [o.name for o in (*brief.actors, *brief.others) if o.name not in wanted]
+    others = [o.name for o in brief.shown if o.name not in wanted]
     return WatchSettings(
         source=str(brief.video),
         tasks=(brief.task,),
@@ -100,7 +100,7 @@ def watch_taught(brief: Brief, limit: int | None = None) -> MachineReport:
     """Watch a clip as `visup watch` does, taught from its brief."""
     with tempfile.TemporaryDirectory() as scratch:
         models = Path(scratch) / "taught.models"
-        taught_database(brief, models)
+        store(models, views_of(brief.shown))
         settings = replace(clip_settings(brief), models=models)
         return _watched(brief, settings, limit, lambda o: build_agent(settings, (o,)))
 

@@ -27,6 +27,7 @@ from visup.evaluation.figures import Progress, silent, sums_of
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import Audience, supervise
 from visup.runs.settings import RunOptions, WatchSettings
+from visup.terminal.console import make_console
 from visup.terminal.narrator import Narrator
 
 KILLED_AGAIN = 0.25
@@ -209,7 +210,7 @@ def _forked(folder: Path, run: Callable[[Console], None]) -> int:
         out = os.open(folder / "printed", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         os.dup2(out, 1)
         sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115  # of this process only
-        run(Console())
+        run(make_console())
         sys.stdout.flush()
         code = 0
     except VisupError as fault:

@@ -1,4 +1,5 @@
 """What rendering writes: mission folders with ground truth, the demo clip and its model database.
 
-Read `truth` (what is true of a frame and of a mission), `writer` (the folder), `demo_clip`, `demo_models`.
+Read `truth` (what is true of a frame and of a mission), `writer` (a mission),
+`clip_folder` (its video, masks and files), `demo_clip`, `demo_models`.
 """

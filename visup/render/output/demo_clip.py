@@ -11,8 +11,8 @@ from importlib import resources
 from pathlib import Path
 
 from visup.render.imaging.renderer import Renderer
+from visup.render.output.clip_folder import ClipWriter
 from visup.render.output.truth import frame_truth, mission, mission_truth
-from visup.render.output.writer import ClipWriter
 from visup.render.scenario.library import shipped_scenario
 
 CLIP, RECORD = "sts87.mp4", "sts87.json"

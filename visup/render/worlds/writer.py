@@ -8,13 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent.model.errors import OutputError
+from visup.render.output.clip_folder import (
+    ClipWriter,
+    make_clip_folder,
+    write_file,
+    write_mask,
+)
 from visup.render.output.truth import frame_truth
-from visup.render.output.writer import ClipWriter
 from visup.render.worlds.frames import WorldRenderer
 from visup.render.worlds.lesson import lesson
 from visup.render.worlds.truth import outline, well_seen, world_brief, world_truth
@@ -42,7 +45,7 @@ def write_world(
     Raises:
         OutputError: The folder cannot be written, or something is in it already.
     """
-    _make_folder(out)
+    make_clip_folder(out)
     # Outlines name the clip that they are drawn in by its folder.
     world = replace(world, name=out.resolve().name)
     renderer = WorldRenderer(world)
@@ -51,16 +54,16 @@ def write_world(
         for index in range(world.frames):
             picture = renderer.picture(index)
             video.write(picture.image)
-            _write_mask(out, index, picture.mask)
+            write_mask(out, index, picture.mask)
             frames.append(frame_truth(picture, world.labels))
             masks.append(picture.mask)
             if progress is not None:
                 progress(index + 1, world.frames)
     truth = world_truth(world, frames)
     brief = world_brief(world, _teach(world, out, frames, masks))
-    _write(out / f"{world.task}.task", world.task_text.encode())
-    _write(out / "truth.json", json.dumps(truth).encode())
-    _write(out / "brief.json", (json.dumps(brief) + "\n").encode())
+    write_file(out / f"{world.task}.task", world.task_text.encode())
+    write_file(out / "truth.json", json.dumps(truth).encode())
+    write_file(out / "brief.json", (json.dumps(brief) + "\n").encode())
     return truth
 
 
@@ -87,34 +90,9 @@ def _lesson(world: World, out: Path, best: dict[str, int]) -> dict[str, Any]:
     if any(np.count_nonzero(p.mask == labels[a]) < LEAST_PX for a, p in pairs):
         return {}
     folder = out.resolve().parent / world.name
-    _make_folder(folder)
+    make_clip_folder(folder)
     with ClipWriter(folder / "video.mp4", FPS, world.size) as video:
         for index, picture in enumerate(pictures):
             video.write(picture.image)
-            _write_mask(folder, index, picture.mask)
+            write_mask(folder, index, picture.mask)
     return {a: _shown(world, a, index, p.mask) for index, (a, p) in enumerate(pairs)}
-
-
-def _write_mask(folder: Path, index: int, mask: NDArray[np.uint8]) -> None:
-    _write(folder / "masks" / f"{index:05d}.png", cv2.imencode(".png", mask)[1].tobytes())
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()):
-            raise OutputError(
-                "the folder is not empty", where=str(out), expected="a new or an empty folder"
-            )
-        (out / "masks").mkdir()
-    except OSError as error:
-        raise OutputError(f"the folder cannot be made: {error.strerror}", where=str(out)) from error
-
-
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise OutputError(
-            f"the file cannot be written: {error.strerror}", where=str(path)
-        ) from error

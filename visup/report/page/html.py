@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 from html import escape
 from importlib.resources import files
@@ -9,13 +11,14 @@ from pathlib import Path
 from string import Template
 
 from visup.agent.model.errors import ExtraMissingError, OutputError
+from visup.agent.storage.atomic import write_whole
 from visup.report.page import sections
 from visup.report.page.distance_figures import distance_figures
 from visup.report.page.figures import Figure, presence_figure, stage_figure, vote_figures
 from visup.report.page.summary import title_of, verdict_words
 from visup.report.page.task_trees import courses
 from visup.report.records import RunData
-from visup.wording import prose
+from visup.wording import printable, prose
 
 
 def write_report(run: RunData, path: Path) -> None:
@@ -30,10 +33,8 @@ def write_report(run: RunData, path: Path) -> None:
         OutputError: The file cannot be written.
     """
     page = report_page(run)
-    part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(page, encoding="utf-8")
-        part.replace(path)
+        write_whole(path, page.encode())
     except OSError as fault:
         raise OutputError(
             f"the report cannot be written ({fault.strerror or fault})",
@@ -59,6 +60,8 @@ def report_page(run: RunData) -> str:
     distances, votes = distance_figures(run), vote_figures(run)
     drawn = [f for f in (stages, presence, *distances, *votes) if f is not None]
     own = files("visup.report.page")
+    plotly = plotly_source() if drawn else ""
+    script = (own / "report.js").read_text(encoding="utf-8")
     page = Template((own / "report.html").read_text(encoding="utf-8"))
     text = {
         "title": escape(title_of(run)),
@@ -81,11 +84,18 @@ def report_page(run: RunData) -> str:
         "figures": embedded(drawn),
     }
     return page.substitute(
-        {name: prose(words) for name, words in text.items()},
+        {name: printable(prose(words)) for name, words in text.items()},
         style=(own / "report.css").read_text(encoding="utf-8"),
-        plotly=plotly_source() if drawn else "",
-        script=(own / "report.js").read_text(encoding="utf-8"),
+        plotly=plotly,
+        script=script,
+        scripts_allowed=" ".join(map(script_hash, (plotly, script))),
     )
+
+
+def script_hash(script: str) -> str:
+    """A script as a content security policy allows it, and no other."""
+    digest = hashlib.sha256(script.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
 def embedded(figures: list[Figure]) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.percepts.shape.shapes import ZOO, limbs, shape, small_database
-from visup.agent.model.errors import DatabaseError
+from visup.agent.model.errors import DatabaseError, VisupError
 from visup.percepts.shape.building.database_builder import (
     silhouette_views,
 )
@@ -277,11 +277,12 @@ def test_a_failed_write_leaves_the_old_file(stored: Path, tmp_path: Path) -> Non
     with pytest.raises(DatabaseError, match="no more views"):
         ModelDatabase.create(path, breaks())  # type: ignore[arg-type]
     assert path.read_bytes() == stored.read_bytes()
-    assert [p.name for p in tmp_path.iterdir()] == ["kept.db"]
+    assert [p.name for p in tmp_path.glob("[!.]*")] == ["kept.db"]
+    assert not list(tmp_path.glob("*.part"))
 
 
 def test_a_database_cannot_be_written_where_no_folder_is(tmp_path: Path) -> None:
-    with pytest.raises(DatabaseError, match="cannot be written"):
+    with pytest.raises(VisupError, match="cannot be written"):
         ModelDatabase.create(tmp_path / "nowhere" / "a.db")
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from visup.render.worlds.kinds.kind import (
     Script,
+    bearing,
     cut_short,
     finished,
     frames_until,
@@ -163,11 +164,8 @@ def _layout(
 def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
     side, high = rng.uniform(-0.6, 0.6), np.radians(rng.uniform(18, 50))
     far = float(rng.uniform(4.5, 6.2))
-    position = far * np.array(
-        [np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)]
-    )
     aim = np.array([0.0, 0.0, 0.4])
-    return random_view(rng, position + aim, aim, frames)
+    return random_view(rng, aim + far * bearing(side, high), aim, frames)
 
 
 def _drive(

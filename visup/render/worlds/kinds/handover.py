@@ -72,8 +72,10 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     frames = frames_until(times.end)
     meet = np.array([rng.uniform(-0.06, 0.06), rng.uniform(-0.16, 0.02), LEVEL])
     grip = np.array([side * half * 0.72, 0, 0])
-    first = _giver_course(rng, giver, times, outcome, (meet - grip, thick), frames)
-    second = _receiver_course(rng, receiver, times, outcome, (meet + grip, thick), frames)
+    gives = Partner.for_bar(giver, meet - grip, thick)
+    takes = Partner.for_bar(receiver, meet + grip, thick)
+    first = _giver_course(rng, gives, times, outcome, frames)
+    second = _receiver_course(rng, takes, times, outcome, frames)
     hands = hand_poses(giver, first), hand_poses(receiver, second)
     payload, drop_s = _payload_poses(rng, hands, times, outcome, meet)
     surface = Surface("grain", 0.05, float(rng.uniform(0.02, 0.2)), seed_of(rng))
@@ -109,47 +111,53 @@ def _times(rng: np.random.Generator) -> HandoverTimes:
     )
 
 
-def _home(design: RobotDesign, height: float) -> Doubles:
-    """Where a tip waits: on its own side, a little before the foot."""
-    return np.array([0.62 * design.foot[0], design.foot[1] - 0.12, height])
+@dataclass(frozen=True, slots=True, eq=False)
+class Partner:
+    """One of the two arms.
+
+    Attributes:
+        design: The arm.
+        goal: (3,) where its tip is while the bar changes hands, metres.
+        tight: Width of its fingers when they hold the bar, metres, and
+        wide: When they do not.
+    """
+
+    design: RobotDesign
+    goal: Doubles
+    tight: float
+    wide: float
+
+    @classmethod
+    def for_bar(cls, design: RobotDesign, goal: Doubles, thick: float) -> Partner:
+        """An arm with fingers for a bar of half a thickness, metres."""
+        return cls(design, goal, 2 * thick, 2 * thick + 0.05)
+
+    def random_home(self, rng: np.random.Generator) -> Doubles:
+        """(3,) where its tip waits: on its own side, a little before the foot."""
+        x, y = self.design.foot[:2]
+        return np.array([0.62 * x, y - 0.12, float(rng.uniform(0.3, 0.4))])
 
 
 def _giver_course(
-    rng: np.random.Generator,
-    design: RobotDesign,
-    times: HandoverTimes,
-    outcome: str,
-    place: tuple[Doubles, float],
-    frames: int,
+    rng: np.random.Generator, arm: Partner, t: HandoverTimes, outcome: str, frames: int
 ) -> RobotCourse:
-    (goal, thick), t = place, times
-    home = _home(design, float(rng.uniform(0.3, 0.4)))
-    keys = [(t.begin, home), (t.reach - 0.3, goal), (t.back, goal), (t.back + 1.8, home)]
-    wide, tight = 2 * thick + 0.05, 2 * thick
-    loose = t.release
-    if outcome == "drop":
-        loose = t.reach - 0.05
-    grip = [(loose, tight), (loose + 0.3, wide)] if outcome != "never" else [(0.0, tight)]
-    return _course_of(rng, keys, grip, frames)
+    home = arm.random_home(rng)
+    keys = [(t.begin, home), (t.reach - 0.3, arm.goal), (t.back, arm.goal), (t.back + 1.8, home)]
+    loose = t.reach - 0.05 if outcome == "drop" else t.release
+    grip = [(loose, arm.tight), (loose + 0.3, arm.wide)]
+    return _course_of(rng, keys, grip if outcome != "never" else [(0.0, arm.tight)], frames)
 
 
 def _receiver_course(
-    rng: np.random.Generator,
-    design: RobotDesign,
-    times: HandoverTimes,
-    outcome: str,
-    place: tuple[Doubles, float],
-    frames: int,
+    rng: np.random.Generator, arm: Partner, t: HandoverTimes, outcome: str, frames: int
 ) -> RobotCourse:
-    (goal, thick), t = place, times
-    home = _home(design, float(rng.uniform(0.3, 0.4)))
-    ready = goal + np.array([0.12 * np.sign(design.foot[0]), 0, 0])
+    home, goal = arm.random_home(rng), arm.goal
+    ready = goal + np.array([0.12 * np.sign(arm.design.foot[0]), 0, 0])
     between = t.offer + 0.7 * (t.reach - t.offer)
     leave = t.back + 0.3 if outcome != "never" else t.take + 0.4
     keys = [(t.offer, home), (between, ready), (t.reach, goal), (leave, goal), (leave + 2.0, home)]
-    wide, tight = 2 * thick + 0.05, 2 * thick
-    shut = wide - 0.015 if outcome == "never" else tight
-    return _course_of(rng, keys, [(t.reach, wide), (t.take, shut)], frames)
+    shut = arm.wide - 0.015 if outcome == "never" else arm.tight
+    return _course_of(rng, keys, [(t.reach, arm.wide), (t.take, shut)], frames)
 
 
 def _course_of(

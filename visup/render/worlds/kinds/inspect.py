@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
 from visup.render.meshes.spacecraft import mesh
-from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, spans
+from visup.render.worlds.kinds.kind import Script, bearing, cut_short, finished, frames_until, spans
 from visup.render.worlds.motion import clock, dropped, eased, frame_at, posed, still
 from visup.render.worlds.things import clutter, machines
 from visup.render.worlds.things.scenery import (
@@ -177,10 +177,8 @@ def _view(
     radius, height = sizes
     high, side = np.radians(rng.uniform(least_deg, 88)), rng.uniform(0, 2 * np.pi)
     far = 3.6 * (radius + 0.5)
-    way = np.array([np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)])
     aim = np.array([0.0, 0.0, 0.3 * height])
-    place = far * way + aim
-    view = steady(place, aim, float(rng.uniform(38, 44)), frames)
+    view = steady(aim + far * bearing(side, high), aim, float(rng.uniform(38, 44)), frames)
     return disturbed(view, rng, str(rng.choice(["fixed", "fixed", "shaking", "panning"])))
 
 

@@ -109,8 +109,12 @@ def from_around(
         side: Most radians to either side.
     """
     turn, high = rng.uniform(-side, side), np.radians(rng.uniform(*high_deg))
-    way = [np.sin(turn) * np.cos(high), -np.cos(turn) * np.cos(high), np.sin(high)]
-    return np.asarray(aim, float) + far * np.array(way)
+    return np.asarray(aim, float) + far * bearing(float(turn), float(high))
+
+
+def bearing(turn: float, high: float) -> NDArray[np.float64]:
+    """(3,) unit, from the origin towards -y, turned to the side and raised, radians."""
+    return np.array([np.sin(turn) * np.cos(high), -np.cos(turn) * np.cos(high), np.sin(high)])
 
 
 def cut_short(course: Course, end_s: float) -> Course:

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from visup.agent.model.errors import SettingsError
 from visup.render.meshes.solids import Colour, Solid, box, join, lathe
 from visup.render.worlds.kinds import pick_tasks
-from visup.render.worlds.kinds.kind import Script, cut_short, finished, frames_until, random_view
+from visup.render.worlds.kinds.kind import (
+    Script,
+    bearing,
+    cut_short,
+    finished,
+    frames_until,
+    random_view,
+)
 from visup.render.worlds.motion import carried, clock, dropped, eased, frame_at, posed, still
 from visup.render.worlds.things import clutter
 from visup.render.worlds.things.robot import (
@@ -276,11 +283,8 @@ def _layout(
 def _view(rng: np.random.Generator, frames: int) -> Viewpoint:
     side, high = rng.uniform(-0.9, 0.9), np.radians(rng.uniform(28, 62))
     far = float(rng.uniform(1.25, 1.6))
-    position = far * np.array(
-        [np.sin(side) * np.cos(high), -np.cos(side) * np.cos(high), np.sin(high)]
-    )
     aim = np.array([0.0, 0.0, 0.08])
-    return random_view(rng, position + aim, aim, frames)
+    return random_view(rng, aim + far * bearing(side, high), aim, frames)
 
 
 def _surroundings(

@@ -1,0 +1,74 @@
+"""The contracts of behaviours of the user's own, read in another process: nothing of theirs runs here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from visup.agent.contract.contract import Contract
+from visup.agent.execution.messages import Message
+from visup.agent.execution.process_runner import ChildProcess
+from visup.agent.model import errors
+from visup.agent.model.errors import BehaviourError, ErrorGroup, VisupError
+
+READING_S = 60.0
+"""How long importing a file of behaviours may take, seconds."""
+
+
+def read_contracts(
+    where: str, settings: Mapping[str, Mapping[str, Any]] | None = None
+) -> list[Contract]:
+    """The contracts of what a file or a module offers, once it is made with its settings.
+
+    Args:
+        where: `FILE.py`, or `package.module:Class`.
+        settings: Name of a behaviour -> values for its settings.
+
+    Raises:
+        BehaviourError: It is missing, does not run, ends its process, or holds no behaviour.
+        SettingsError: A setting is not as it should be.
+    """
+    asked = {"do": "contracts", "where": where, "settings": _plain(settings or {})}
+    child = ChildProcess(asked)
+    try:
+        answer = child.receive(READING_S, "its contract was not told")
+    except BehaviourError as fault:
+        raise BehaviourError(f"it does not run: {fault.what}", where=where) from fault
+    finally:
+        child.close()
+    if "fault" in answer:
+        raise _refused(answer, where)
+    try:
+        return [Contract(**_tuples(told)) for told in answer["contracts"]]
+    except (KeyError, TypeError, AttributeError) as fault:
+        raise BehaviourError("its contract cannot be read", where=where) from fault
+
+
+def _plain(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {name: dict(values) for name, values in settings.items()}
+
+
+def _tuples(told: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in told.items()}
+
+
+def _refused(answer: Message, where: str) -> VisupError:
+    """The error that the process told, with all its parts."""
+    told = answer.get("refused")
+    faults = [_error(f, where) for f in told if isinstance(f, Mapping)] if told else []
+    if len(faults) > 1:
+        return ErrorGroup(faults)
+    said = answer["fault"]
+    words = ": ".join(str(s) for s in said if s) if isinstance(said, list) else ""
+    return faults[0] if faults else BehaviourError(f"it does not run: {words[:1000]}", where=where)
+
+
+def _error(told: Mapping[str, Any], where: str) -> VisupError:
+    kind = getattr(errors, str(told.get("kind")), BehaviourError)
+    if not (isinstance(kind, type) and issubclass(kind, VisupError)):
+        kind = BehaviourError
+    if kind in (ErrorGroup, errors.ExtraMissingError):
+        kind = BehaviourError
+    texts = {k: str(told[k])[:1000] for k in ("where", "expected", "hint") if told.get(k)}
+    error: VisupError = kind(str(told.get("what"))[:1000], **{"where": where, **texts})
+    return error

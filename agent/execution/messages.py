@@ -1,0 +1,91 @@
+"""Messages between the supervisor and the process of an isolated behaviour: data, never code.
+
+A message is a JSON document of a bounded size, with its length before it. Reading and writing have
+deadlines: neither half a message nor an end that does not read holds anybody up.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic_core import from_json, to_json
+
+from visup.agent.storage.mask_codec import check_room
+
+LARGEST_BYTES = 256 * 2**20
+"""Bytes of a message; a larger one is refused unread."""
+
+_LENGTH = struct.Struct("<Q")
+_CHUNK = 2**20
+
+Message = Mapping[str, Any]
+
+
+class MessageError(Exception):
+    """What came is no message."""
+
+
+class Channel:
+    """One end of a connection; used by one thread.
+
+    Args:
+        end: A connected stream socket; it is closed with the channel.
+    """
+
+    def __init__(self, end: socket.socket) -> None:
+        self._end = end
+
+    def send(self, message: Message, seconds: float | None = None) -> None:
+        """Send a message, within so many seconds.
+
+        Raises:
+            TimeoutError: The other end does not read.
+            OSError: It is closed.
+            ValueError: The message is larger than a message may be, or holds what is no JSON.
+        """
+        body = to_json(message, inf_nan_mode="constants")
+        if len(body) > LARGEST_BYTES:
+            raise ValueError(f"it takes more than {LARGEST_BYTES >> 20} MB")
+        self._end.settimeout(seconds)
+        self._end.sendall(_LENGTH.pack(len(body)) + body)
+
+    def receive(self, seconds: float | None = None) -> Any:
+        """Wait for a message, the whole of it, for so many seconds.
+
+        Raises:
+            TimeoutError: It did not come in time.
+            EOFError: The other end is closed.
+            OSError: The connection broke.
+            MessageError: What came is no message.
+        """
+        deadline = None if seconds is None else time.monotonic() + seconds
+        (length,) = _LENGTH.unpack(self._read(_LENGTH.size, deadline))
+        if length > LARGEST_BYTES:
+            raise MessageError(f"its answer takes more than {LARGEST_BYTES >> 20} MB")
+        body = self._read(length, deadline)
+        try:
+            check_room(body)
+            return from_json(body)
+        except ValueError as fault:
+            raise MessageError(f"its answer cannot be read ({fault})") from fault
+
+    def close(self) -> None:
+        """Close this end."""
+        self._end.close()
+
+    def _read(self, count: int, deadline: float | None) -> bytes:
+        got = bytearray()
+        while len(got) < count:
+            left = None if deadline is None else deadline - time.monotonic()
+            if left is not None and left <= 0.0:
+                raise TimeoutError
+            self._end.settimeout(left)
+            part = self._end.recv(min(_CHUNK, count - len(got)))
+            if not part:
+                raise EOFError
+            got += part
+        return bytes(got)

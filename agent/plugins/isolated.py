@@ -1,0 +1,39 @@
+"""A behaviour that is not imported here: what is known of one that runs in a process of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from visup.agent.contract.contract import Contract
+from visup.agent.model.errors import BehaviourError
+from visup.agent.model.events import Directive
+from visup.agent.model.records import Frame, Observation, Percept
+
+
+@dataclass(slots=True)
+class IsolatedBehaviour:
+    """A behaviour whose code never runs in this process; give it to an agent like any other.
+
+    Attributes:
+        contract: As its own process told it.
+        where: `FILE.py`, or `package.module:Class`.
+        settings: Of this behaviour.
+    """
+
+    contract: Contract
+    where: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """Refuse: it runs in a process of its own, and nowhere else.
+
+        Raises:
+            BehaviourError: Always.
+        """
+        raise BehaviourError(
+            f"'{self.contract.name}' can only run in a process of its own", where=self.where
+        )

@@ -1,0 +1,66 @@
+"""One writer at a time for a file or a run folder: a lock that dies with whoever holds it.
+
+The lock is the operating system's, on a hidden file beside what is locked (`.NAME.lock`), which may stay: a
+process that was killed holds nothing. Reading needs no lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from filelock import BaseFileLock, FileLock, Timeout
+
+from visup.agent.model.errors import OutputError
+
+WAIT_S = 60.0
+"""How long a writer waits for another one: replacing a database takes a second or two."""
+
+
+def acquire_lock(
+    path: Path, what: str, wait_s: float = 0.0, *, again: bool = False
+) -> BaseFileLock:
+    """Become the only writer of a file; to be released by whoever asked.
+
+    Args:
+        path: What is written; it need not exist.
+        what: Such as 'this run', for the message.
+        wait_s: How long to wait for another writer, seconds.
+        again: Whether a thread that holds it may take it once more.
+
+    Raises:
+        OutputError: Another writer holds it, or no lock can be taken there.
+    """
+    if not path.parent.is_dir() or not path.name:
+        raise _unwritable(path, what, "there is no such folder")
+    lock = FileLock(path.with_name(f".{path.name}.lock"), is_singleton=again)
+    try:
+        lock.acquire(timeout=wait_s, poll_interval=0.02)
+    except Timeout as held:
+        raise OutputError(
+            f"another visup is writing {what}",
+            where=str(path),
+            hint="wait until it is done, or stop it",
+        ) from held
+    except OSError as fault:
+        raise _unwritable(path, what, fault.strerror or str(fault)) from fault
+    return lock
+
+
+def _unwritable(path: Path, what: str, why: str) -> OutputError:
+    return OutputError(
+        f"{what} cannot be written ({why})",
+        where=str(path),
+        hint="check that the folder exists, is writable and has room",
+    )
+
+
+@contextmanager
+def only_writer(path: Path, what: str) -> Iterator[None]:
+    """Hold the lock of a file while something is changed in it, once others are done; see `acquire_lock`."""
+    lock = acquire_lock(path, what, WAIT_S, again=True)
+    try:
+        yield
+    finally:
+        lock.release()

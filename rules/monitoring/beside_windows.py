@@ -1,0 +1,209 @@
+"""What formulas need beside windows: the sample before, what is told late, what begins or ends in a window.
+
+`since` with a lower bound asks its left side also after the window, `until` also before it;
+`always`, `once` and `since` without a window leave out what was told of the time before the first
+sample. All keep immutable states as the operators of `operators.py` do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any, NamedTuple
+
+from visup.rules.monitoring.intervals import FALSE, TRUE, UNKNOWN, Algebra, Interval
+from visup.rules.monitoring.samples import SAMPLE_HOLD, SelectObjects, Update, max_samples
+from visup.rules.monitoring.sliding import SlidingState, initial, later, mapped, slide
+
+
+@dataclass(frozen=True)
+class PreviousSample:
+    """`previous f`: what it was at the sample before; unknown after a silence."""
+
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its part at a sample."""
+        unknown = algebra.constant(UNKNOWN)
+
+        def step(state: tuple[int, Any] | None, now: int, value: Any) -> tuple[Any, Any]:
+            heard = state is not None and now - state[0] <= SAMPLE_HOLD
+            return (now, value), state[1] if state is not None and heard else unknown
+
+        return step
+
+    @property
+    def kept(self) -> int:
+        """Most intervals that the state holds for one choice of objects."""
+        return 1
+
+    def rows(self, state: tuple[int, Any], pick: SelectObjects) -> tuple[int, Any]:
+        """The same state for other objects; those that are new have no past."""
+        return state[0], pick(state[1], UNKNOWN)
+
+
+@dataclass(frozen=True)
+class BegunWindow:
+    """The least of what began in a window that ends now; true when nothing did.
+
+    Attributes:
+        high: Length of the window, microseconds; what stands where it begins is left out.
+    """
+
+    high: int
+
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its part at a sample."""
+        unknown, nothing = algebra.constant(UNKNOWN), algebra.constant(TRUE)
+        least, high = algebra.least, self.high
+
+        def step(state: SlidingState | None, now: int, value: Any) -> tuple[SlidingState, Any]:
+            if state is None:
+                state = initial(now, unknown)
+            elif now - state.then > SAMPLE_HOLD:
+                state = slide(state, state.then + SAMPLE_HOLD, unknown, 0, high, least)[0]
+            state = slide(state, now, value, 0, high, least)[0]
+            return state, later(state, least, nothing)
+
+        return step
+
+    @property
+    def kept(self) -> int:
+        """Most intervals that the state holds for one choice of objects."""
+        return 2 * max_samples(self.high) + 2
+
+    def rows(self, state: SlidingState, pick: SelectObjects) -> SlidingState:
+        """The same state for other objects; those that are new have no past."""
+        return mapped(state, lambda v: pick(v, UNKNOWN))
+
+
+class EndedState(NamedTuple):
+    """What `EndedWindow` retains.
+
+    Attributes:
+        standing: The value that has not ended.
+        window: The values that have, each at its end.
+    """
+
+    standing: Any
+    window: SlidingState
+
+
+@dataclass(frozen=True)
+class EndedWindow:
+    """The least of what ended in a window before now; true when nothing did.
+
+    Attributes:
+        low: How long before now the window ends, microseconds.
+        high: How long before now it begins; what ended there is left out.
+    """
+
+    low: int
+    high: int
+
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its part at a sample."""
+        unknown, nothing = algebra.constant(UNKNOWN), algebra.constant(TRUE)
+        least, low, high = algebra.least, self.low, self.high
+
+        def step(state: EndedState | None, now: int, value: Any) -> tuple[EndedState, Any]:
+            standing, window = state or (unknown, initial(now, unknown))
+            if now - window.then > SAMPLE_HOLD:
+                silent = window.then + SAMPLE_HOLD
+                standing, window = unknown, slide(window, silent, standing, low, high, least)[0]
+            window = slide(window, now, standing, low, high, least)[0]
+            return EndedState(value, window), later(window, least, nothing)
+
+        return step
+
+    @property
+    def kept(self) -> int:
+        """Most intervals that the state holds for one choice of objects."""
+        return 2 * max_samples(self.high) + 3
+
+    def rows(self, state: EndedState, pick: SelectObjects) -> EndedState:
+        """The same state for other objects; those that are new have no past."""
+        window = mapped(state.window, lambda v: pick(v, UNKNOWN))
+        return EndedState(pick(state.standing, UNKNOWN), window)
+
+
+class LateState(NamedTuple):
+    """What `DelayedUnbounded` retains.
+
+    Attributes:
+        then: Time of the last sample, microseconds.
+        born: Time of the first sample, as an interval without width; infinite before it.
+        kept: The value so far.
+    """
+
+    then: int
+    born: Any
+    kept: Any
+
+
+@dataclass(frozen=True)
+class DelayedUnbounded:
+    """`always`, `once` and `since` of what is told late: from the first sample's moment on.
+
+    What is told first is about moments before the first sample, which are no part of what was
+    watched; of these nothing is known.
+
+    Attributes:
+        kind: 'always', 'once' or 'since'.
+        delay: How late the parts are told, microseconds.
+    """
+
+    kind: str
+    delay: int
+
+    def on(self, algebra: Algebra) -> Update:
+        """How it takes in the values of its parts at a sample."""
+        a, unknown = algebra, algebra.constant(UNKNOWN)
+        lasts = self.kind == "always"
+
+        def started(born: Any, moment: int) -> Any:
+            """TRUE where a moment is not before the first sample, else FALSE."""
+            # Half a microsecond more, so that nothing is 0, which has no sign.
+            return a.scaled(a.shifted(a.scaled(born, -1.0), moment + 0.5), inf)
+
+        def joined(kept: Any, on: Any, *values: Any) -> Any:
+            if lasts:
+                return a.least(kept, a.most(values[0], a.scaled(on, -1.0)))
+            if self.kind == "since":
+                kept = a.least(kept, values[0])
+            return a.most(kept, a.least(values[-1], on))
+
+        def step(state: LateState | None, now: int, *values: Any) -> tuple[LateState, Any]:
+            if state is None:
+                state = self._initial(a, now)
+            then, born, kept = state
+            if now - then > SAMPLE_HOLD:
+                on = started(born, then + SAMPLE_HOLD - self.delay)
+                kept = joined(kept, on, *(unknown,) * len(values))
+            born = a.least(born, a.constant((float(now), float(now))))
+            on = started(born, now - self.delay)
+            kept = joined(kept, on, *values)
+            if lasts:
+                told = a.least(kept, a.most(unknown, on))
+            else:
+                told = a.most(kept, a.least(unknown, a.scaled(on, -1.0)))
+            return LateState(now, born, kept), told
+
+        return step
+
+    def _initial(self, algebra: Algebra, now: int) -> LateState:
+        return LateState(now, algebra.constant(_UNBORN), algebra.constant(self._empty))
+
+    @property
+    def _empty(self) -> Interval:
+        return TRUE if self.kind == "always" else FALSE
+
+    @property
+    def kept(self) -> int:
+        """Most intervals that the state holds for one choice of objects."""
+        return 2
+
+    def rows(self, state: LateState, pick: SelectObjects) -> LateState:
+        """The same state for other objects; those that are new have no past."""
+        return LateState(state.then, pick(state.born, _UNBORN), pick(state.kept, self._empty))
+
+
+_UNBORN: Interval = (inf, inf)

@@ -1,0 +1,46 @@
+"""Samples of plain signals from any source: what is taken for a time, for a value, for unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf, isfinite
+from typing import SupportsFloat
+
+from visup.agent.model.errors import SettingsError
+from visup.rules.formula.units import TICKS, ticks
+from visup.rules.monitoring.intervals import UNKNOWN, Interval
+
+SignalValue = SupportsFloat | Interval | None
+"""A number of Python or NumPy, an interval, or None where nothing is known."""
+Signals = Mapping[str, SignalValue]
+
+
+def later(time: float, before: int | None) -> int:
+    """The moment of a sample in microseconds, which must come after the one before."""
+    if not isfinite(time):
+        raise SettingsError(
+            f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
+        )
+    now = ticks(time)
+    if before is not None and now <= before:
+        what = f"a sample at {time:.6g} s comes after one at {before / TICKS:.6g} s"
+        raise SettingsError(what, expected="times that increase", hint="sort samples by their time")
+    return now
+
+
+_LEAVE_OUT = "leave samples without a time out"
+
+
+def known_interval(value: SignalValue) -> Interval:
+    """What a signal says, in Python's floats: those of NumPy are slower and warn."""
+    if type(value) is float and value == value:  # NaN is not equal to itself
+        return (value, value)
+    if value is None:
+        return UNKNOWN
+    low, high = value if isinstance(value, tuple) else (value, value)
+    low, high = float(low), float(high)
+    low, high = -inf if low != low else low, inf if high != high else high
+    if low > high:
+        what = f"a signal is the interval ({low:g}, {high:g})"
+        raise SettingsError(what, expected="the lower bound first")
+    return (low, high)

@@ -1,0 +1,168 @@
+"""What a run folder may make visup do: nothing but to read it. And who may write it: one at a time."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from tests.clips import moving_disc, write_clip
+from tests.runs.test_resume import BARE, Pulled, broken_run
+from visup.agent import Frame
+from visup.agent.model.errors import OutputError, SettingsError
+from visup.agent.model.step import Step
+from visup.agent.storage.journal import Journal
+from visup.agent.storage.journal_reader import JOURNAL, Recording
+from visup.runs.resume import interrupted_run
+from visup.runs.runner import Audience, fresh_folder, supervise
+from visup.runs.settings import RunOptions, WatchSettings
+
+PLUG_IN = """
+from pathlib import Path
+from visup.agent import Contract
+
+Path({mark!r}).touch()
+
+
+class Lamp:
+    contract = Contract("lamp", gives=("lamp",))
+
+    def perceive(self, frame, seen, directives):
+        return ()
+"""
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> WatchSettings:
+    return WatchSettings(source=str(write_clip(tmp_path / "disc.avi", moving_disc(12), fps=20.0)))
+
+
+def written(journal: Path, **facts: object) -> None:
+    """Change what a journal says of its run, as a stranger may."""
+    import json
+    import sqlite3
+
+    db = sqlite3.connect(journal)
+    (text,) = db.execute("SELECT value FROM run WHERE key = 'settings'").fetchone()
+    row = (json.dumps({**json.loads(text), **facts}),)
+    db.execute("UPDATE run SET value = ? WHERE key = 'settings'", row)
+    db.commit()
+    db.close()
+
+
+@pytest.mark.parametrize("named", [{"behaviours": ["{file}"]}, {"plugins": ["shape"]}])
+def test_code_that_a_run_folder_names_does_not_run(
+    clip: WatchSettings, tmp_path: Path, named: dict[str, list[str]]
+) -> None:
+    mark, file = tmp_path / "it ran", tmp_path / "lamp.py"
+    file.write_text(PLUG_IN.format(mark=str(mark)))
+    broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
+    named = {kind: [n.format(file=file) for n in names] for kind, names in named.items()}
+    written(tmp_path / "run" / JOURNAL, **named)
+    with pytest.raises(SettingsError, match="cannot have code run") as refused:
+        interrupted_run(tmp_path / "run")
+    assert not mark.exists()
+    assert all(name in (refused.value.hint or "") for names in named.values() for name in names)
+
+
+def test_it_runs_once_it_is_named_again_wherever_it_is_now(
+    clip: WatchSettings, tmp_path: Path
+) -> None:
+    mark, file = tmp_path / "it ran", tmp_path / "lamp.py"
+    broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
+    written(tmp_path / "run" / JOURNAL, behaviours=["/somewhere/else/lamp.py"])
+    file.write_text(PLUG_IN.format(mark=str(mark)))
+    past = interrupted_run(tmp_path / "run", behaviours=(file,))
+    assert supervise(past.settings, tmp_path / "run", options=BARE, past=past).steps == 12
+    assert mark.exists()
+
+
+def test_other_code_than_the_run_had_is_refused(clip: WatchSettings, tmp_path: Path) -> None:
+    broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
+    with pytest.raises(SettingsError, match="no behaviours of its own"):
+        interrupted_run(tmp_path / "run", plugins=("shape",))
+
+
+def test_a_live_run_is_not_resumed_and_loses_nothing(clip: WatchSettings, tmp_path: Path) -> None:
+    refused = []
+
+    def meanwhile(step: Step, frame: Frame) -> None:
+        if step.frame_index == 6:
+            past = interrupted_run(tmp_path / "run")
+            with pytest.raises(OutputError, match="another visup is writing this run") as told:
+                supervise(past.settings, tmp_path / "run", options=BARE, past=past)
+            refused.append(told)
+
+    folder = fresh_folder(tmp_path / "run", "")
+    supervise(clip, folder, audience=Audience([meanwhile]), options=BARE)
+    assert refused
+    run = Recording.open(folder)
+    assert (run.count(), run.facts()["ended"]) == (12, "complete")
+
+
+def test_a_run_that_somebody_else_went_on_with_is_not_gone_on_with(
+    clip: WatchSettings, tmp_path: Path
+) -> None:
+    broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
+    first, second = interrupted_run(tmp_path / "run"), interrupted_run(tmp_path / "run")
+    supervise(first.settings, tmp_path / "run", options=BARE, past=first)
+    with pytest.raises(OutputError, match="gone on with this run meanwhile"):
+        supervise(second.settings, tmp_path / "run", options=BARE, past=second)
+    assert Recording.open(tmp_path / "run").facts()["ended"] == "complete"
+
+
+def test_two_runs_into_one_folder_are_told_apart_in_words(
+    clip: WatchSettings, tmp_path: Path
+) -> None:
+    folder = fresh_folder(tmp_path / "run", "")
+    journal = Journal(folder / JOURNAL)
+    with pytest.raises(OutputError, match="another visup is writing this run"):
+        supervise(clip, folder, options=BARE)
+    journal.close()
+    with pytest.raises(OutputError, match="a run is recorded here already"):
+        supervise(clip, folder, options=BARE)
+
+
+def test_runs_that_begin_at_once_are_given_folders_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found: list[Path] = []
+    begin = threading.Barrier(8)
+
+    def start() -> None:
+        begin.wait()
+        found.append(fresh_folder(None, "clip.mp4"))
+
+    threads = [threading.Thread(target=start) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(set(found)) == 8
+
+
+def test_a_killed_writer_leaves_no_lock(clip: WatchSettings, tmp_path: Path) -> None:
+    import os
+    import signal
+
+    folder = tmp_path / "run"
+    folder.mkdir()
+    child = os.fork()
+    if child == 0:
+        Journal(folder / JOURNAL)
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    Journal(folder / JOURNAL, resume=True).close()
+
+
+def test_the_plug_that_is_pulled_releases_the_folder(clip: WatchSettings, tmp_path: Path) -> None:
+    def pull(step: Step, frame: Frame) -> None:
+        raise Pulled
+
+    folder = fresh_folder(tmp_path / "run", "")
+    with pytest.raises(Pulled):
+        supervise(clip, folder, audience=Audience([pull]), options=BARE)
+    past = interrupted_run(folder)
+    assert supervise(past.settings, folder, options=BARE, past=past).steps == 12

@@ -1,0 +1,136 @@
+"""Servers that mean harm, or are in trouble: a webhook is neither led astray nor held up by them."""
+
+from __future__ import annotations
+
+import itertools
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from visup.sinks.webhook import Webhook
+
+Answer = Callable[[socket.socket], None]
+
+
+@contextmanager
+def server(answer: Answer) -> Iterator[tuple[str, list[bytes]]]:
+    """A server that answers each connection so; it keeps what was sent to it."""
+    got: list[bytes] = []
+
+    def serve(listening: socket.socket) -> None:
+        with suppress(OSError):
+            while True:
+                client, _ = listening.accept()
+                with client, suppress(OSError):
+                    got.append(request(client))
+                    answer(client)
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        thread = threading.Thread(target=serve, args=(listening,), daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}/hook", got
+        listening.shutdown(socket.SHUT_RDWR)
+    thread.join(10.0)
+
+
+def request(client: socket.socket) -> bytes:
+    client.settimeout(5.0)
+    data = b""
+    while b"\r\n\r\n" not in data or not data.endswith(b"}"):
+        if not (part := client.recv(65536)):
+            break
+        data += part
+    return data
+
+
+def says(text: bytes) -> Answer:
+    return lambda client: client.sendall(text)
+
+
+def without_end(begin: bytes, more: bytes, pause_s: float = 0.0) -> Answer:
+    def answer(client: socket.socket) -> None:
+        client.sendall(begin)
+        for _ in itertools.count():
+            client.sendall(more)
+            time.sleep(pause_s)
+
+    return answer
+
+
+def hook(url: str) -> Webhook:
+    return Webhook(url, timeout_s=0.5, tries=2, wait=lambda seconds: None)
+
+
+@pytest.mark.parametrize("status", [301, 302, 303, 307, 308])
+@pytest.mark.parametrize("scheme", ["http", "file", "ftp"])
+def test_no_redirect_is_followed_and_none_counts_as_delivered(status: int, scheme: str) -> None:
+    with server(says(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")) as (other, reached):
+        place = other if scheme == "http" else f"{scheme}:///etc/passwd"
+        answer = f"HTTP/1.1 {status} Moved\r\nLocation: {place}\r\nContent-Length: 0\r\n\r\n"
+        with server(says(answer.encode())) as (url, asked):
+            with pytest.raises(OSError, match=f"{status}.*not followed"):
+                hook(url).deliver({"a": 1})
+            assert len(asked) == 1
+        assert not reached
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        without_end(b"HTTP/1.1 200 OK\r\n", b"X-More: and more\r\n"),
+        without_end(b"HTTP/1.1 200 OK\r\nX: ", b"y"),
+        without_end(b"", b"H", 0.1),
+        without_end(b"HTTP/1.1 200 ", b"O", 0.1),
+        says(b"nonsense\r\n\r\n"),
+        says(b"HTTP/1.1 abc OK\r\n\r\n"),
+        says(b""),
+        lambda client: time.sleep(1.5),
+    ],
+)
+def test_an_answer_without_end_ends_in_time(answer: Answer) -> None:
+    with server(answer) as (url, _):
+        begin = time.monotonic()
+        with pytest.raises(OSError, match=r"."):
+            hook(url).deliver({"a": 1})
+        assert time.monotonic() - begin < 4.0
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        without_end(b"HTTP/1.1 200 OK\r\n\r\n", b"body" * 1000),
+        without_end(b"HTTP/1.1 200 OK\r\nContent-Length: 999999999999\r\n\r\n", b"x", 0.1),
+        without_end(b"HTTP/1.1 204 OK\r\nTransfer-Encoding: chunked\r\n\r\n", b"1\r\nx\r\n", 0.1),
+    ],
+)
+def test_of_a_body_nothing_is_read(answer: Answer) -> None:
+    with server(answer) as (url, got):
+        begin = time.monotonic()
+        hook(url).deliver({"a": 1})
+        assert time.monotonic() - begin < 2.0
+        assert got[0].endswith(b'{"a":1}')
+
+
+def test_words_of_the_server_are_not_repeated() -> None:
+    with (
+        server(says(b"HTTP/1.1 404 \x1b[2J\x1b]0;owned\x07\r\nContent-Length: 0\r\n\r\n")) as (
+            url,
+            _,
+        ),
+        pytest.raises(OSError, match="404") as told,
+    ):
+        hook(url).deliver({"a": 1})
+    assert str(told.value) == "the server answered 404 (Not Found)"
+
+
+def test_records_follow_each_other_on_new_connections() -> None:
+    with server(says(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")) as (url, got):
+        one = hook(url)
+        for n in range(3):
+            one.deliver({"n": n})
+        one.close()
+    assert [g[-7:] for g in got] == [b'{"n":0}', b'{"n":1}', b'{"n":2}']

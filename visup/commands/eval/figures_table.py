@@ -1,0 +1,126 @@
+"""Figures by item as tables that are whole at 80 columns, however many figures and items there are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+Rows = Mapping[str, Mapping[str, Any]]
+Cells = Mapping[str, Mapping[str, str]]
+
+WIDTH = 80
+LONGEST_NAME = 26
+"""Longer names of items are folded."""
+
+HEADINGS = {
+    "verdicts_right": "right",
+    "false_alerts_per_min": "false alerts /min",
+    "false_alerts_per_hour": "false alerts /hour",
+    "false_reports_per_hour": "false reports /hour",
+}
+"""Headings that are shorter than their keys in the file of figures."""
+
+SHORT_WORDS = {"interrupted": "interr.", "in_progress": "in pr.", "succeeded": "succ."}
+"""Verdicts are long words for narrow columns: these stand in where the whole words find no room."""
+
+
+def figures_tables(title: str, figures: Mapping[str, Any], keys: Sequence[str]) -> Iterator[Table]:
+    """Figures as tables that fit 80 columns.
+
+    Items are rows if that fits, else figures are rows and items are numbered columns if that fits, else
+    the figures are spread over several tables.
+
+    Args:
+        title: Of the table.
+        figures: With `items` by name and `total`.
+        keys: Which figures, in order; those that no item has are left out.
+    """
+    rows: Rows = {**figures["items"], "total": figures["total"]}
+    shown = [k for k in keys if any(k in row for row in rows.values())]
+    for cells in (_cells(rows, shown, {}), _cells(rows, shown, SHORT_WORDS)):
+        if _fits([_name_width(rows), *_widths(cells, shown)]):
+            yield _wide(title, cells, shown)
+            return
+        if len(rows) <= len(shown) and _fits([max(map(len, shown)), *_turned_widths(cells, shown)]):
+            yield _tall(title, cells, shown)
+            return
+    for number, part in enumerate(_parts(cells, shown)):
+        yield _wide(f"{title} (continued)" if number else title, cells, part)
+
+
+def _cells(rows: Rows, keys: Sequence[str], short: Mapping[str, str]) -> Cells:
+    return {name: {k: _cell(row.get(k), short) for k in keys} for name, row in rows.items()}
+
+
+def _cell(value: object, short: Mapping[str, str]) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+    return short.get(str(value), str(value))
+
+
+def _words(key: str) -> list[str]:
+    return HEADINGS.get(key, key.replace("_", " ")).split()
+
+
+def _name_width(rows: Mapping[str, object]) -> int:
+    return min(LONGEST_NAME, max(map(len, rows)))
+
+
+def _widths(cells: Cells, keys: Sequence[str]) -> list[int]:
+    """Of each figure's column: its widest cell, or the longest word of its heading."""
+    return [max(len(text) for text in (*_words(k), *(c[k] for c in cells.values()))) for k in keys]
+
+
+def _turned_widths(cells: Cells, keys: Sequence[str]) -> list[int]:
+    """Of each item's column, when figures are rows."""
+    return [max(5, *(len(row[k]) for k in keys)) for row in cells.values()]
+
+
+def _fits(widths: Sequence[int]) -> bool:
+    """Whether columns of these widths and the lines between them find room."""
+    return 1 + sum(w + 1 for w in widths) <= WIDTH
+
+
+def _parts(cells: Cells, keys: Sequence[str]) -> Iterator[list[str]]:
+    """The figures in parts, each as large as finds room."""
+    names, part = _name_width(cells), list[str]()
+    for key in keys:
+        if part and not _fits([names, *_widths(cells, [*part, key])]):
+            yield part
+            part = []
+        part.append(key)
+    yield part
+
+
+def _wide(title: str, cells: Cells, keys: Sequence[str]) -> Table:
+    table = _table(title)
+    table.add_column("", overflow="fold", width=_name_width(cells))
+    # Widths are given: left to itself, rich makes room for whole headings at the cost of the cells.
+    for key, width in zip(keys, _widths(cells, keys), strict=True):
+        table.add_column(" ".join(_words(key)), justify="right", width=width)
+    for name, row in cells.items():
+        if name == "total":
+            table.add_section()
+        table.add_row(name, *(row[k] for k in keys))
+    return table
+
+
+def _tall(title: str, cells: Cells, keys: Sequence[str]) -> Table:
+    """Figures as rows; items as numbered columns, whose names stand below."""
+    names = [name for name in cells if name != "total"]
+    table = _table(title)
+    table.add_column("", no_wrap=True)
+    for heading in (*(str(n) for n in range(1, len(names) + 1)), "total"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for key in keys:
+        table.add_row(key, *(row[key] for row in cells.values()))
+    table.caption = ", ".join(f"{n} {name}" for n, name in enumerate(names, start=1))
+    return table
+
+
+def _table(title: str) -> Table:
+    return Table(title=title, title_justify="left", caption_justify="left", padding=(0, 0))

@@ -1,0 +1,72 @@
+"""Behaviours of the user's own in a run: found, made with their settings.
+
+Their contracts are read in another process. Those that run in a process of their own are never imported
+here, unless another one of the same file is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from visup.agent import Behaviour, Contract
+from visup.agent.execution.contracts import read_contracts
+from visup.agent.model.errors import SettingsError
+from visup.agent.plugins.factory import load_behaviours
+from visup.agent.plugins.isolated import IsolatedBehaviour
+from visup.agent.plugins.registry import discover_behaviours
+from visup.runs.settings import WatchSettings
+
+OWN = "visup."
+"""Modules of visup itself, which need no process to look at them in."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Offer:
+    """A file or module, and the contracts of what it offers; None where it is visup's own."""
+
+    where: str
+    contracts: tuple[Contract, ...] | None
+
+
+def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
+    """The behaviours that a run adds to those of visup: installed ones, then those of files and modules.
+
+    Raises:
+        BehaviourError: One cannot be found or made.
+        SettingsError: A setting is not as it should be, or is for a behaviour that is not there.
+    """
+    registry = discover_behaviours() if settings.plugins else None
+    named = [registry.where(name) for name in settings.plugins] if registry else []
+    values = settings.plugin_settings
+    offers = []
+    for where in (*named, *map(str, settings.behaviours)):
+        own = where.startswith(OWN)
+        offers.append(_Offer(where, None if own else tuple(read_contracts(where, values))))
+    made = [b for offer in offers for b in _made(offer, settings)]
+    _check_known(settings, [b.contract.name for b in made])
+    return made
+
+
+def _made(offer: _Offer, settings: WatchSettings) -> Iterable[Behaviour]:
+    values = settings.plugin_settings
+    told = offer.contracts
+    apart = {c.name: c for c in told or () if c.isolate or c.name in settings.isolate}
+    if told is None or len(apart) < len(told):
+        for behaviour in load_behaviours(offer.where, values):
+            if behaviour.contract.name not in apart:
+                yield behaviour
+    for name, contract in apart.items():
+        yield IsolatedBehaviour(contract, offer.where, values.get(name, {}))
+
+
+def _check_known(settings: WatchSettings, known: list[str]) -> None:
+    for name in settings.plugin_settings:
+        if name not in known:
+            raise SettingsError(
+                f"there is no behaviour called '{name}' to set",
+                expected=f"one of: {', '.join(known)}"
+                if known
+                else "a behaviour that is plugged in",
+                hint=None if known else "add it with --behaviour FILE or --plugin NAME",
+            )

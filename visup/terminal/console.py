@@ -1,0 +1,96 @@
+"""All that visup prints goes through here, so that no text of others reaches the terminal as a command to it.
+
+Names of models, texts of tasks, a server's answer may hold anything, also sequences that clear the
+screen, set its title, or turn the reading order round. `tests/terminal/test_console.py` sees to it that
+nothing else in visup prints. Nobody has to read it either: when the reader goes away (as in
+`visup watch ... | head -1`), what is said from then on is lost, and a supervisor goes on.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderResult
+    from rich.measure import Measurement
+
+
+def make_console(**options: Any) -> Console:
+    """A console of rich that prints only what `printable` lets through.
+
+    Args:
+        options: As of `rich.console.Console`; nothing is highlighted unless asked for.
+    """
+    from rich.console import Console, RenderHook
+
+    class Printable(RenderHook):
+        def process_renderables(
+            self, renderables: list[ConsoleRenderable]
+        ) -> list[ConsoleRenderable]:
+            return [_Cleaned(r) for r in renderables]
+
+    class Patient(Console):
+        def on_broken_pipe(self) -> None:
+            self.quiet = True
+            _reader_has_gone()
+
+    console = Patient(**{"highlight": False, **options})
+    console.push_render_hook(Printable())
+    return console
+
+
+class _Cleaned:
+    """Something to be printed, without what a terminal would obey."""
+
+    def __init__(self, shown: ConsoleRenderable) -> None:
+        self._shown = shown
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.segment import Segment
+
+        from visup.wording import printable
+
+        for text, style, control in console.render(self._shown, options):
+            # What rich itself says to the terminal is not text.
+            yield Segment(text if control else printable(text), style, control)
+
+    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
+        from rich.measure import Measurement
+
+        return Measurement.get(console, options, self._shown)
+
+
+def echo(text: str = "", *, nl: bool = True) -> None:
+    """Print a text as it is, but for what a terminal would obey; at once."""
+    from visup.wording import printable
+
+    _print(printable(text), "\n" if nl else "")
+
+
+def echo_json(value: Any, **options: Any) -> None:
+    """Print a value as JSON, on one line unless the options of `json.dumps` say otherwise."""
+    from visup.wording import escaped_json
+
+    _print(escaped_json(value, **options))
+
+
+def _print(text: str, end: str = "\n") -> None:
+    try:
+        print(text, end=end, flush=True)
+    except BrokenPipeError:
+        _reader_has_gone()
+
+
+def _reader_has_gone() -> None:
+    """Let what is printed from now on go nowhere; Python flushes what is left when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def complain(message: str) -> None:
+    """Print an error to standard error."""
+    from rich.text import Text
+
+    console = make_console(stderr=True, soft_wrap=True)
+    console.print(Text("error: ", style="bold red") + Text(message))
