@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 
 from visup.agent import ObjectBelief, Region
-from visup.rules.formula.truth import MAYBE
+from visup.rules.formula.truth import MAYBE, YES
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import GAP
-from visup.rules.predicates.snapshot import YES, Codes, Snapshot, code
+from visup.rules.predicates.snapshot import Codes, Snapshot, code
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.presence.settings import PresenceSettings

@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from visup.agent import Mind, ObjectBelief
-from visup.rules.geometry._fit_jit import fit_motion
+from visup.rules.geometry._recent_motion_jit import fit_motion
 from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
 from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, image_diagonal

@@ -59,7 +59,6 @@ from visup.rules.relations._pair_states_jit import (
     smoothed_outlines,
 )
 from visup.rules.relations._thresholds_jit import classify_boxes, signs_with_hysteresis
-from visup.rules.relations.camera import drifted
 from visup.rules.relations.direction import CONVERSE as DIRECTION_CONVERSE
 from visup.rules.relations.direction import DIRECTION_NAMES
 from visup.rules.relations.distance import CLASS_NAMES
@@ -89,7 +88,7 @@ from visup.rules.relations.rows import (
 )
 from visup.rules.relations.rows import TableRow as T
 from visup.rules.relations.rows import ValueRow as V
-from visup.rules.relations.samples import SampleWindow, covers_window, sampled
+from visup.rules.relations.samples import SampleWindow, covers_window, drifted, sampled
 from visup.rules.relations.thresholds import least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 from visup.rules.smoothing.ema import new_share

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent import Mind, ObjectBelief, Observation, Presence
+from visup.agent import CameraMotion, Mind, ObjectBelief, Observation, Presence
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.outlines import write_support
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, hull_separation
@@ -101,6 +102,29 @@ def sampled(
     return extended(without_reassigned(history, mind), row, old)
 
 
+def drifted(before: Floats, objects: Sequence[ObjectBelief], observation: Observation) -> Floats:
+    """How far the camera's own motion has moved the picture where each object is, after one more frame.
+
+    What rests in the scene moves through the picture of a camera that pans, shakes or zooms. The motion
+    is taken at the middle of an object, so that of a zoom or a turn only the shift is taken off, not
+    the growth. Where nobody tells of the camera it is taken to rest.
+
+    Args:
+        before: (M, 2) pixels, up to the frame before.
+        objects: M of them.
+        observation: What was perceived; of several motions of the camera the last counts.
+
+    Returns:
+        (M, 2) pixels; the same array where the camera rests.
+    """
+    told: Sequence[CameraMotion] = observation.of("camera")
+    if not told or np.array_equal(told[-1].motion, np.eye(2, 3)):
+        return before
+    moved = [told[-1].displacement(b.region.centroid) for b in objects]
+    drift: Floats = before + np.array(moved).reshape(-1, 2)
+    return drift
+
+
 def covers_window(history: SampleWindow, window_s: float) -> bool:
     """Whether enough of the window is filled for a fit: six samples over three fifths of it."""
     times = history.times
@@ -145,7 +169,8 @@ def without_oldest(history: SampleWindow, old: int) -> SampleWindow:
     """A history without its `old` oldest samples."""
     if not old:
         return history
-    return SampleWindow(history.ids, *(a[old:] for a in history.arrays), history.start + old)
+    left = (a[old:] for a in history.arrays)
+    return _window(history.ids, left, history.start + old)
 
 
 def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> SampleWindow:
@@ -162,7 +187,7 @@ def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> Sampl
     for values, new in zip(memory, row, strict=True):
         values[end] = new
     start = history.start + old
-    return SampleWindow(history.ids, *(m[start : end + 1] for m in memory), start)
+    return _window(history.ids, (m[start : end + 1] for m in memory), start)
 
 
 def _with_room(history: SampleWindow, more: int) -> SampleWindow:
@@ -175,4 +200,10 @@ def _with_room(history: SampleWindow, more: int) -> SampleWindow:
         wide[:count] = values
         return wide[:count]
 
-    return SampleWindow(history.ids, *map(roomy, history.arrays))
+    return _window(history.ids, map(roomy, history.arrays))
+
+
+def _window(ids: tuple[int, ...], arrays: Iterable[NDArray[Any]], start: int = 0) -> SampleWindow:
+    """The samples of some objects, from arrays in the order of `SampleWindow.arrays`."""
+    times, support, free, separation, depth, drift = arrays
+    return SampleWindow(ids, times, support, free, separation, depth, drift, start)

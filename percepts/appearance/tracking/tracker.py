@@ -137,7 +137,8 @@ class ThingTracker:
         seen = [t for t in self.tracks if t.state in IN_VIEW]
         if self._static and seen and len(resting) == len(seen):
             # The camera rests, too: what it shows has not moved by a pixel.
-            moved, camera = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64)), STILL
+            moved = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64))
+            camera: Doubles | None = STILL
         else:
             taken = _taken(self.tracks, old)
             self._scenery, camera = followed_camera(self._scenery, old, scene, taken)
