@@ -78,7 +78,8 @@ def _was_part(context: StepContext, part: ObjectBelief, whole: ObjectBelief) -> 
 def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
     """How well a new region suits a missing object; 0 when it does not."""
     track = context.of[old.id]
-    if new.id in context.recognised and old.confidence > 0.9 and new.name == old.name:
+    named = bool(new.candidates and old.candidates) and new.name == old.name
+    if named and new.id in context.recognised and old.confidence > 0.9:
         return 1.0  # there is but one of what was shown by a name
     if track.merged_with is not None:
         iou = box_iou(new.region.bbox, old.region.bbox)

@@ -304,7 +304,8 @@ def classify_motion(
             k += 1
             rate, sigma = tables[PairQuantity.RATE, i, j], tables[PairQuantity.SIGMA, i, j]
             # What two that move as one do to their distance is no trend: they sway.
-            sway = SWAY * min(now.speed[i], now.speed[j])
+            known = np.isfinite(now.speed[i]) and np.isfinite(now.speed[j])
+            sway = SWAY * min(now.speed[i], now.speed[j]) if known else 0.0
             least = max(rates[0], sway), max(rates[1], sway)
             found = classify_trend(rate, sigma, state[0, k], pending[0, k], least, limits.sigmas)
             found = combined_trend(found, codes[3, k])
