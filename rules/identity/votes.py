@@ -364,10 +364,10 @@ def _identified(
     # By its model alone: the part that it plays in a task may be another's, and lags behind.
     words = spaced(called(mind, belief.name))
     if before is None:
-        text = f"An object {seems(belief.confidence)} the {words}."
+        text = f"Object {belief.id} {seems(belief.confidence)} the {words}."
     else:
         was = spaced(called(mind, before))
-        text = f"The object taken for the {was} {seems(belief.confidence)} the {words}."
+        text = f"Object {belief.id}, taken for the {was}, {seems(belief.confidence)} the {words}."
     data = MappingProxyType({"name": belief.name, "before": before})
     return Event(
         "identified",

@@ -1,4 +1,4 @@
-"""Sentences for people: 'An object, believed to be the satellite, appears to be ...' (paper, 1)."""
+"""Sentences for people: 'Object 2, believed to be the satellite, appears to be ...' (after the paper, 1)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from functools import lru_cache
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
-ORDINALS = ("an", "a second", "a third", "a fourth", "a fifth", "a sixth", "a seventh", "an eighth")
 SURE, LIKELY = 0.95, 0.5
 """Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
 
@@ -52,22 +51,18 @@ def called(mind: Mind, model: str) -> str:
     return next((a for a, models in sorted(mind.actors.items()) if model in models), model)
 
 
-def describe(mind: Mind, object_id: int, nth: int = 0) -> str:
+def describe(mind: Mind, object_id: int) -> str:
     """An object in words, as a person would first mention it.
 
     Args:
         mind: The mind.
         object_id: Any object id.
-        nth: How many other objects the sentence mentioned before it.
 
     Returns:
-        Such as 'an object, believed to be the satellite,' without the last comma.
+        Such as 'object 2, believed to be the satellite', or 'object 3' when nobody knows what it is.
     """
     name = believed_name(mind, object_id)
-    ordinal = ORDINALS[min(nth, len(ORDINALS) - 1)]
-    if name is not None:
-        return f"{ordinal} object, believed to be the {spaced(name)}"
-    return "an unidentified object" if nth == 0 else f"{ordinal}, unidentified object"
+    return f"object {object_id}" + (f", believed to be the {spaced(name)}" if name else "")
 
 
 def short(mind: Mind, object_id: int) -> str:
@@ -108,8 +103,7 @@ def sentence(mind: Mind, template: str, *ids: int, confidence: float = 0.8) -> s
         mind: The mind.
         template: Text with `{0}`, `{1}`, ... for the objects in the order of `ids`, and a verb of
             `VERBS`, such as `{is}`, for what its confidence grades. An object's first mention
-            describes it, later ones say 'it' when it is the only one, else 'the first object',
-            'the second object'.
+            describes it, later ones say 'it' when it is the only one, else what `short` calls it.
         ids: The objects.
         confidence: 0 to 1; how strong the verb is.
 
@@ -158,10 +152,7 @@ def spaced(name: str) -> str:
 
 def _mention(mind: Mind, object_id: int, mentioned: list[int]) -> str:
     if object_id in mentioned:
-        return "it" if len(mentioned) == 1 else f"the {_ORDER[mentioned.index(object_id)]} object"
+        return "it" if len(mentioned) == 1 else short(mind, object_id)
     mentioned.append(object_id)
-    words = describe(mind, object_id, len(mentioned) - 1)
+    words = describe(mind, object_id)
     return f"{words}," if "believed" in words else words
-
-
-_ORDER = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")

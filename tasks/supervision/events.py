@@ -173,7 +173,7 @@ def _stage_event(kind: str, stage: StageBelief, belief: TaskBelief, mind: Mind) 
 
 def _introduction(stage: StageBelief, belief: TaskBelief, mind: Mind) -> str:
     """The sentence with which a task begins: it says who is believed to take part."""
-    who = ", and ".join(describe(mind, i, n) for n, i in enumerate(_objects(belief)))
+    who = ", and ".join(describe(mind, i) for i in _objects(belief))
     return f"Stage `{stage.stage}` of task `{belief.task}` has begun, with {who}."
 
 

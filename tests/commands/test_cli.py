@@ -6,16 +6,15 @@ import json
 import os
 import re
 import sqlite3
-import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from tests.cli import Call, caller
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
-from visup.cli import main
 from visup.commands.doctor import EXTRAS, LIBRARIES
 
 MISTAKES = """\
@@ -26,12 +25,6 @@ MISTAKES = """\
 """
 
 
-class Result:
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-
-Call = Callable[..., Result]
 Make = Callable[[Path], list[object]]
 
 
@@ -40,19 +33,7 @@ def visup(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Call:
     monkeypatch.chdir(tmp_path)
-
-    def call(*words: object) -> Result:
-        monkeypatch.setattr(sys, "argv", ["visup", *map(str, words)])
-        capfd.readouterr()
-        try:
-            main()
-            code = 0
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capfd.readouterr()
-        return Result(code, out, err)
-
-    return call
+    return caller(monkeypatch, capfd)
 
 
 @pytest.fixture

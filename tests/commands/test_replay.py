@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli import Call
 from tests.clips import moving_disc, write_clip
-from tests.commands.test_cli import Call, visup
+from tests.commands.test_cli import visup
 from visup.agent.storage.journal_reader import JOURNAL
 
 __all__ = ["visup"]  # the fixture

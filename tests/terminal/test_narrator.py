@@ -14,11 +14,19 @@ def event(text: str, severity: Severity = Severity.INFO, kind: str = "entry") ->
     return Event(kind, 12.34, 308, text, severity=severity)
 
 
-def printed(*events: Event) -> str:
+def printed(*events: Event, terminal: bool = True) -> str:
     out = io.StringIO()
     for it in events:
-        Narrator(Console(file=out, width=80)).print_event(it)
+        console = Console(file=out, width=80, force_terminal=terminal, color_system=None)
+        Narrator(console).print_event(it)
     return out.getvalue()
+
+
+def test_a_pipe_is_given_one_line_for_each_event_neither_wrapped_nor_padded() -> None:
+    words = ("word " * 40).strip()
+    assert printed(event(words), event("It is."), terminal=False) == (
+        f"  12.3 s   {words}\n  12.3 s   It is.\n"
+    )
 
 
 def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:

@@ -69,21 +69,25 @@ def replay(
         recording,
         settings,
         folder,
-        None if silent else lambda step: narrator.print_events(step.events),
+        None if silent else narrator,
     )
+    if not silent:
+        narrator.finish()
     console.print(_speed(told), style="dim")
     if other is None:
-        raise typer.Exit(_print_verdict(console, told))
+        raise typer.Exit(_print_verdict(console, told, has_task=bool(settings.tasks)))
     raise typer.Exit(_print_changes(console, other, told, comparison.quiet))
 
 
-def _print_verdict(console: Console, told: Transcript) -> int:
+def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int:
     """Print how the replay ended; the exit code."""
     from visup.agent import Verdict
+    from visup.runs.result import RunResult
     from visup.terminal.narrator import verdict_line
 
-    console.print(verdict_line(Verdict(told.verdict) if told.verdict else None))
-    return int(told.failed)
+    verdict = Verdict(told.verdict) if told.verdict else None
+    console.print(verdict_line(verdict, has_task=has_task))
+    return RunResult(verdict, told.steps, has_task=has_task).exit_code
 
 
 def _print_changes(console: Console, other: Recording, told: Transcript, quiet: bool) -> int:

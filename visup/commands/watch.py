@@ -36,6 +36,9 @@ class Presentation:
 
     out: Annotated[Path | None, Option("Run folder (default: runs/NAME).", metavar="DIR")] = None
     quiet: Annotated[bool, Option("Print only the verdict.", "--quiet")] = False
+    verbose: Annotated[
+        bool, Option("Print every event, also of objects that nobody knows.", "--verbose")
+    ] = False
     as_json: Annotated[bool, Option("Print events as JSON, one per line.", "--json")] = False
     answers: Annotated[
         Mapping[int, str],
@@ -72,7 +75,8 @@ def watch(
 ) -> None:
     """Watch a video and say whether the work goes well.
 
-    Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input.
+    Exit code: 0 when it went well, 1 when it failed, was unsafe or could not be followed, 2 on bad input,
+    3 when the task was still in progress, 4 when the source broke off, 130 when you stopped it.
     """
     past = None
     if resume:
@@ -144,16 +148,19 @@ def run_and_report(
 
     from visup.runs.operator import HumanOperator, typed_lines
     from visup.runs.runner import Audience, fresh_folder, supervise
+    from visup.story import Detail, Narrative
     from visup.terminal.narrator import Narrator
 
     console = make_console()
+    narrative = Narrative(Detail.ALL if shown.verbose else Detail.USUAL)
+    narrator = Narrator(console, shown.as_json, narrative)
     folder = past.recording.path.parent if past else fresh_folder(shown.out, settings.source)
     silent = shown.quiet or shown.as_json
     # Whoever reads events from a pipe does not type answers.
     typed = None if silent or not console.is_terminal else typed_lines()
     with progress_bar(console, "watching", shown=not silent) as progress:
         audience = Audience(
-            observers=() if shown.quiet else (Narrator(console, shown.as_json),),
+            observers=() if shown.quiet else (narrator,),
             progress=progress,
             operator=HumanOperator(shown.all_answers(), typed, console.print),
             notice=None
@@ -161,6 +168,7 @@ def run_and_report(
             else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]"),
         )
         result = supervise(settings, folder, audience=audience, options=options, past=past)
+    narrator.finish()
     _print_result(console, result, as_json=shown.as_json)
     return result
 
@@ -215,7 +223,7 @@ def _as_json(result: RunResult) -> dict[str, object]:
 def _closing_lines(result: RunResult) -> Iterator[str]:
     from rich.markup import escape
 
-    from visup.terminal.narrator import verdict_line
+    from visup.terminal.narrator import part_seen, verdict_line
 
     if result.problem:
         yield f"[yellow]The source: {escape(result.problem)}[/yellow]"
@@ -225,4 +233,4 @@ def _closing_lines(result: RunResult) -> Iterator[str]:
         yield f"Report:  {escape(str(result.report))}"
     elif result.folder:
         yield f"Run:     {escape(str(result.folder))}"
-    yield verdict_line(result.verdict)
+    yield verdict_line(result.verdict, has_task=result.has_task, part=part_seen(result))

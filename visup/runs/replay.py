@@ -50,11 +50,6 @@ class Transcript:
         """The events of some kinds."""
         return tuple(e for e in self.events if kinds(str(e.get("kind"))))
 
-    @property
-    def failed(self) -> bool:
-        """Whether the run calls for a person, as the exit code of `visup watch` does."""
-        return self.verdict not in (None, Verdict.SUCCEEDED.value, Verdict.IN_PROGRESS.value)
-
 
 @dataclass(frozen=True, slots=True)
 class TranscriptDiff:

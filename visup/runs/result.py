@@ -1,11 +1,29 @@
-"""How a run ended."""
+"""How a run ended, and what it says to whoever started it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 
 from visup.agent import Verdict
+
+
+class ExitCode(IntEnum):
+    """What `visup watch` and `visup replay` end with; where several are true, the first of 1, 4, 130, 3."""
+
+    GOOD = 0
+    """It went well; without a task: nothing unsafe was seen, from the first frame to the last."""
+    BAD = 1
+    """It failed, was unsafe, or could not be followed."""
+    BAD_INPUT = 2
+    """Something given is not as it should be; nothing was watched."""
+    UNFINISHED = 3
+    """The task was still in progress when the source ended, and nothing was wrong."""
+    SOURCE_BROKE_OFF = 4
+    """The source is cut off or damaged; nothing was wrong in the part that was seen."""
+    STOPPED = 130
+    """The user stopped it (Ctrl-C); nothing was wrong until then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +37,9 @@ class RunResult:
         folder: The run folder, or None.
         report: The report, or None.
         notes: What the user should know, such as an extra that is missing.
+        has_task: Whether there was a task to judge.
+        stopped: Whether the user stopped it.
+        seconds: Time of the last frame.
     """
 
     verdict: Verdict | None
@@ -27,8 +48,17 @@ class RunResult:
     folder: Path | None = None
     report: Path | None = None
     notes: tuple[str, ...] = ()
+    has_task: bool = True
+    stopped: bool = False
+    seconds: float = 0.0
 
     @property
-    def exit_code(self) -> int:
-        """0 when all went well, 1 when it failed, was unsafe, or could not be followed."""
-        return 0 if self.verdict in (None, Verdict.SUCCEEDED, Verdict.IN_PROGRESS) else 1
+    def exit_code(self) -> ExitCode:
+        """What the command ends with."""
+        if self.verdict not in (None, Verdict.SUCCEEDED, Verdict.IN_PROGRESS):
+            return ExitCode.BAD
+        if self.problem and not self.stopped:
+            return ExitCode.SOURCE_BROKE_OFF
+        if self.stopped:
+            return ExitCode.STOPPED
+        return ExitCode.UNFINISHED if self.verdict is Verdict.IN_PROGRESS else ExitCode.GOOD

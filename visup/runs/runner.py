@@ -260,7 +260,15 @@ class _Run:
             *self._sinks.end(verdict, self._steps),
         )
         notes = (*self._notes, *filter(None, told))
-        result = RunResult(verdict, self._steps, problem, notes=notes)
+        result = RunResult(
+            verdict,
+            self._steps,
+            problem,
+            notes=notes,
+            has_task=bool(mind.tasks),
+            stopped=self._stopped,
+            seconds=mind.time,
+        )
         if self._recorder is None:
             return result
         ended = self.source.ended.value if self.source.ended and not self._stopped else "stopped"

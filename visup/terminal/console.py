@@ -2,11 +2,14 @@
 
 Names of models, texts of tasks, a server's answer may hold anything, also sequences that clear the
 screen, set its title, or turn the reading order round. `tests/terminal/test_console.py` sees to it that
-nothing else in visup prints.
+nothing else in visup prints. Nobody has to read it either: when the reader goes away (as in
+`visup watch ... | head -1`), what is said from then on is lost, and a supervisor goes on.
 """
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -28,7 +31,12 @@ def make_console(**options: Any) -> Console:
         ) -> list[ConsoleRenderable]:
             return [_Cleaned(r) for r in renderables]
 
-    console = Console(**{"highlight": False, **options})
+    class Patient(Console):
+        def on_broken_pipe(self) -> None:
+            self.quiet = True
+            _reader_has_gone()
+
+    console = Patient(**{"highlight": False, **options})
     console.push_render_hook(Printable())
     return console
 
@@ -58,15 +66,26 @@ def echo(text: str = "", *, nl: bool = True) -> None:
     """Print a text as it is, but for what a terminal would obey; at once."""
     from visup.wording import printable
 
-    end = "\n" if nl else ""
-    print(printable(text), end=end, flush=True)
+    _print(printable(text), "\n" if nl else "")
 
 
 def echo_json(value: Any, **options: Any) -> None:
     """Print a value as JSON, on one line unless the options of `json.dumps` say otherwise."""
     from visup.wording import escaped_json
 
-    print(escaped_json(value, **options), flush=True)
+    _print(escaped_json(value, **options))
+
+
+def _print(text: str, end: str = "\n") -> None:
+    try:
+        print(text, end=end, flush=True)
+    except BrokenPipeError:
+        _reader_has_gone()
+
+
+def _reader_has_gone() -> None:
+    """Let what is printed from now on go nowhere; Python flushes what is left when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complain(message: str) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rich.console import Console
 from rich.table import Table
@@ -12,8 +11,10 @@ from rich.text import Text
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import event_record
+from visup.runs.result import RunResult
+from visup.story import Narrative, summary_lines
 from visup.terminal.console import echo_json
-from visup.wording import prose, worded_once
+from visup.wording import prose
 
 STYLE = {Severity.INFO: "default", Severity.WARNING: "yellow", Severity.CRITICAL: "bold red"}
 MARK = {Severity.INFO: " ", Severity.WARNING: "!", Severity.CRITICAL: "‼"}
@@ -33,33 +34,51 @@ VERDICT_TEXT = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Narrator:
-    """Prints events as they come. Give it to an agent as an observer.
+    """Prints what is worth telling of each step. Give it to an agent as an observer.
 
     Attributes:
         console: Where to.
-        as_json: One JSON object a line instead of sentences.
+        as_json: One JSON object a line, for every event, instead of sentences.
+        narrative: Chooses what is told.
+        last: The last step.
     """
 
     console: Console
     as_json: bool = False
+    narrative: Narrative = field(default_factory=Narrative)
+    last: Step | None = None
 
-    def __call__(self, step: Step, frame: Frame) -> None:
-        """Print the events of one step."""
-        self.print_events(step.events)
-
-    def print_events(self, events: Sequence[Event]) -> None:
-        """Print the events of one step."""
-        for event in events if self.as_json else worded_once(events):
+    def __call__(self, step: Step, frame: Frame | None = None) -> None:
+        """Print what is told of one step."""
+        self.last = step
+        for event in step.events if self.as_json else self.narrative.lines(step, frame):
             self.print_event(event)
+
+    def finish(self) -> None:
+        """Print what is left to be told when the run is over, and how many objects there were."""
+        if self.last is None or self.as_json:
+            return
+        for event in self.narrative.rest(self.last):
+            self.print_event(event)
+        for text in summary_lines(self.narrative.log):
+            self.console.print(text, soft_wrap=True, markup=False)
 
     def print_event(self, event: Event) -> None:
         """Print one event."""
         if self.as_json:
             echo_json(event_record(event), ensure_ascii=False, sort_keys=True)
-        else:
+        elif self.console.is_terminal:
             self.console.print(event_row(event))
+        else:
+            # A file or a pipe has no width: one line for each event, for whoever searches in them.
+            self.console.print(Text(event_line(event)), soft_wrap=True)
+
+
+def event_line(event: Event) -> str:
+    """One event as one line of plain text: time, mark, sentence."""
+    return f"{event.time:6.1f} s {MARK[event.severity]} {prose(event.text)}"
 
 
 def event_row(event: Event) -> Table:
@@ -73,9 +92,28 @@ def event_row(event: Event) -> Table:
     return row
 
 
-def verdict_line(verdict: Verdict | None) -> str:
-    """The verdict as a line of rich markup; None stands for a run without a task."""
+def verdict_line(verdict: Verdict | None, *, has_task: bool = True, part: str = "") -> str:
+    """The verdict as a line of rich markup.
+
+    Args:
+        verdict: None stands for a run without a task in which nothing grave was told.
+        has_task: Whether there was a task to judge.
+        part: What was seen, where that is not the whole source: ` in the first 2.0 s`.
+    """
     if verdict is None:
-        return "Verdict: [bold green]nothing unsafe was seen[/bold green] (no task was given)"
+        return (
+            f"Verdict: [bold green]nothing unsafe was seen[/bold green]{part} (no task was given)"
+        )
     style = VERDICT_STYLE[verdict]
-    return f"Verdict: [{style}]{verdict.value}[/{style}] ({VERDICT_TEXT[verdict]})"
+    if not has_task:
+        return f"Verdict: [{style}]something grave was seen[/{style}]{part} (no task was given)"
+    return f"Verdict: [{style}]{verdict.value}[/{style}]{part} ({VERDICT_TEXT[verdict]})"
+
+
+def part_seen(result: RunResult) -> str:
+    """What was seen of a source, where that is not all of it; else empty."""
+    if not (result.problem or result.stopped):
+        return ""
+    frames = "1 frame" if result.steps == 1 else f"{result.steps} frames"
+    until = "that came before it was stopped" if result.stopped else "before the source broke off"
+    return f" in the {frames} ({result.seconds:.1f} s) {until}"

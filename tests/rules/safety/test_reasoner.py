@@ -85,8 +85,8 @@ def test_closing_in_is_a_collision_course_where_no_task_wants_it() -> None:
     assert concern.objects == (2, 1)
     assert concern.severity is Severity.WARNING
     assert concern.cause == (
-        "An object, believed to be the arm model, appears to be on a collision course with "
-        "a second object, believed to be the probe."
+        "Object 2, believed to be the arm model, appears to be on a collision course with "
+        "object 1, believed to be the probe."
     )
     assert any("time_to_contact(the arm model, the probe)" in e for e in concern.evidence)
 
@@ -213,18 +213,18 @@ MIND = Mind(actors=MappingProxyType({"satellite": ("spartan",)})).with_objects(
     [
         (
             "{0} {is} on a collision course with {1}.", (1, 2), 0.8,
-            "An object, believed to be the satellite, appears to be on a collision course with a "
-            "second object, believed to be the rms arm.",
+            "Object 1, believed to be the satellite, appears to be on a collision course with "
+            "object 2, believed to be the rms arm.",
         ),
         ("{0} {is} near {1}.", (3, 1), 0.99,
-         "An unidentified object is near a second object, believed to be the satellite."),
+         "Object 3 is near object 1, believed to be the satellite."),
         ("{0} {is} near {1}.", (1, 3), 0.2,
-         "An object, believed to be the satellite, may be near a second, unidentified object."),
-        ("{0} leaves.", (2,), 1.0, "An object, believed to be the rms arm, leaves."),
+         "Object 1, believed to be the satellite, may be near object 3."),
+        ("{0} leaves.", (2,), 1.0, "Object 2, believed to be the rms arm, leaves."),
         ("{0} meets {1}; {1} stops.", (1, 2), 1.0,
-         "An object, believed to be the satellite, meets a second object, believed to be the rms "
-         "arm; the second object stops."),
-        ("{0} comes; {0} goes.", (3,), 1.0, "An unidentified object comes; it goes."),
+         "Object 1, believed to be the satellite, meets object 2, believed to be the rms arm; "
+         "the rms arm stops."),
+        ("{0} comes; {0} goes.", (3,), 1.0, "Object 3 comes; it goes."),
     ],
 )  # fmt: skip
 def test_sentences(template: str, ids: tuple[int, ...], confidence: float, expected: str) -> None:
@@ -238,6 +238,6 @@ def test_an_object_is_called_by_its_actor_then_by_its_model() -> None:
             TaskBelief("t", Verdict.IN_PROGRESS, bindings=(Binding("gripper", ("rms_arm",), 2),)),
         ),
     )
-    assert describe(MIND, 2) == "an object, believed to be the rms arm"
-    assert describe(bound, 2) == "an object, believed to be the gripper"
-    assert describe(MIND, 3) == "an unidentified object"
+    assert describe(MIND, 2) == "object 2, believed to be the rms arm"
+    assert describe(bound, 2) == "object 2, believed to be the gripper"
+    assert describe(MIND, 3) == "object 3"

@@ -126,8 +126,8 @@ def test_no_alert_is_false(name: str) -> None:
 def test_the_narrative_is_that_of_the_paper() -> None:
     told = [e.text for e in run("capture_fails").events if e.kind.startswith(("stage", "verdict"))]
     assert told[0] == (
-        "Stage `approach` of task `dock` has begun, with an object, believed to be the arm, "
-        "and a second object, believed to be the satellite."
+        "Stage `approach` of task `dock` has begun, with object 1, believed to be the arm, "
+        "and object 2, believed to be the satellite."
     )
     assert told[1].startswith("Stage `approach` is progressing satisfactorily: ")
     assert told[2].startswith("Stage `approach` is complete")

@@ -1,0 +1,113 @@
+"""How a run ends: each ending has words and an exit code of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+from tests.cli import Call
+from tests.clips import moving_disc
+from tests.paths import ROOT
+from visup.agent import Verdict
+from visup.runs.result import ExitCode, RunResult
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Thirty images."""
+    made = tmp_path / "images"
+    made.mkdir()
+    for number, frame in enumerate(moving_disc()[:30]):
+        cv2.imwrite(str(made / f"{number:05d}.png"), frame)
+    return made
+
+
+def damaged_picture(folder: Path) -> None:
+    data = (folder / "00020.png").read_bytes()
+    (folder / "00020.png").write_bytes(data[: len(data) // 2])
+
+
+def odd_picture(folder: Path) -> None:
+    cv2.imwrite(str(folder / "00020.png"), moving_disc()[0][:-7])
+
+
+@pytest.mark.parametrize("harm", [damaged_picture, odd_picture], ids=lambda f: f.__name__)
+def test_a_source_that_breaks_off_is_told_and_has_its_code(
+    visup: Call, folder: Path, harm: object
+) -> None:
+    assert callable(harm)
+    harm(folder)
+    done = visup("watch", folder, "--no-video")
+    assert done.code == ExitCode.SOURCE_BROKE_OFF
+    assert "00020.png" in done.out
+    last = done.out.splitlines()[-1]
+    assert last == (
+        "Verdict: nothing unsafe was seen in the 20 frames (0.8 s) before the source broke off "
+        "(no task was given)"
+    )
+
+
+def test_a_file_cut_short_is_told_and_has_its_code(visup: Call, clip: Path, tmp_path: Path) -> None:
+    short = tmp_path / "short.avi"
+    short.write_bytes(clip.read_bytes()[: clip.stat().st_size // 2])
+    done = visup("watch", short, "--no-video")
+    assert done.code == ExitCode.SOURCE_BROKE_OFF
+    assert "before the source broke off" in done.out.splitlines()[-1]
+
+
+def test_a_task_in_progress_has_its_code(visup: Call, clip: Path, tmp_path: Path) -> None:
+    task = tmp_path / "wait.task"
+    task.write_text(
+        "actor disc is what moves first\n<t> ::= <go> <end>\n"
+        "<go> ::= present(disc) for 0.2 s\n<end> ::= gone(disc)\n"
+    )
+    done = visup("watch", clip, "--task", task, "--no-video")
+    assert "in_progress" in done.out, done.out + done.err
+    assert done.code == ExitCode.UNFINISHED
+
+
+@pytest.mark.parametrize(
+    ("result", "code"),
+    [
+        (RunResult(None, 9), 0),
+        (RunResult(Verdict.SUCCEEDED, 9), 0),
+        (RunResult(Verdict.IN_PROGRESS, 9), 3),
+        (RunResult(Verdict.SUCCEEDED, 9, "cut off"), 4),
+        (RunResult(Verdict.IN_PROGRESS, 9, "cut off"), 4),
+        (RunResult(None, 9, "stopped by the user", stopped=True), 130),
+        (RunResult(Verdict.IN_PROGRESS, 9, "stopped by the user", stopped=True), 130),
+        (RunResult(Verdict.FAILED, 9, "cut off"), 1),
+        (RunResult(Verdict.UNKNOWN, 9), 1),
+        (RunResult(Verdict.INTERRUPTED, 9, "stopped by the user", stopped=True), 1),
+    ],
+)
+def test_the_gravest_ending_is_the_exit_code(result: RunResult, code: int) -> None:
+    assert result.exit_code == code
+
+
+def test_every_exit_code_is_documented() -> None:
+    page = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
+    assert all(f"| {int(code)} | " in page for code in ExitCode)
+
+
+def test_a_reader_that_goes_away_does_not_end_the_run(clip: Path, tmp_path: Path) -> None:
+    """As in `visup watch ... --json | head -1`."""
+    run = tmp_path / "run"
+    words = ["watch", str(clip), "--json", "--no-video", "--out", str(run)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "visup.cli", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert process.stdout
+    assert process.stderr
+    process.stdout.close()  # before the first word
+    assert process.wait(timeout=120) == ExitCode.GOOD, process.stderr.read()
+    process.stderr.close()
+    assert (run / "report.html").is_file()

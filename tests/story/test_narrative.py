@@ -1,0 +1,166 @@
+"""What is told of a run: a line a life, few a minute, nothing grave withheld."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Severity
+from visup.agent.model.object_beliefs import Candidate
+from visup.agent.model.step import Step
+from visup.story import Detail, Narrative, summary_lines
+from visup.story.line_budget import LineBudget
+from visup.testing import region_of
+from visup.wording import worded_once
+
+SIZE = (320, 240)
+FPS = 10
+
+
+def belief(number: int, x: float, y: float, now: float, **changes: object) -> ObjectBelief:
+    """An object of 20 x 20 pixels with its upper left corner at (x, y), cut by the border where it is."""
+    left, top = max(0, round(x)), max(0, round(y))
+    right, bottom = min(SIZE[0], round(x) + 20), min(SIZE[1], round(y) + 20)
+    full = np.ones((max(1, bottom - top), max(1, right - left)), dtype=bool)
+    region = region_of(full, number, at=(min(left, SIZE[0] - 1), min(top, SIZE[1] - 1)), size=SIZE)
+    made = ObjectBelief(number, region, Presence.SEEN, now, now, confirmed=True)
+    return replace(made, **changes)  # type: ignore[arg-type]  # fields as the test names them
+
+
+def step(now: float, *objects: ObjectBelief, events: Sequence[Event] = ()) -> Step:
+    index = round(now * FPS)
+    mind = Mind(time=now, frame_index=index, frame_size=SIZE).with_objects(*objects)
+    return Step(index, now, Observation(index, now, SIZE), mind, tuple(events))
+
+
+def crossing(number: int, since: float, until: float, now: float, y: float = 100.0) -> ObjectBelief:
+    """An object that goes from the left border to the right one."""
+    x = -19 + (SIZE[0] + 18) * (min(now, until) - since) / (until - since)
+    seen = replace(belief(number, x, y, min(now, until)), first_seen=since)
+    return seen if now <= until else replace(seen, presence=Presence.LEFT)
+
+
+def times(seconds: float) -> list[float]:
+    return [n / FPS for n in range(round(seconds * FPS) + 1)]
+
+
+def told(steps: Sequence[Step], detail: Detail = Detail.USUAL) -> list[Event]:
+    narrative = Narrative(detail)
+    lines = [e for s in steps for e in narrative.lines(s, None)]
+    return [*lines, *narrative.rest(steps[-1])]
+
+
+def event(kind: str, now: float, *ids: int, severity: Severity = Severity.INFO) -> Event:
+    return Event(kind, now, round(now * FPS), f"{kind} {ids} {now}.", ids, severity=severity)
+
+
+def test_a_life_is_one_line_with_who_where_how_long_and_whom_it_came_near() -> None:
+    stays = [belief(1, 230.0, 130.0, t, first_seen=0.0) for t in times(12)]
+    steps = [
+        step(t, stay, *([crossing(4, 3.0, 6.0, t)] if t >= 3 else []))
+        for t, stay in zip(times(12), stays, strict=True)
+    ]
+    lines = [e.text for e in told(steps)]
+    assert lines[0] == "Object 4 crossed from left to right, 3.0 s, closest to object 1 at 10 px."
+    assert lines[1].startswith("Object 1 has been in view since 0.0 s, now on the right")
+    assert len(lines) == 3
+    assert lines[2].startswith("Object 1 moved about on the right")
+
+
+def test_lives_of_one_course_share_a_line() -> None:
+    lanes = {4: 0.0, 5: 60.0, 6: 120.0, 7: 180.0, 8: 210.0, 9: 30.0}
+    steps = [
+        step(t, *(crossing(i, 3.0, 6.0, t, y) for i, y in lanes.items() if t >= 3.0))
+        for t in times(9)
+    ]
+    assert [e.text for e in told(steps)] == [
+        "Objects 4, 5, 6, 7 and 2 more crossed from left to right, 3.0 s."
+    ]
+
+
+def test_specks_and_glimpses_are_only_counted() -> None:
+    steps = [step(t, *([crossing(2, 1.0, 1.4, t)] if t >= 1.0 else [])) for t in times(5)]
+    narrative = Narrative()
+    assert [e for s in steps for e in narrative.lines(s, None)] + narrative.rest(steps[-1]) == []
+    assert next(iter(summary_lines(narrative.log))) == "Seen: 1 object."
+
+
+def test_relations_of_objects_that_nobody_knows_are_told_on_request_alone() -> None:
+    met = event("relation", 1.0, 1, 2)
+    steps = [step(1.0, belief(1, 50, 50, 1.0), belief(2, 90, 50, 1.0), events=[met])]
+    assert told(steps) == []
+    assert told(steps, Detail.ALL) == [met]
+
+
+def test_of_named_objects_the_same_is_not_told_again_and_again() -> None:
+    known = (Candidate("arm", 1.0, 1.0, 0.99),)
+    both = [belief(i, 60.0 * i, 50, 1.0, candidates=known, unknown=0.0) for i in (1, 2)]
+    steps = [step(t, *both, events=[event("relation", t, 1, 2)]) for t in times(30)]
+    assert [e.time for e in told(steps)] == pytest.approx([0.0, 10.0, 20.0, 30.0])
+
+
+KINDS = ("relation", "entry", "alert", "stage_failing", "coupled", "of_a_plugin")
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.lists(st.integers(1, 40), min_size=1, max_size=40),
+    st.lists(st.tuples(st.sampled_from(KINDS), st.booleans()), min_size=1, max_size=6),
+)
+def test_however_much_happens_lines_are_few_and_nothing_grave_is_withheld(
+    begins: list[int], kinds: list[tuple[str, bool]]
+) -> None:
+    known = (Candidate("arm", 1.0, 1.0, 0.99),)
+    steps = []
+    for t in times(60)[::4]:
+        alive = [
+            replace(crossing(n + 1, float(b), b + 3.0, t, 11.0 * n % 220))
+            for n, b in enumerate(begins)
+            if t >= b
+        ]
+        both = [belief(100 + n, 50.0 * n, 150, t, candidates=known, unknown=0.0) for n in range(5)]
+        happen = [
+            event(k, t, 100 + n % 5, severity=Severity.WARNING if grave else Severity.INFO)
+            for n, (k, grave) in enumerate(kinds)
+        ]
+        steps.append(step(t, *alive, *both, events=happen))
+    lines = told(steps)
+    grave = [e for s in steps for e in worded_once(s.events) if e.severity > Severity.INFO]
+    assert [e for e in lines if e.severity > Severity.INFO] == grave
+    about = [e for e in lines if e.kind in ("life", "relation", "entry", "alert", "coupled")]
+    light = [e for e in about if e.severity is Severity.INFO]
+    assert len(light) <= 10 + LineBudget().at_once
+    assert all(e.objects for e in light)
+
+
+@given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=200))
+def test_no_minute_has_more_than_ten_lines(pauses: list[float]) -> None:
+    budget, now, taken = LineBudget(), 0.0, []
+    for pause in pauses:
+        now += pause
+        taken += [now] if budget.take(now) else []
+    assert all(sum(t <= x < t + 60.0 for x in taken) <= 10 for t in taken)
+
+
+def test_a_summary_names_the_busiest_pair_and_the_longest_stay() -> None:
+    narrative, last = Narrative(), None
+    for t in times(8):
+        last = step(
+            t,
+            belief(1, 100, 100, t, first_seen=0.0),
+            *([belief(2, 125, 100, t, first_seen=0.0)] if t < 5 else []),
+            *([belief(3, 10, 10, t, first_seen=0.0)] if t < 3 else []),
+        )
+        narrative.lines(last, None)
+    assert last is not None
+    narrative.rest(last)
+    assert list(summary_lines(narrative.log)) == [
+        "Seen: 3 objects, at most 3 at a time.",
+        "Longest in view: object 1, 8.0 s, last in the middle.",
+        "Busiest pair: objects 1 and 2, near each other for 4.9 s, at the closest 5 px apart.",
+    ]

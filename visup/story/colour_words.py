@@ -1,0 +1,28 @@
+"""One plain word for the colour of an object, where it has one."""
+
+from __future__ import annotations
+
+from visup.percepts.colour import Palette
+from visup.rules.traits.colours import colour_share
+
+PLAIN = ("red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "black")
+GREY = "grey"
+
+LEAST_SHARE = 0.35
+"""So much of an object must be of a colour for it to be called so."""
+
+
+def colour_word(palette: Palette) -> str | None:
+    """The basic colour of most of an object, or None when no colour is that of much of it.
+
+    A colour comes before grey, which is what light and shade leave of anything: a blue car is blue though
+    its windows and tyres are not.
+
+    >>> colour_word(((52.0, 80.0, 70.0, 0.7), (50.0, 0.0, 0.0, 0.3)))
+    'red'
+    """
+    shares = {word: colour_share(word, palette) for word in PLAIN}
+    best = max(shares, key=lambda word: shares[word])
+    if shares[best] >= LEAST_SHARE:
+        return best
+    return GREY if colour_share(GREY, palette) >= LEAST_SHARE else None

@@ -1,0 +1,86 @@
+"""A life in a line, and lives of the same course in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from visup.rules.wording.sentences import spaced
+from visup.story.lives import ObjectLife
+
+STAYED = 0.06
+"""Who has come no farther than that, in image diagonals, has stayed where it was."""
+
+MOST_NAMED = 4
+"""Of more objects than that the rest are counted."""
+
+
+def who(life: ObjectLife) -> str:
+    """An object with its id, and what else is known of it: `object 4 (blue)`, `the arm (object 2)`."""
+    if life.name is not None:
+        return f"the {spaced(life.name)} (object {life.id})"
+    return f"object {_with_colour(life)}"
+
+
+def course(life: ObjectLife) -> str:
+    """What an object did from its coming to its going, as a verb and places."""
+    came, went = life.came_from, life.went_to
+    if came and went:
+        crossed = f"crossed from {came} to {went}"
+        return crossed if came != went else f"came in from the {came} and went out there again"
+    if came:
+        seen_last = "there" if came in life.ended_at else life.ended_at
+        return f"came in from the {came} and was last seen {seen_last}"
+    if went:
+        origin = "" if went in life.begun_at else f" from {_place(life.begun_at)}"
+        return f"went out to the {went}{origin}"
+    if life.travelled < STAYED:
+        return f"moved about {life.ended_at}"
+    if life.begun_at == life.ended_at:
+        return f"moved a little {life.ended_at}"
+    return f"went from {_place(life.begun_at)} to {_place(life.ended_at)}"
+
+
+def life_sentence(life: ObjectLife) -> str:
+    """One life in one line: who, where, how long, whom it came near."""
+    text = f"{who(life)} {course(life)}, {life.seconds:.1f} s{_nearest(life)}."
+    return text[:1].upper() + text[1:]
+
+
+def lives_sentence(lives: Sequence[ObjectLife]) -> str:
+    """Lives of the same course in one line; a single one as `life_sentence` tells it.
+
+    Args:
+        lives: At least one.
+    """
+    if len(lives) == 1:
+        return life_sentence(lives[0])
+    shortest, longest = min(x.seconds for x in lives), max(x.seconds for x in lives)
+    lasted = f"{shortest:.1f} to {longest:.1f} s each" if shortest < longest else f"{longest:.1f} s"
+    shown = [_with_colour(x) for x in lives[:MOST_NAMED]]
+    rest = len(lives) - len(shown)
+    last = f"{rest} more" if rest else shown.pop()
+    return f"Objects {', '.join(shown)} and {last} {course(lives[0])}, {lasted}."
+
+
+def stay_sentence(life: ObjectLife) -> str:
+    """Of an object that stays: since when it is in view, and where it is now."""
+    since = f"has been in view since {life.since:.1f} s"
+    text = f"{who(life)} {since}, now {life.ended_at}{_nearest(life)}."
+    return text[:1].upper() + text[1:]
+
+
+def _with_colour(life: ObjectLife) -> str:
+    return f"{life.id} ({life.colour})" if life.colour else str(life.id)
+
+
+def _place(words: str) -> str:
+    return words.split(" ", 1)[1]
+
+
+def _nearest(life: ObjectLife) -> str:
+    if life.closest is None:
+        return ""
+    other, gap = life.closest
+    return f", closest to object {other} " + (
+        f"at {gap:.0f} px" if gap >= 0.5 else "(outlines met)"
+    )

@@ -1,0 +1,216 @@
+"""The lives of objects: from where each came, where it went, how long it was in view, whom it came near."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+from visup.agent import Frame, Mind, ObjectBelief, Presence
+from visup.agent.model.step import Step
+from visup.percepts.colour import palette
+from visup.rules.geometry.outlines import outline_gap
+from visup.rules.wording.sentences import believed_name
+from visup.story.colour_words import colour_word
+from visup.story.places import Box, place_of, sides_of
+
+OVER_S = 1.5
+"""A life is over when its object has been out of view for so long; what comes back later lives again."""
+
+GROWN = 1.3
+"""The colour is looked at again when an object shows so many times as large as when it was looked at."""
+
+NEAR = 0.12
+"""Objects farther apart than that, in image diagonals, have nothing to do with each other."""
+
+MOST_PAIRS = 1000
+"""Of more pairs than that, those that were near each other for the shortest time are forgotten."""
+
+MOST_NEIGHBOURS = 12
+"""Of so many objects at once it is told who came near whom, the largest first."""
+
+
+@dataclass(slots=True)
+class ObjectLife:
+    """One object from its coming into view to its going.
+
+    Attributes:
+        id: Of the object.
+        size: (width, height) of the picture, pixels.
+        since: When it was first seen, seconds.
+        until: When it was seen last, seconds.
+        first: Its box then.
+        last: Its box when it was seen last.
+        area: Pixels it showed at the most.
+        name: What it is believed to be, or None.
+        colour: A word for its colour, or None.
+        near: Object id -> least gap in pixels, of those that came near it.
+        left: Whether it went over the border.
+        from_start: Whether it was in view in the first frames.
+    """
+
+    id: int
+    size: tuple[int, int]
+    since: float
+    until: float
+    first: Box
+    last: Box
+    area: float = 0.0
+    name: str | None = None
+    colour: str | None = None
+    near: dict[int, float] = field(default_factory=dict)
+    left: bool = False
+    from_start: bool = False
+
+    @property
+    def seconds(self) -> float:
+        """How long it was in view."""
+        return self.until - self.since
+
+    @property
+    def came_from(self) -> str | None:
+        """The side over which it came, or None when it was first seen within the picture."""
+        sides = () if self.from_start else sides_of(self.first, self.size)
+        return sides[0] if sides else None
+
+    @property
+    def went_to(self) -> str | None:
+        """The side over which it went, or None."""
+        sides = sides_of(self.last, self.size) if self.left else ()
+        return sides[0] if sides else None
+
+    @property
+    def begun_at(self) -> str:
+        """The place where it was first seen."""
+        return place_of(self.first, self.size)
+
+    @property
+    def ended_at(self) -> str:
+        """The place where it was seen last."""
+        return place_of(self.last, self.size)
+
+    @property
+    def travelled(self) -> float:
+        """How far its middle has come, image diagonals."""
+        dx = self.last[0] + self.last[2] / 2 - self.first[0] - self.first[2] / 2
+        dy = self.last[1] + self.last[3] / 2 - self.first[1] - self.first[3] / 2
+        return float((dx * dx + dy * dy) ** 0.5) / diagonal(self.size)
+
+    @property
+    def closest(self) -> tuple[int, float] | None:
+        """The object that came nearest, and its gap in pixels."""
+        if not self.near:
+            return None
+        other = min(self.near, key=lambda i: (self.near[i], i))
+        return other, self.near[other]
+
+
+def diagonal(size: tuple[int, int]) -> float:
+    """Of a picture, pixels."""
+    return float((size[0] ** 2 + size[1] ** 2) ** 0.5)
+
+
+@dataclass(slots=True)
+class LifeLog:
+    """Follows all objects of a run; give it each step.
+
+    Attributes:
+        alive: Lives that are not over, by object id.
+        ended: How many lives are over.
+        together: Pair of ids -> seconds in which both were near each other; the busiest ones.
+        gaps: Pair of ids -> the least gap between their outlines, pixels.
+        most_at_once: The most objects in view at one time.
+        longest: The longest life so far.
+    """
+
+    alive: dict[int, ObjectLife] = field(default_factory=dict)
+    ended: int = 0
+    together: dict[tuple[int, int], float] = field(default_factory=dict)
+    gaps: dict[tuple[int, int], float] = field(default_factory=dict)
+    most_at_once: int = 0
+    longest: ObjectLife | None = None
+    _looked: dict[int, float] = field(default_factory=dict)
+    _begun: float | None = None
+    _now: float = 0.0
+
+    def add(self, step: Step, frame: Frame | None) -> list[ObjectLife]:
+        """Take in one step.
+
+        Args:
+            step: The step.
+            frame: Its frame, or None where there is none: colours are then not known.
+
+        Returns:
+            The lives that are over since the last step, in the order in which they ended.
+        """
+        mind = step.mind
+        lasted = 0.0 if self._begun is None else step.time - self._now
+        self._begun = step.time if self._begun is None else self._begun
+        self._now = step.time
+        seen = [
+            b for b in mind.present() if b.presence is Presence.SEEN and b.last_seen == step.time
+        ]
+        for belief in seen:
+            self._see(belief, mind, frame)
+        self.most_at_once = max(self.most_at_once, len(seen))
+        self._meet(seen, mind, lasted)
+        return list(self._over(mind))
+
+    def finish(self) -> list[ObjectLife]:
+        """The lives that are not over when the run is."""
+        rest = [self.alive[i] for i in sorted(self.alive)]
+        for life in rest:
+            self._close(life)
+        return rest
+
+    def _see(self, belief: ObjectBelief, mind: Mind, frame: Frame | None) -> None:
+        box, size = belief.region.bbox, mind.frame_size
+        life = self.alive.get(belief.id)
+        if life is None:
+            # It was followed for some frames before it counted as an object.
+            since = max(belief.first_seen, self._now - OVER_S)
+            start = self._begun is not None and since - self._begun < OVER_S
+            life = ObjectLife(belief.id, size, since, self._now, box, box, from_start=start)
+            self.alive[belief.id] = life
+        life.until, life.last, life.left = self._now, box, False
+        life.name = believed_name(mind, belief.id)
+        life.area = max(life.area, belief.region.area)
+        if frame is not None and belief.region.area > GROWN * self._looked.get(belief.id, 0.0):
+            self._looked[belief.id] = belief.region.area
+            life.colour = colour_word(palette(frame.image, belief.region)) or life.colour
+
+    def _meet(self, seen: Sequence[ObjectBelief], mind: Mind, lasted: float) -> None:
+        """Who is near whom."""
+        largest = sorted(seen, key=lambda b: (-b.region.area, b.id))[:MOST_NEIGHBOURS]
+        near = NEAR * diagonal(mind.frame_size)
+        for a, b in combinations(sorted(largest, key=lambda b: b.id), 2):
+            gap = outline_gap(a.region, b.region, near)
+            if gap is None:
+                continue
+            pair = a.id, b.id
+            self.together[pair] = self.together.get(pair, 0.0) + lasted
+            self.gaps[pair] = min(gap, self.gaps.get(pair, gap))
+            for one, other in (pair, pair[::-1]):
+                known = self.alive[one].near
+                known[other] = min(gap, known.get(other, gap))
+        if len(self.together) > MOST_PAIRS:
+            busiest = sorted(self.together, key=lambda p: (-self.together[p], p))[: MOST_PAIRS // 2]
+            self.together = {p: self.together[p] for p in busiest}
+            self.gaps = {p: self.gaps[p] for p in busiest}
+
+    def _over(self, mind: Mind) -> Iterator[ObjectLife]:
+        for i in sorted(self.alive, key=lambda i: (self.alive[i].until, i)):
+            life = self.alive[i]
+            belief = mind.objects.get(i)
+            if belief is not None and belief.presence is Presence.LEFT:
+                life.left = True
+            if self._now - life.until > OVER_S or belief is None:
+                self._close(life)
+                yield life
+
+    def _close(self, life: ObjectLife) -> None:
+        del self.alive[life.id]
+        self._looked.pop(life.id, None)
+        self.ended += 1
+        if self.longest is None or life.seconds > self.longest.seconds:
+            self.longest = life

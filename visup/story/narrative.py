@@ -1,0 +1,159 @@
+"""What of a run is worth a line: what tasks and alerts say, named objects sparingly, a line a life of others.
+
+Events are recorded whatever is told of them; this is what people read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from visup.agent import Event, Frame, Mind, Severity
+from visup.agent.model.step import Step
+from visup.rules.wording.sentences import believed_name
+from visup.story.life_sentences import course, lives_sentence, stay_sentence
+from visup.story.line_budget import LineBudget
+from visup.story.lives import LifeLog, ObjectLife
+from visup.wording import EVENT_KINDS, worded_once
+
+BRIEF_S = 0.8
+"""Who is in view for less than that is counted in the summary and told of nowhere else."""
+
+SPECK = 0.0002
+"""So it is with who never shows more than that, share of the picture."""
+
+STAYS_S = 10.0
+"""Who is in view for so long is told of while it is."""
+
+PATIENCE_S = 15.0
+"""A life that has found no line for so long is left to the summary."""
+
+SAME_S, SAME_PAIR_S = 3.0, 10.0
+"""Of the same object, and of the same pair, the same kind of thing is told no more often, seconds."""
+
+ABOUT_OBJECTS = frozenset(
+    {
+        *("entry", "noticed", "exit", "occlusion", "reappearance", "lost", "found"),
+        *("coupled", "decoupled", "relation", "identified", "alert", "alert_closed"),
+    }
+)
+"""Kinds of events that are told of named objects alone, and sparingly; all others are always told."""
+
+
+class Detail(StrEnum):
+    """How much is told."""
+
+    USUAL = "usual"
+    ALL = "all"
+
+
+@dataclass(slots=True)
+class Narrative:
+    """Chooses what is told. Give it each step; what it gives back is to be shown.
+
+    What a task says, and what is grave, is always told. So is what its actors do, though the same seldom;
+    other named objects share a budget of lines a minute with the lives of all others.
+
+    Attributes:
+        detail: `ALL` tells every event, and no lives.
+        log: The lives of all objects.
+        budget: Lines a minute of what is not grave and belongs to no task.
+        withheld: Events that were not told.
+    """
+
+    detail: Detail = Detail.USUAL
+    log: LifeLog = field(default_factory=LifeLog)
+    budget: LineBudget = field(default_factory=LineBudget)
+    withheld: int = 0
+    _waiting: list[ObjectLife] = field(default_factory=list)
+    _staying: set[int] = field(default_factory=set)
+    _told: dict[tuple[object, ...], float] = field(default_factory=dict)
+    _alerts: set[object] = field(default_factory=set)
+
+    def lines(self, step: Step, frame: Frame | None) -> list[Event]:
+        """What is told of one step.
+
+        Args:
+            step: The step.
+            frame: Its frame, for colours, or None.
+        """
+        ended = self.log.add(step, frame)
+        if self.detail is Detail.ALL:
+            return worded_once(step.events)
+        told = [e for e in worded_once(step.events) if self._worth_telling(e, step.mind)]
+        self.withheld += len(step.events) - len(told)
+        self._waiting += [x for x in ended if _counts(x)]
+        return [*told, *self._lives(step)]
+
+    def rest(self, step: Step) -> list[Event]:
+        """What is left to be told when the run is over: the lives that wait, and those that go on.
+
+        Args:
+            step: The last one.
+        """
+        lives = [*self._waiting, *(x for x in self.log.finish() if _counts(x))]
+        self._waiting = []
+        if self.detail is Detail.ALL:
+            return []
+        groups = sorted(_by_course(lives), key=len, reverse=True)
+        return [_event(lives_sentence(g), g, step) for g in groups[: self.budget.at_once]]
+
+    def _worth_telling(self, event: Event, mind: Mind) -> bool:
+        if event.kind not in ABOUT_OBJECTS and event.kind in EVENT_KINDS:
+            return True
+        if event.kind not in EVENT_KINDS:
+            return True  # a plug-in's own
+        if event.severity > Severity.INFO:
+            self._alerts.add(event.data.get("alert"))
+            return True
+        if event.kind == "alert_closed":
+            return event.data.get("alert") in self._alerts
+        if not event.objects or any(believed_name(mind, i) is None for i in event.objects):
+            return False
+        if not self._seldom(event):
+            return False
+        return set(event.objects) <= _actors(mind) or self.budget.take(event.time)
+
+    def _seldom(self, event: Event) -> bool:
+        key = event.kind, *sorted(event.objects)
+        last, quiet = self._told.get(key), SAME_PAIR_S if len(event.objects) > 1 else SAME_S
+        if last is not None and event.time - last < quiet:
+            return False
+        self._told = {k: t for k, t in self._told.items() if event.time - t < SAME_PAIR_S}
+        self._told[key] = event.time
+        return True
+
+    def _lives(self, step: Step) -> Iterator[Event]:
+        """Lines on lives, as many as there may be now: those of the most numerous course first."""
+        self._waiting = [x for x in self._waiting if step.time - x.until < PATIENCE_S]
+        while self._waiting and self.budget.take(step.time):
+            group = max(_by_course(self._waiting), key=lambda g: (len(g), max(x.area for x in g)))
+            self._waiting = [x for x in self._waiting if x not in group]
+            yield _event(lives_sentence(group), group, step)
+        for life in self.log.alive.values():
+            long = step.time - life.since >= STAYS_S and life.name is None and _counts(life)
+            if long and life.id not in self._staying and self.budget.take(step.time):
+                self._staying.add(life.id)
+                yield _event(stay_sentence(life), [life], step)
+
+
+def _actors(mind: Mind) -> set[int | None]:
+    """The objects that play a part in a task."""
+    return {b.object_id for task in mind.tasks for b in task.bindings}
+
+
+def _counts(life: ObjectLife) -> bool:
+    large = life.area >= SPECK * life.size[0] * life.size[1]
+    return large and life.seconds >= BRIEF_S and life.name is None
+
+
+def _by_course(lives: Sequence[ObjectLife]) -> list[list[ObjectLife]]:
+    groups: dict[str, list[ObjectLife]] = {}
+    for life in lives:
+        groups.setdefault(course(life), []).append(life)
+    return list(groups.values())
+
+
+def _event(text: str, lives: Sequence[ObjectLife], step: Step) -> Event:
+    return Event("life", step.time, step.frame_index, text, tuple(x.id for x in lives))

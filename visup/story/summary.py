@@ -1,0 +1,35 @@
+"""A run in a few lines: how many objects there were, the busiest pair, the longest stay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from visup.story.life_sentences import who
+from visup.story.lives import LifeLog
+
+
+def summary_lines(log: LifeLog) -> Iterator[str]:
+    """What is said of a run when it is over; its lives must be finished.
+
+    Args:
+        log: Of the run.
+    """
+    if not log.ended:
+        yield "Seen: no object that moved."
+        return
+    objects = "1 object" if log.ended == 1 else f"{log.ended} objects"
+    at_once = f", at most {log.most_at_once} at a time" if log.ended > 1 else ""
+    yield f"Seen: {objects}{at_once}."
+    if log.longest is not None:
+        yield (
+            f"Longest in view: {who(log.longest)}, {log.longest.seconds:.1f} s, "
+            f"last {log.longest.ended_at}."
+        )
+    if log.together:
+        pair = min(log.together, key=lambda p: (-log.together[p], p))
+        gap = log.gaps[pair]
+        closest = f"at the closest {gap:.0f} px apart" if gap >= 0.5 else "their outlines met"
+        yield (
+            f"Busiest pair: objects {pair[0]} and {pair[1]}, near each other for "
+            f"{log.together[pair]:.1f} s, {closest}."
+        )
