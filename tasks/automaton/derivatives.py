@@ -282,15 +282,8 @@ class _Entrance(Generic[W]):
 
     def _fact(self, todo: Continuation, fact: Fact) -> Iterator[State[W] | None]:
         key, actors = fact_key(self.task, fact)
-        around = (
-            todo.stage,
-            todo.hold_s,
-            todo.deadlines,
-            todo.conditions,
-            todo.inside,
-            todo.already,
-        )
-        yield Leaf(TaskStep(key, actors, *around), self.payload)
+        said = todo.stage, todo.hold_s, todo.deadlines, todo.conditions
+        yield Leaf(TaskStep(key, actors, *said, todo.inside, todo.already), self.payload)
         if any(self.task.actor(a).optional for a in actors):
             yield None
 
