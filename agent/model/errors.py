@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+LONGEST_QUOTE = 200
+"""Characters of a faulty line that are shown, those round the fault."""
+
 
 @dataclass(frozen=True, slots=True)
 class SourceLocation:
@@ -32,8 +35,14 @@ class SourceLocation:
 
     def caret(self) -> str:
         """The faulty line with carets under the fault; tabs are kept so that the carets line up."""
-        lead = "".join("\t" if c == "\t" else " " for c in self.text[: self.column - 1])
-        return f"    {self.text}\n    {lead}{'^' * max(1, self.length)}"
+        first = (
+            max(0, self.column - 1 - LONGEST_QUOTE // 2) if len(self.text) > LONGEST_QUOTE else 0
+        )
+        text = self.text[first : first + LONGEST_QUOTE]
+        before = self.text[first : self.column - 1]
+        lead = "".join("\t" if c == "\t" else " " for c in before)
+        marked = max(1, min(self.length, len(text) - len(before)))
+        return f"    {text}\n    {lead}{'^' * marked}"
 
 
 class VisupError(Exception):

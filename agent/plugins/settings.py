@@ -9,6 +9,7 @@ from typing import Any
 
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import ErrorGroup, SettingsError, VisupError
+from visup.agent.storage.text_file import read_text_file
 
 Values = dict[str, dict[str, Any]]
 """Name of a behaviour -> its settings."""
@@ -83,7 +84,7 @@ def read_settings(path: Path) -> Values:
         SettingsError: The file is missing, is not TOML, or holds something else.
     """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(read_text_file(path))
     except OSError as fault:
         raise SettingsError(f"cannot be read: {fault.strerror}", where=str(path)) from fault
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import cast
 
@@ -12,6 +13,7 @@ from lark import Lark, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput
 
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import RuleError
+from visup.agent.storage.text_file import read_text_file
 from visup.rules.formula.nodes import Formula, Rule
 from visup.rules.language.diagnostics import Diagnostic, Source, either, raise_all
 from visup.rules.language.transform import read_tree
@@ -60,6 +62,14 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         ManyErrors: It has several; each rule is read by itself, so that one syntax fault in a rule
             hides nothing of the others.
     """
+    check_length(text, file)
+    try:
+        return _parsed(text, file)
+    except RecursionError:
+        raise RuleError("things stand inside one another too deep", where=file) from None
+
+
+def _parsed(text: str, file: str) -> tuple[Rule, ...]:
     checker = TypeChecker(text, file)
     errors: list[Diagnostic] = []
     rules: list[Rule] = []
@@ -75,8 +85,35 @@ def parse_rules(text: str, file: str = "<rules>") -> tuple[Rule, ...]:
         rules += found
         sound += () if faults else found
     errors += [*checker.twice(rules), *(fault for rule in sound for fault in checker.rule(rule))]
-    raise_all(sorted(errors, key=_position), RuleError)
+    raise_all(sorted(errors, key=_position)[:MOST_FAULTS], RuleError)
     return tuple(rules)
+
+
+LONGEST_FILE = 200_000
+"""Characters of a rules file; that which ships has a twentieth of it."""
+LONGEST_RULE = 10_000
+MOST_RULES = 1_000
+MOST_FAULTS = 100
+"""Faults of a file that are told; who made more knows enough."""
+
+
+def check_length(text: str, file: str) -> None:
+    """Refuse a text that takes long to read.
+
+    Raises:
+        RuleError: It, or one of its rules, is too long.
+    """
+    if len(text) > LONGEST_FILE:
+        what = f"the file has {len(text)} characters"
+        raise RuleError(what, where=file, expected=f"at most {LONGEST_FILE}")
+    starts = [m.start() for m in _HEAD.finditer(text)]
+    if len(starts) > MOST_RULES:
+        what = f"the file has {len(starts)} rules"
+        raise RuleError(what, where=file, expected=f"at most {MOST_RULES}")
+    longest = max(b - a for a, b in pairwise([0, *starts, len(text)]))
+    if longest > LONGEST_RULE:
+        what = f"a rule has {longest} characters"
+        raise RuleError(what, where=file, expected=f"at most {LONGEST_RULE}")
 
 
 def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
@@ -94,6 +131,14 @@ def parse_formula(text: str, vocabulary: Vocabulary = RULES) -> Formula:
         ManyErrors: It has several.
     """
     file = "<formula>"
+    check_length(text, file)
+    try:
+        return _formula(text, file, vocabulary)
+    except RecursionError:
+        raise RuleError("things stand inside one another too deep", where=file) from None
+
+
+def _formula(text: str, file: str, vocabulary: Vocabulary) -> Formula:
     try:
         tree = _parser().parse(text, start="formula")
     except UnexpectedInput as fault:
@@ -119,7 +164,7 @@ def load_rules(path: str | Path) -> tuple[Rule, ...]:
         ManyErrors: It has several faults.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text_file(Path(path))
     except UnicodeDecodeError:
         raise RuleError("this is not text", where=str(path), expected="UTF-8") from None
     except OSError as fault:

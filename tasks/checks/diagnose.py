@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from collections.abc import Set as AnySet
+from functools import partial
+from pathlib import Path
 
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
+from visup.tasks.checks.bounds import MOST_FAULTS, text_fault
 from visup.tasks.checks.files import read_beside
 from visup.tasks.checks.semantics import check_semantics
 from visup.tasks.diagnostics.includes import Read, join_included
@@ -22,7 +25,7 @@ def diagnose(
     file: str = "<text>",
     actions: Mapping[str, ActionDefinition] | None = None,
     percepts: AnySet[str] = ALL_PERCEPTS,
-    read: Read = read_beside,
+    read: Read | None = None,
 ) -> tuple[Task, list[Diagnostic]]:
     """The tree of a text and all its mistakes.
 
@@ -31,15 +34,34 @@ def diagnose(
         file: Its name, for messages; what it includes is looked for beside it.
         actions: The actions that it may ask for; None for all that are known.
         percepts: The kinds of percept that will be at hand.
-        read: How included files are read.
+        read: How included files are read; unless told, from the folder of this file, and none outside it.
 
     Returns:
         What could be read, with what it includes, and the faults in the order of the text, those of
-        included files last; the tree may be used only when there are none.
+        included files last, the first hundred; the tree may be used only when there are none.
     """
     source = Source(text, file)
+    if (fault := text_fault(text, source)) is not None:
+        return Task(()), [fault]
+    try:
+        task, faults = _diagnosed(text, source, actions, percepts, read)
+    except RecursionError:
+        what = "things stand inside one another too deep"
+        return Task(()), [Diagnostic("E128", what, source.place(1, 1))]
+    order = {name: i for i, name in enumerate((file, *source.included))}
+    return task, sorted(faults, key=lambda f: _order(f, order))[:MOST_FAULTS]
+
+
+def _diagnosed(
+    text: str,
+    source: Source,
+    actions: Mapping[str, ActionDefinition] | None,
+    percepts: AnySet[str],
+    read: Read | None,
+) -> tuple[Task, list[Diagnostic]]:
     cleaned, odd = normalise(text, source)
-    parsed = join_included(parse(cleaned, source), source, read)
+    within = partial(read_beside, root=Path(source.file).parent)
+    parsed = join_included(parse(cleaned, source), source, read or within)
     foreign = {f.place.line for f in parsed.faults if f.code in FOREIGN}
     odd = [f for f in odd if f.place.line not in foreign]
     known = known_actions() if actions is None else actions
@@ -47,8 +69,7 @@ def diagnose(
     if not faults and not any(not s.span.file for s in parsed.task.stages):
         expected = "a rule such as `<dock> ::= converging(arm, satellite)`"
         faults = [Diagnostic("E129", "there is no rule", source.place(1, 1), expected=expected)]
-    order = {name: i for i, name in enumerate((file, *source.included))}
-    return parsed.task, sorted(faults, key=lambda f: _order(f, order))
+    return parsed.task, faults
 
 
 def _order(fault: Diagnostic, files: Mapping[str, int]) -> tuple[int, int, int, str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import TaskError
+from visup.agent.storage.text_file import read_text_file
 
 
 def read_text(path_or_name: str | Path) -> str:
@@ -21,11 +22,7 @@ def read_text(path_or_name: str | Path) -> str:
         resource = files("visup.tasks.shipped").joinpath(f"{path_or_name}.task")
         return resource.read_text(encoding="utf-8")
     try:
-        if path.exists() and not path.is_file():  # a pipe would be waited for
-            raise TaskError(
-                "cannot be read: it is not a file", where=str(path), expected="a task file"
-            )
-        return path.read_text(encoding="utf-8-sig")
+        return read_text_file(path)
     except FileNotFoundError:
         raise _no_such(str(path_or_name)) from None
     except UnicodeDecodeError as e:
@@ -37,20 +34,39 @@ def read_text(path_or_name: str | Path) -> str:
         raise TaskError(what, where=str(path), expected="a task file") from e
 
 
-def read_beside(path: str, including: str) -> tuple[str, str]:
+def read_beside(path: str, including: str, root: Path | None = None) -> tuple[str, str]:
     """An included file: its name for messages, and its text.
 
     Args:
         path: As `include` says it: a path from the folder of the including file, or the name of a shipped
             task.
         including: The file that includes it.
+        root: The folder in which it must be; None for anywhere.
 
     Raises:
-        TaskError: When there is no such file or task, or it is not text.
+        TaskError: When there is no such file or task, it is not text, or outside of the folder.
     """
     beside = Path(normpath(Path(including).parent / path))  # so that a file has one name
-    name = str(beside) if not path or beside.exists() or path not in shipped_tasks() else path
-    return name, read_text(name)
+    if path in shipped_tasks() and not beside.exists():
+        return path, read_text(path)
+    if root is not None and not _is_within(beside, root):
+        raise TaskError(
+            "it is outside of the folder of the task that is read",
+            where=str(beside)[:LONGEST_NAME],
+            expected=f"a file in {root} or below",
+        )
+    return str(beside), read_text(beside)
+
+
+LONGEST_NAME = 200
+
+
+def _is_within(path: Path, root: Path) -> bool:
+    """Whether a file is in a folder or below, also once links are followed; none that cannot be named."""
+    try:
+        return path.resolve().is_relative_to(root.resolve())
+    except (OSError, ValueError, RuntimeError):
+        return False
 
 
 def shipped_tasks() -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
+from visup.tasks.checks.bounds import BoundsCheck
 from visup.tasks.checks.courses import CourseCheck
 from visup.tasks.checks.criteria import criteria_faults
 from visup.tasks.checks.names import NameCheck
@@ -123,6 +124,9 @@ class _Semantics:
             self.parsed, self.source, self.actions, self.percepts, self.asked
         ).faults()
         if whole:
+            bounds = list(BoundsCheck(self.grammar, self.source).faults())
+            yield from bounds
+        if whole and not bounds:
             yield from AmbiguityCheck(self.parsed.task, self.source, self.grammar).faults()
 
     def misread(self, stage: Stage) -> str:

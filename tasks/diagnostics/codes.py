@@ -39,6 +39,7 @@ CODES = {
     "E134": "a number of times that is not complete",
     "E135": "`any order` without its list",
     "E136": "a floor whose points are not right",
+    "E137": "a file or a line that is too long",
     "E201": "an unknown action",
     "E202": "a stage that is not defined",
     "E203": "a stage defined twice",
@@ -77,5 +78,6 @@ CODES = {
     "E236": "an actor that no object can be",
     "E237": "an actor that is a part of itself",
     "E238": "a range in which nothing lies",
+    "E239": "more stages, or ways to go on, than can be followed",
 }
 """Every code with what it stands for; a code never changes its meaning."""

@@ -34,6 +34,8 @@ def join_included(parsed: ParsedFile, source: Source, read: Read) -> ParsedFile:
 
 
 DEEPEST = 30  # files that include one another in a row
+MOST_FILES = 100
+MOST_CHARACTERS = 600_000
 
 
 @dataclass
@@ -41,6 +43,7 @@ class _Joiner:
     source: Source
     read: Read
     taken: set[str] = field(default_factory=set)
+    room: int = MOST_CHARACTERS
 
     def join(self, parsed: ParsedFile, chain: tuple[str, ...]) -> ParsedFile:
         whole = replace(parsed, task=replace(parsed.task, includes=()))
@@ -63,6 +66,11 @@ class _Joiner:
         if file in self.taken:
             return ParsedFile(Task(()))
         self.taken.add(file)
+        self.room -= len(text)
+        if self.room < 0 or len(self.taken) > MOST_FILES:
+            what = "all that is included is more than a task may be"
+            expected = f"at most {MOST_FILES} files, and {MOST_CHARACTERS} characters"
+            return self.fault("E137", what, include, expected, None)
         source = self.source.included[file] = Source(text, file)
         code, odd = normalise(text, source)
         parsed = parse(code, source)

@@ -14,9 +14,11 @@ from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
 from visup.agent.storage.atomic import write_whole
 from visup.agent.storage.checkpoint import StateError, dump_state, load_state
+from visup.agent.storage.text_file import read_bounded
 from visup.version import __version__
 
 CHECKPOINT = "state.bin"
+LARGEST_STATE_BYTES = 2**30
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,7 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
         It, or None when there is none that can be used, and then why, when there is one.
     """
     try:
-        told = load_state((folder / CHECKPOINT).read_bytes())
+        told = load_state(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES))
         if told["visup"] != __version__:
             return None, f"its checkpoint is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None

@@ -18,6 +18,7 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.cycle.answers import resolve_model
 from visup.agent.model.errors import SettingsError, VisupError
 from visup.agent.model.step import Observer, Step
+from visup.agent.storage.text_file import read_text_file
 
 
 def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, str]:
@@ -56,7 +57,7 @@ def read_answers(path: Path) -> dict[int, str]:
         SettingsError: It cannot be read, or a line is not of the form ID=NAME.
     """
     try:
-        return parse_answers(path.read_text(encoding="utf-8").splitlines(), str(path))
+        return parse_answers(read_text_file(path).splitlines(), str(path))
     except (OSError, UnicodeDecodeError) as fault:
         raise SettingsError(f"the answers cannot be read: {fault}", where=str(path)) from fault
 

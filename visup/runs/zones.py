@@ -15,6 +15,7 @@ import numpy as np
 
 from visup.agent import VisupError, Zone
 from visup.agent.model.errors import ErrorGroup, SettingsError
+from visup.agent.storage.text_file import read_text_file
 from visup.rules.geometry.ground import Floats, projected
 from visup.tasks.actions.floor import floor_map
 from visup.tasks.grammar.nodes import Ground, Number
@@ -88,7 +89,7 @@ def _ground(given: object, path: Path) -> Ground | None:
 
 def _entries(path: Path) -> tuple[list[Any], object]:
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
+        found = tomllib.loads(read_text_file(path))
     except OSError as fault:
         raise SettingsError(
             f"the zones cannot be read: {fault.strerror}", where=str(path)

@@ -18,10 +18,13 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import SettingsError
+from visup.agent.storage.text_file import read_text_file
 from visup.teaching.outlines import DrawnOutline
 
 VIDEOS = ("clip.mp4", "video.mp4")
 """Names of a clip's video in its folder."""
+
+LARGEST_BRIEF_BYTES = 16 * 2**20
 
 EXPECTED = '{"teach": {NAME: {"clip": FOLDER, "frame": N, "polygon": [[x, y], ...]}}}'
 
@@ -81,7 +84,7 @@ def clip_video(folder: Path) -> Path:
 
 def _read(path: Path) -> Mapping[str, Any]:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = json.loads(read_text_file(path, LARGEST_BRIEF_BYTES))
     except OSError as e:
         raise SettingsError(
             f"the brief cannot be read ({e.strerror or e})", where=str(path), expected=EXPECTED

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, VisupError
+from visup.agent.storage.text_file import read_text_file
 from visup.render.scenario.optics import (
     Camera,
     Direction,
@@ -222,7 +223,7 @@ def load_scenario(path: Path) -> Scenario:
         ManyErrors: It has several.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text_file(path)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not a text file"
         raise SettingsError(

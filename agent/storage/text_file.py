@@ -1,0 +1,42 @@
+"""Text files that others wrote, read within bounds: regular files of a limited size, in UTF-8."""
+
+from __future__ import annotations
+
+import os
+import stat
+from errno import EFBIG, EINVAL
+from pathlib import Path
+
+LARGEST_TEXT_BYTES = 2**20
+"""No task, rules, zones or settings are larger; the largest that ship take a hundredth of it."""
+
+
+def read_text_file(path: Path, most: int = LARGEST_TEXT_BYTES) -> str:
+    """The text of a file; a mark of the byte order at its beginning is no part of it.
+
+    Raises:
+        OSError: It cannot be read, is a device or a pipe, or is larger than that.
+        UnicodeDecodeError: It is not UTF-8.
+    """
+    return read_bounded(path, most).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bounded(path: Path, most: int) -> bytes:
+    """The bytes of a regular file that is no larger than that.
+
+    Raises:
+        OSError: It cannot be read, is a device or a pipe, or is larger.
+    """
+    # What is no file may never come to an end, or to a beginning.
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    with open(handle, "rb") as file:  # noqa: PTH123  # of a descriptor
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(EINVAL, "it is not a file", str(path))
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(EFBIG, f"it is larger than {_size(most)}", str(path))
+    return data
+
+
+def _size(most: int) -> str:
+    return f"{most >> 20} MB" if most >= 2**20 else f"{most} bytes"

@@ -1,0 +1,152 @@
+"""What a task file may ask for at most: whatever is accepted can be followed in bounded time and memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, islice
+from math import prod
+
+from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.tasks.grammar.analysis import Grammar
+from visup.tasks.grammar.graphs import dependencies_first
+from visup.tasks.grammar.nodes import (
+    Actors,
+    AnyOrder,
+    Choice,
+    Conditioned,
+    Counted,
+    Course,
+    Reference,
+    Repeated,
+    Sequence,
+    Timed,
+    Together,
+    walk,
+)
+
+LONGEST_FILE = 600_000
+"""Characters of a task, with all that it includes; the longest that ships has two thousand."""
+LONGEST_LINE = 20_000
+MOST_FAULTS = 100
+"""Mistakes of a file that are told; who made more knows enough."""
+MOST_STAGES = 2_000
+"""Stages of a file. With 2,000 a run begins within some seconds; with 10,000 it takes a minute."""
+DEEPEST_STAGES = 100
+"""Stages inside one another; each takes some of the depth that Python allows."""
+MOST_WAYS = 500
+"""Ways in which a course may begin. With 256 a step takes 10 ms, with 4,000 half a second, and each
+alternative beside another doubles them."""
+MOST_TOGETHER = 12
+"""Things at the same time; each of which may go on by itself."""
+
+
+def text_fault(text: str, source: Source) -> Diagnostic | None:
+    """What is wrong with the size of a text, before anything of it is read."""
+    if len(text) > LONGEST_FILE:
+        what = f"the file has {len(text)} characters"
+        return Diagnostic("E137", what, source.place(1, 1), f"at most {LONGEST_FILE}")
+    for number, line in enumerate(text.split("\n"), start=1):
+        if len(line) > LONGEST_LINE:
+            what = f"the line has {len(line)} characters"
+            hint = "a statement may go on in the next line"
+            return Diagnostic(
+                "E137", what, source.place(number, 1), f"at most {LONGEST_LINE}", hint
+            )
+    return None
+
+
+@dataclass(frozen=True)
+class BoundsCheck:
+    """Checks of how much a task asks for.
+
+    Attributes:
+        grammar: Of the task, with at least one rule.
+        source: For places.
+    """
+
+    grammar: Grammar
+    source: Source
+
+    def faults(self) -> Iterator[Diagnostic]:
+        """The first thing that is too much."""
+        yield from islice(chain(self._sizes(), self._stages()), 1)
+
+    def _sizes(self) -> Iterator[Diagnostic]:
+        stages = self.grammar.task.stages
+        if len(stages) > MOST_STAGES:
+            what = f"the task has {len(stages)} stages"
+            place = stages[MOST_STAGES].span
+            yield self.source.fault("E239", what, place, f"at most {MOST_STAGES}")
+        bodies = [s.body for s in stages if not isinstance(s.body, Actors)]
+        for course in (c for body in bodies for c in walk(body)):
+            if isinstance(course, Together) and len(course.parts) > MOST_TOGETHER:
+                what = f"{len(course.parts)} things at the same time"
+                yield self.source.fault("E239", what, course.span, f"at most {MOST_TOGETHER}")
+
+    def _stages(self) -> Iterator[Diagnostic]:
+        for name in self._order:
+            place = self.grammar.stages[name].span
+            if self._depths[name] > DEEPEST_STAGES:
+                what = f"stage `<{name}>` has more than {DEEPEST_STAGES} stages inside one another"
+                hint = "write those that follow one another side by side"
+                yield self.source.fault("E239", what, place, hint=hint)
+            if self._ways[name] > MOST_WAYS:
+                what = f"stage `<{name}>` may begin in {self._counted(name)} ways"
+                hint = "have fewer alternatives at the same time"
+                yield self.source.fault("E239", what, place, f"at most {MOST_WAYS}", hint)
+
+    @cached_property
+    def _order(self) -> list[str]:
+        """Stages, each after those that it refers to, as far as there are no circles."""
+        return dependencies_first(self.grammar.mentions)
+
+    @cached_property
+    def _depths(self) -> dict[str, int]:
+        depths: dict[str, int] = {}
+        for name in self._order:
+            inside = (depths.get(n, 0) for n in self.grammar.mentions[name])
+            depths[name] = 1 + max(inside, default=0)
+        return depths
+
+    @cached_property
+    def _ways(self) -> dict[str, int]:
+        ways: dict[str, int] = {}
+        for name in self._order:
+            body = self.grammar.stages[name].body
+            ways[name] = 1
+            if not isinstance(body, Actors):
+                # Also what is come to later: a course inside may branch more than the whole does at first.
+                inside = (c for c in walk(body) if isinstance(c, Together))
+                most = max((self._begins(c, ways) for c in inside), default=1)
+                ways[name] = min(max(most, self._begins(body, ways)), MOST_WAYS**2)
+        return ways
+
+    def _begins(self, course: Course, ways: dict[str, int]) -> int:
+        """In how many ways a course may begin, at most; being left out is one."""
+        match course:
+            case Reference(stage=name):
+                return ways.get(name, 1)
+            case Choice(options=parts) | AnyOrder(items=parts):
+                return sum(self._begins(p, ways) for p in parts)
+            case Together(parts=parts):
+                return prod(min(self._begins(p, ways), MOST_WAYS) for p in parts)
+            case Repeated(item=item) | Counted(item=item):
+                return self._begins(item, ways) + 1
+            case Timed(item=item) | Conditioned(item=item):
+                return self._begins(item, ways)
+            case Sequence(items=items):
+                return self._of_sequence(items, ways)
+        return 1
+
+    def _of_sequence(self, items: tuple[Course, ...], ways: dict[str, int]) -> int:
+        total = 0
+        for item in items:
+            total += self._begins(item, ways)
+            if not self.grammar.nullable(item):
+                break
+        return total
+
+    def _counted(self, name: str) -> str:
+        return str(self._ways[name]) if self._ways[name] < MOST_WAYS**2 else "countless"

@@ -1,0 +1,151 @@
+"""What `check` accepts can be watched, in bounded time and memory; all else it refuses in words."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from visup.agent import Mind, Observation
+from visup.agent.model.errors import VisupError
+from visup.rules.language.parser import load_rules, parse_rules
+from visup.tasks import load_tasks, parse_task
+from visup.tasks.checks.bounds import DEEPEST_STAGES, MOST_FAULTS
+from visup.tasks.supervision.supervise import task_reasoner
+from visup.tasks.tools.outline import outline
+
+ACTIONS = ("converging", "touching", "diverging")
+
+
+def chained(count: int) -> str:
+    lines = [f"<s{i}> ::= {ACTIONS[i % 3]}(a, b) <s{i + 1}>" for i in range(count)]
+    return "\n".join([*lines, f"<s{count}> ::= {ACTIONS[count % 3]}(a, b)"])
+
+
+def beside(count: int, form: str) -> str:
+    return "<t> ::= " + "\n & ".join(f"({form.format(n)})" for n in range(count))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (chained(3000), "3001 stages"),
+        (chained(DEEPEST_STAGES), "inside one another"),
+        (
+            "\n".join(f"<s{n}> ::= <s{n + 1}>" for n in range(1500)) + "\n<s1500> ::= seen(a)",
+            "inside",
+        ),
+        (beside(25, "converging(a, b{0}) | touching(a, b{0})"), "25 things at the same time"),
+        (beside(10, "converging(a, b{0}) | touching(a, b{0})"), "1024 ways"),
+        ("<t> ::= " + " ".join(f"convergin{n}(a, b)" for n in range(5000)), "characters"),
+        ("<t> ::= " + "\n".join(f"<s{n}>" for n in range(90_000)), "characters"),
+        ("<t> ::= " + "(" * 3000 + "seen(a)" + ")" * 3000, "too deep|60 deep|characters"),
+    ],
+)
+def test_what_cannot_be_followed_is_refused_at_once(text: str, said: str) -> None:
+    begin = time.monotonic()
+    with pytest.raises(VisupError, match=said) as told:
+        parse_task(text)
+    assert time.monotonic() - begin < 5.0
+    assert len(str(told.value)) < 100_000
+
+
+def test_many_mistakes_are_told_in_a_bounded_text() -> None:
+    text = "<t> ::= " + "\n".join(f"convergin{n}(a, b)" for n in range(5000))
+    with pytest.raises(VisupError) as told:
+        parse_task(text)
+    assert len(getattr(told.value, "errors", (1,))) <= MOST_FAULTS
+    assert len(str(told.value)) < 100_000
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.one_of(
+        st.integers(1, DEEPEST_STAGES - 1).map(chained),
+        st.tuples(
+            st.integers(2, 8),
+            st.sampled_from(
+                ["converging(a, b{0}) | touching(a, b{0})", "seen(b{0}) touching(a, b{0})"]
+            ),
+        ).map(lambda t: beside(*t)),
+    )
+)
+def test_what_is_accepted_is_watched_drawn_and_written(text: str) -> None:
+    task = parse_task(text)
+    begin = time.monotonic()
+    reason, mind = task_reasoner([task]), Mind()
+    for n in range(3):
+        mind = reason(mind, Observation(n, n / 10, (64, 48))).mind
+    assert outline(task).inside
+    assert parse_task(str(task)) == task
+    assert time.monotonic() - begin < 10.0
+
+
+def test_include_stays_in_the_folder_of_the_task(tmp_path: Path) -> None:
+    inside = tmp_path / "cell"
+    (inside / "parts").mkdir(parents=True)
+    (tmp_path / "secret").write_text("the password is swordfish\n")
+    (inside / "parts" / "common.task").write_text("<near> ::= converging(a, b)\n")
+    (inside / "link.task").symlink_to(tmp_path / "secret")
+    good = inside / "good.task"
+    good.write_text('include "parts/common.task"\n<t> ::= <near> touching(a, b)\n')
+    assert load_tasks(good)[0].name == "t"
+    for path in ("../secret", str(tmp_path / "secret"), "link.task", "parts/../../secret"):
+        (inside / "bad.task").write_text(f'include "{path}"\n<t> ::= seen(a)\n')
+        with pytest.raises(VisupError, match="cannot be included") as told:
+            load_tasks(inside / "bad.task")
+        assert "swordfish" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["x" * 3900, "x/" * 1900, "\\0", "/dev/zero", "."])
+def test_an_include_that_is_no_file_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "a.task").write_text(f'include "{name}"\n<t> ::= seen(a)\n')
+    with pytest.raises(VisupError):
+        load_tasks(tmp_path / "a.task")
+
+
+RULE = 'rule close(a, b): warning\n    when gap(a, b) < 9 px\n    say "{a}."\n'
+
+
+def test_a_mark_of_the_byte_order_is_accepted_in_both(tmp_path: Path) -> None:
+    (tmp_path / "a.rules").write_text(RULE, "utf-8-sig")
+    assert load_rules(tmp_path / "a.rules")[0].name == "close"
+    (tmp_path / "a.task").write_text("<t> ::= seen(a)\n", "utf-8-sig")
+    assert load_tasks(tmp_path / "a.task")[0].name == "t"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        RULE.replace("when ", "when " + "not " * 1000),
+        RULE.replace(
+            "when gap(a, b) < 9 px", "when " + " and ".join(["gap(a, b) < 9 px"] * 20_000)
+        ),
+        RULE.replace("gap", "(" * 3000 + "gap"),
+        "".join(RULE.replace("close", f"r{n}") for n in range(2000)),
+        "rule " * 40_000,
+        RULE * 900,
+    ],
+)
+def test_rules_that_are_too_much_are_refused_at_once(text: str) -> None:
+    begin = time.monotonic()
+    with pytest.raises(VisupError) as told:
+        parse_rules(text)
+    assert time.monotonic() - begin < 10.0
+    assert len(str(told.value)) < 100_000
+
+
+def test_what_is_no_file_is_read_by_nobody(tmp_path: Path) -> None:
+    import os
+
+    from visup.runs.zones import load_zones
+
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "large").write_bytes(b"#" * (2**20 + 1))
+    for path in (Path("/dev/zero"), tmp_path / "pipe", tmp_path / "large", tmp_path):
+        for load in (load_rules, load_tasks, load_zones):
+            with pytest.raises(VisupError):
+                load(path)
