@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from visup.agent import Event, Mind, Observation, Status, Verdict
+from visup.agent import Event, Mind, Observation, Status, TaskBelief, Verdict
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.supervision.supervise import MEMORY, finish, task_reasoner
 
@@ -47,7 +47,8 @@ def judged(task: Task, minds: Sequence[Mind]) -> JudgedRun:
         minds: In the order of time.
     """
     reasoner = task_reasoner([task])
-    memory, beliefs, events = MEMORY.default, (), list[Event]()
+    memory, events = MEMORY.default, list[Event]()
+    beliefs: tuple[TaskBelief, ...] = ()
     for number, mind in enumerate(minds):
         blank = mind.remember(MEMORY, memory, tasks=beliefs, alerts=())
         outcome = reasoner(blank, Observation(number, mind.time, mind.frame_size))

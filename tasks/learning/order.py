@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from statistics import mean
 
 from visup.tasks.learning.traces import Happening, RunTrace, Symbol
@@ -171,7 +171,7 @@ def _plan(items: list[Occurrence], before: Callable[[Occurrence, Occurrence], bo
     ]
     if cuts:
         edges = [0, *cuts, len(items)]
-        blocks = [items[i:j] for i, j in zip(edges[:-1], edges[1:], strict=True)]
+        blocks = [items[i:j] for i, j in pairwise(edges)]
         return Series(tuple(_plan(b, before) for b in blocks))
     groups = _components(items, before)
     if len(groups) > 1:
