@@ -24,7 +24,7 @@ SAYS = {
     "07_marker_pose.py": "marker 7 is 0.5",
     "08_depth_camera.py": "region 1 at 4.0 m",
     "10_step_and_ask_why.py": "it rests on ",
-    "11_call_a_closer_look.py": "is called for an unidentified object",
+    "11_call_a_closer_look.py": "'closer_look' is called for object 1.",
     "12_your_own_cell.py": "verdict: succeeded",
     "09_another_process.py": "late: it gave no answer within 500 ms",
 }

@@ -10,6 +10,7 @@ import typer
 
 from visup.agent.model.errors import VisupError
 from visup.commands.behaviours import app as behaviours_app
+from visup.commands.check import check
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
@@ -40,6 +41,7 @@ app = typer.Typer(
 )
 app.command("watch")(watch)
 app.command("demo")(demo)
+app.command("check")(check)
 app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)

@@ -9,9 +9,12 @@ reasoned about again without its video. Read next: `journal_reader.py`, which re
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 import zlib
+from contextlib import closing
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -239,7 +242,7 @@ def segment_path(path: Path, number: int) -> Path:
 def segments(path: Path) -> list[Path]:
     """The files of a journal, in order; the first one is always among them."""
     found = [path]
-    while (following := segment_path(path, len(found) + 1)).exists():
+    while (following := segment_path(path, len(found) + 1)).is_file():
         found.append(following)
     return found
 
@@ -247,6 +250,29 @@ def segments(path: Path) -> list[Path]:
 def is_empty(db: sqlite3.Connection) -> bool:
     """Whether a file is a segment that was not begun."""
     return db.execute("SELECT 1 FROM sqlite_schema LIMIT 1").fetchone() is None
+
+
+def check_schema(db: sqlite3.Connection, path: Path) -> None:
+    """Refuse a file whose tables are not those of a journal, before anything of them is read.
+
+    A view in the place of a table may be a program, and one without an end.
+
+    Raises:
+        OutputError: They are not.
+    """
+    db.execute("PRAGMA trusted_schema = OFF")
+    if sorted(db.execute(_SCHEMA_OF)) != _expected_schema():
+        raise OutputError("this is not a journal", where=str(path), expected="a run of visup")
+
+
+_SCHEMA_OF = "SELECT type, name, tbl_name, sql FROM sqlite_schema"
+
+
+@cache
+def _expected_schema() -> list[Any]:
+    with closing(sqlite3.connect(":memory:")) as db:
+        db.executescript(SCHEMA)
+        return sorted(db.execute(_SCHEMA_OF))
 
 
 def check_version(db: sqlite3.Connection, path: Path) -> None:
@@ -266,6 +292,7 @@ def check_version(db: sqlite3.Connection, path: Path) -> None:
             expected=f"version {VERSION}",
             hint="record the run again with this visup, or read it with the visup that wrote it",
         )
+    check_schema(db, path)
 
 
 def summary(step: Step) -> dict[str, Any]:
@@ -310,8 +337,14 @@ def _alert_row(a: Alert) -> tuple[Any, ...]:
 
 
 def _text(value: Any) -> str:
-    """Plain values as JSON, the same values as the same text."""
-    return _TEXT.encode(value)
+    """Plain values as JSON, the same values as the same text.
+
+    File names that are not UTF-8 hold what no file can; it stands in the text as escapes.
+    """
+    return _SURROGATE.sub(lambda found: f"\\u{ord(found[0]):04x}", _TEXT.encode(value))
+
+
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 _TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)

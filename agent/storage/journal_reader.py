@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sqlite3
 import zlib
 from collections.abc import Iterator, Mapping
@@ -11,14 +12,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from visup.agent.model.errors import OutputError
+from visup.agent.contract.percept_values import LARGEST_SIDE, check_value, expect, is_finite
+from visup.agent.model.errors import BehaviourError, OutputError
 from visup.agent.model.records import Observation
 from visup.agent.storage.atomic import replacing
-from visup.agent.storage.codec import unpack_observation
+from visup.agent.storage.codec import LARGEST_STEP_BYTES, unpack_observation
 from visup.agent.storage.journal import check_version, is_empty, segments
+from visup.agent.storage.mask_codec import check_room
 
 JOURNAL = "journal.sqlite"
-_LARGEST_ROW = 2**30
+_LARGEST_ROW = LARGEST_STEP_BYTES
+_LARGEST_RECORD = 16 * 2**20
+"""Characters of a record that is no step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +105,7 @@ class Recording:
             where = f"{path}, frame {index}"
             if not isinstance(seen, bytes) or zlib.crc32(seen) != crc:
                 raise _damaged(where, "its check sum is wrong")
-            yield unpack_observation(seen, where)
+            yield checked(unpack_observation(seen, where), where)
 
     def first_and_last(self) -> tuple[int, int] | None:
         """Numbers of the first and last frame whose steps are kept, or None when there are none."""
@@ -140,9 +145,35 @@ class Recording:
 
     def _loaded(self, text: Any) -> Any:
         try:
+            if not isinstance(text, str) or len(text) > _LARGEST_RECORD:
+                raise ValueError(f"a record is no text, or longer than {_LARGEST_RECORD >> 20} MB")
+            check_room(text.encode(errors="replace"))
             return json.loads(text)
         except (ValueError, TypeError, RecursionError) as fault:
             raise _damaged(str(self.path), str(fault)) from fault
+
+
+def checked(observation: Observation, where: str) -> Observation:
+    """The same observation, once it is known to hold what behaviours may report.
+
+    Raises:
+        OutputError: It does not.
+    """
+    size = observation.frame_size
+    try:
+        fine = math.isfinite(observation.time) and all(0 < side <= LARGEST_SIDE for side in size)
+        expect(fine, f"a frame of {size[0]}x{size[1]} pixels at {observation.time} s", "a frame")
+        for report in observation.reports:
+            for p in report.percepts:
+                fine = is_finite(p.time) and is_finite(p.confidence) and 0 <= p.confidence <= 1
+                expect(fine, f"'{p.kind}' has no time or confidence", "numbers")
+                check_value(p.kind, p.value, size, f"'{p.kind}'")
+    except (BehaviourError, TypeError, ValueError, AttributeError, OverflowError) as fault:
+        raise _damaged(where, str(fault)[:LONGEST_FAULT]) from fault
+    return observation
+
+
+LONGEST_FAULT = 300
 
 
 def export_events(journal: Path, target: Path) -> None:

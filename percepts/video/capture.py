@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video.quiet_decoder import hush_decoder, quiet
 from visup.percepts.video.source import DEFAULT_FPS, to_bgr
 
@@ -54,7 +55,7 @@ def open_capture(name: str | int) -> Capture:
         if isinstance(name, int) or name.startswith("/dev/"):
             return cv2.VideoCapture(name)
         if "://" not in name:
-            return cv2.VideoCapture(name, cv2.CAP_FFMPEG)
+            return cv2.VideoCapture(opencv_name(name), cv2.CAP_FFMPEG)
         timeouts = (cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, cv2.CAP_PROP_READ_TIMEOUT_MSEC)
         return cv2.VideoCapture(
             name, cv2.CAP_FFMPEG, [v for p in timeouts for v in (p, CONNECT_MS)]

@@ -18,6 +18,7 @@ from tests.paths import ROOT
 from visup.agent.model.errors import ExtraMissingError, SettingsError, SourceError
 from visup.api.recorded import RecordedStep
 from visup.api.records import Records, columns
+from visup.runs.demo import demo_settings
 from visup.testing import crossing
 
 FRAMES = 30
@@ -175,7 +176,8 @@ def test_bad_input_is_told_in_words(given: dict[str, object], said: str) -> None
 
 
 def test_a_task_that_was_loaded_can_be_verified(clip: Path) -> None:
-    run = visup.watch(clip, fps=25, task=visup.load_task("dock"))
+    models = demo_settings().models  # any that has the actors' names
+    run = visup.watch(clip, fps=25, task=visup.load_task("dock"), models=models)
     assert run.settings.tasks == ("dock:dock",)
     assert next(run).mind.tasks[0].task == "dock"
     run.stop()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -165,12 +165,24 @@ def run_and_report(
             operator=HumanOperator(shown.all_answers(), typed, console.print),
             notice=None
             if shown.as_json
-            else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]"),
+            else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]", soft_wrap=True),
         )
-        result = supervise(settings, folder, audience=audience, options=options, past=past)
+        with no_empty_folder(folder):
+            result = supervise(settings, folder, audience=audience, options=options, past=past)
     narrator.finish()
     _print_result(console, result, as_json=shown.as_json)
     return result
+
+
+@contextmanager
+def no_empty_folder(folder: Path) -> Iterator[None]:
+    """What is refused before its first frame leaves no folder behind."""
+    try:
+        yield
+    except Exception:
+        with suppress(OSError):
+            folder.rmdir()  # only what is empty can be removed so
+        raise
 
 
 @contextmanager

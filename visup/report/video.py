@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
+from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video.quiet_decoder import quiet
 from visup.report.annotate import annotate
 
@@ -77,7 +78,7 @@ class WebmWriter:
         # FFmpeg picks the tag of the container by itself and says so on standard error.
         with quiet():
             code = cv2.VideoWriter.fourcc(*FOURCC)
-            writer = cv2.VideoWriter(str(self.path), cv2.CAP_FFMPEG, code, self.fps, size)
+            writer = cv2.VideoWriter(opencv_name(self.path), cv2.CAP_FFMPEG, code, self.fps, size)
         if not writer.isOpened():
             raise OutputError(
                 "the annotated video cannot be written",

@@ -14,6 +14,7 @@ from visup.agent.model.step import Observer, Step
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
+from visup.runs.inputs.preflight import check_cast
 from visup.runs.monotonic_clock import MonotonicFrames
 from visup.runs.recorder import Recorder, recorder_state
 from visup.runs.result import RunResult
@@ -148,7 +149,8 @@ def _supervised(
 ) -> Generator[Step | None, None, RunResult]:
     """First None, once everything is open; then the steps."""
     with ExitStack() as stack:
-        run = _Run(settings, folder, options, past, stack)
+        answered = audience.operator is not None and bool(audience.operator.answers)
+        run = _Run(settings, folder, options, past, stack, answered=answered)
         frames = run.catch_up(past) if past else run.source
         run.connect(audience, past)
         timed = run.timed(frames, past)
@@ -167,11 +169,14 @@ class _Run:
         options: RunOptions,
         past: InterruptedRun | None,
         stack: ExitStack,
+        *,
+        answered: bool,
     ) -> None:
         self._faults = RuntimeFaults()
         self.source = stack.enter_context(open_video(settings))
         self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
+        self._warnings = () if past else check_cast(settings, self._agent, answered=answered)
         # Actors as they were bound are recorded, so that a replay, which sees no models, has them too.
         actors = self._agent.mind.actors
         self._notes = _told_of_actors(settings.actors, actors)
@@ -211,12 +216,21 @@ class _Run:
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         others = (*audience.observers, self._sinks, *answering)
         self._agent.observers = (self._severity, *recording, *others)
+        for warning in self._warnings:
+            self._warn(warning, audience.notice)
         if self._recorder:
             self._faults.add_source(self._recorder.runtime_faults)
         self._faults.add_source(self._sinks.runtime_faults)
         if isinstance(self.source, LiveSource):
             self.source.notify = notify(self._sinks, audience.notice)
             self._faults.add_source(self.source.runtime_faults)
+
+    def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
+        """Say something before the first frame; who is told nothing then finds it among the notes."""
+        if notice:
+            notice(text)
+        else:
+            self._notes = (*self._notes, text)
 
     def timed(self, frames: Iterator[Frame], past: InterruptedRun | None) -> MonotonicFrames:
         """Frames in real time where that is wanted, and in any case with times that grow."""

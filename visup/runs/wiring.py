@@ -24,10 +24,10 @@ from visup.rules.activation.activation import ActivationReasoner, activation_rul
 from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
 from visup.rules.reasoners import default_reasoners
-from visup.runs.plugins import user_behaviours
+from visup.runs.inputs.plugins import user_behaviours
+from visup.runs.inputs.zones import load_ground, load_zones
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
-from visup.runs.zones import load_ground, load_zones
 from visup.tasks import load_tasks
 from visup.tasks.casting.fitness import asks_for_colour, asks_for_traits
 from visup.tasks.grammar.criteria import Place

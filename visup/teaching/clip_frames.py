@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
+from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import VideoSource, open_source
 from visup.percepts.video.source import to_bgr
 
@@ -125,7 +126,7 @@ class ClipFrames:
 
 
 def _read_picture(path: Path) -> Picture:
-    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    picture = cv2.imread(opencv_name(path), cv2.IMREAD_UNCHANGED)
     if picture is None:
         raise SourceError("this is not a picture that can be read", where=str(path))
     return to_bgr(picture)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError, SettingsError
+from visup.percepts.opencv_names import opencv_name
 from visup.percepts.shape.building.build_parts import BuildPart, is_made, parts_of, read_part
 from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
 from visup.percepts.shape.database.model_database import ModelDatabase
@@ -57,7 +58,7 @@ def read_silhouette(path: Path) -> NDArray[np.bool_]:
 
 
 def _read_grey(path: Path) -> NDArray[np.uint8]:
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) if path.is_file() else None
+    image = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE) if path.is_file() else None
     if image is None:
         raise DatabaseError(
             "this is not a picture that can be read"

@@ -19,7 +19,7 @@ from visup.agent.execution.sandbox import isolating
 from visup.agent.model.errors import BehaviourError, SettingsError
 from visup.agent.plugins.isolated import IsolatedBehaviour
 
-LIMITS = Limits(hang_s=1.0, start_s=20.0)
+LIMITS = Limits(hang_s=2.0, start_s=20.0)
 
 HEAD = """
 import os, sys, signal, socket, struct, time

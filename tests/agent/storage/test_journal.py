@@ -101,10 +101,14 @@ def test_a_step_that_cannot_be_written_leaves_the_earlier_ones(tmp_path: Path) -
     agent = Agent([], Reasoners(update=(counting,)), observers=(journal.record,))
     agent.run(frames(3))
     blocker = sqlite3.connect(path)
-    blocker.execute("DROP TABLE events")  # as good as a disk that fills up
+    blocker.execute("ALTER TABLE events RENAME TO hidden")  # as good as a disk that fills up
     blocker.commit()
-    blocker.close()
     with pytest.raises(OutputError):
         agent.run(frames(1))
+    blocker.execute("ALTER TABLE hidden RENAME TO events")
+    blocker.execute("PRAGMA writable_schema = ON")  # it is quoted now
+    blocker.execute("UPDATE sqlite_schema SET sql = replace(sql, '\"events\"', 'events')")
+    blocker.commit()
+    blocker.close()
     journal.close()
     assert [s["frame_index"] for s in Recording.open(path).summaries()] == [0, 1, 2]

@@ -23,7 +23,7 @@ from visup.rules.relations.zones import (
     reaching,
     wholly_inside,
 )
-from visup.runs.zones import load_zones
+from visup.runs.inputs.zones import load_zones
 
 DOCK = Zone("dock", ((300.0, 100.0), (500.0, 100.0), (500.0, 400.0), (300.0, 400.0)))
 DEEP = replace(DOCK, name="deep", depth=(10.0, 20.0))

@@ -11,9 +11,9 @@ from visup.agent import Mind, TaskBelief, Verdict, Zone
 from visup.agent.model.errors import SettingsError
 from visup.rules.reasoners import default_reasoners
 from visup.rules.relations.zones import inside, reaching
+from visup.runs.inputs.zones import load_ground, load_zones
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
-from visup.runs.zones import load_ground, load_zones
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import task_reasoner
 

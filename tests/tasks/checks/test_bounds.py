@@ -141,7 +141,7 @@ def test_rules_that_are_too_much_are_refused_at_once(text: str) -> None:
 def test_what_is_no_file_is_read_by_nobody(tmp_path: Path) -> None:
     import os
 
-    from visup.runs.zones import load_zones
+    from visup.runs.inputs.zones import load_zones
 
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "large").write_bytes(b"#" * (2**20 + 1))

@@ -19,6 +19,7 @@ from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.files import read_json
 from visup.evaluation.simulation.truth_masks import LAG_S, TrueMask, moved_since, true_mask
+from visup.percepts.opencv_names import opencv_name
 from visup.testing import region_of
 
 LEAST_PX = 30
@@ -68,7 +69,7 @@ class MaskRegions:
 
     def _read(self, frame: Frame) -> NDArray[np.uint8]:
         path = self.folder / "masks" / f"{frame.index:05d}.png"
-        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        picture = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
         if picture is None:
             raise SettingsError("a mask is missing or cannot be read", where=str(path))
         return np.asarray(picture, dtype=np.uint8)

@@ -14,6 +14,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.pose_errors import Poses
 from visup.evaluation.missions.recorder import MissionRecorder, ObservedObject
 from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth
+from visup.percepts.opencv_names import opencv_name
 
 SMALLEST_SCORED_PX = 500
 COVERING_IOU = 0.5
@@ -39,7 +40,7 @@ def overlaps_of(
 def _overlap(
     path: Path, labels: Mapping[str, int], seen: Sequence[ObservedObject]
 ) -> dict[str, tuple[int, dict[int, float]]]:
-    mask = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    mask = cv2.imread(opencv_name(path), cv2.IMREAD_UNCHANGED)
     if mask is None:
         raise SettingsError("a mask is missing or cannot be read", where=str(path))
     return {name: _ious(mask == label, seen) for name, label in labels.items()}

@@ -31,6 +31,7 @@ from visup.evaluation.motion.mask_scores import (
 )
 from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth
 from visup.percepts.motion.segmenter import MotionSegmenter
+from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import open_source
 
 KEYS = ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
@@ -175,7 +176,7 @@ def _frames(
 
 
 def _labels(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
-    labels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    labels = cv2.imread(opencv_name(path), cv2.IMREAD_UNCHANGED)
     if labels is None:
         raise SourceError("this mask cannot be read", where=str(path), expected="an 8-bit PNG")
     if labels.ndim == 3:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from visup.agent import Region
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.missions.files import read_json
+from visup.percepts.opencv_names import opencv_name
 from visup.rules.coupling.relative_motion import TargetOutline, outline_template, registered
 from visup.rules.geometry.regions import outline
 from visup.testing import region_of
@@ -142,7 +143,7 @@ def _velocity(
 
 
 def _masks(path: Path, labels: Mapping[str, int]) -> dict[str, TrueMask]:
-    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    picture = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
     if picture is None:
         raise SettingsError("a mask is missing or cannot be read", where=str(path))
     found = {name: true_mask(np.asarray(picture == label)) for name, label in labels.items()}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import OutputError, SettingsError
+from visup.percepts.opencv_names import opencv_name
 
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".webm": "VP90"}
 """Container -> codec that OpenCV writes and reads everywhere."""
@@ -31,7 +32,7 @@ class ClipWriter:
         check_container(path.suffix)
         code = cv2.VideoWriter_fourcc(*CODECS[path.suffix])  # type: ignore[attr-defined]
         self._path = path
-        self._writer = cv2.VideoWriter(str(path), code, fps, size)
+        self._writer = cv2.VideoWriter(opencv_name(path), code, fps, size)
         if not self._writer.isOpened():
             raise OutputError("the video cannot be written", where=str(path))
 

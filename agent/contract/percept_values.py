@@ -1,0 +1,219 @@
+"""Whether a value makes sense for its kind of percept: of the kinds of visup, and of plug-ins' own.
+
+Asked of what a behaviour reports (`validation.py`), and of what a journal says that one reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.agent.model.errors import BehaviourError
+from visup.agent.model.records import Depth, Health, HealthStatus, Hypothesis, Region
+
+DEEPEST = 8
+"""Values of plug-ins' own kinds may nest this deep."""
+MOST_BITS = 1024
+"""Whole numbers are no longer: they could not be written down and read back."""
+LARGEST_SIDE = 2**16
+"""Pixels of a frame's side."""
+
+
+def check_value(kind: str, value: Any, size: tuple[int, int], who: str) -> None:
+    """Refuse a value that makes no sense.
+
+    Args:
+        kind: Of percept.
+        value: What was perceived.
+        size: Width and height of the frame, pixels.
+        who: Who says so, for the message.
+
+    Raises:
+        BehaviourError: It is nonsense.
+    """
+    check = VALUE_CHECKS.get(kind)
+    if check is None:
+        _own(value, who)
+        return
+    kind_type, judge = check
+    expect(isinstance(value, kind_type), f"{who} as {a_kind(value)}", _a_type(kind_type))
+    judge(value, size)
+
+
+def _region(r: Region, size: tuple[int, int]) -> None:
+    who = f"region {brief(r.id)}"
+    expect(
+        isinstance(r.id, int) and _integer(r.id) and r.id >= 1,
+        f"{who} has no number",
+        "an id from 1",
+    )
+    expect(
+        isinstance(r.bbox, tuple) and len(r.bbox) == 4 and all(_integer(v) for v in r.bbox),
+        f"{who} has box {brief(r.bbox)}",
+        "(x, y, width, height) in whole pixels",
+    )
+    x, y, w, h = r.bbox
+    inside = x >= 0 and y >= 0 and w > 0 and h > 0 and x + w <= size[0] and y + h <= size[1]
+    shape = getattr(r.mask, "shape", None)
+    expect(
+        inside and shape == (h, w),
+        f"{who} has box {r.bbox} and a mask of {brief(shape)}",
+        f"a box within {size} and a mask of (height, width) of the box",
+    )
+    expect(r.mask.dtype == np.bool_, f"{who} has a mask of {r.mask.dtype}", "a mask of bool")
+    expect(bool(r.mask.any()), f"{who} has an empty mask", "at least one pixel")
+    _array(r.contour, f"{who}: contour", (None, 2))
+    if r.motion is not None:
+        _array(r.motion, f"{who}: motion", (2, 3))
+    for name, value in (("centroid", r.centroid), ("velocity", r.velocity)):
+        pair = isinstance(value, tuple) and len(value) == 2 and all(is_finite(v) for v in value)
+        expect(pair, f"{who} has {name} {brief(value)}", "(x, y), two finite numbers")
+    for name, number in (("area", r.area), ("velocity_sigma", r.velocity_sigma)):
+        expect(_least(number, 0.0), f"{who} has {name} {brief(number)}", "a number, at least 0")
+    expect(_share(r.confidence), f"{who} has confidence {brief(r.confidence)}", "0 to 1")
+
+
+def _hypothesis(h: Hypothesis, size: tuple[int, int]) -> None:
+    who = f"hypothesis of region {brief(h.region_id)}"
+    expect(_integer(h.region_id), f"{who} has no region", "the id of a region of this frame")
+    expect(isinstance(h.name, str) and bool(h.name), f"{who} has no name", "the name of a model")
+    expect(_integer(h.view), f"{who} has view {brief(h.view)}", "the number of a view")
+    expect(_share(h.similarity), f"{who} has similarity {brief(h.similarity)}", "0 to 1")
+    for name, value in (("rotation", h.rotation), ("scale", h.scale)):
+        fine = value is None or is_finite(value)
+        expect(fine, f"{who} has {name} {brief(value)}", "a finite number, or None")
+    if h.direction is not None:
+        _array(h.direction, f"{who}: direction", (3,))
+
+
+def _depth(d: Depth, size: tuple[int, int]) -> None:
+    who = f"depth of region {brief(d.region_id)}"
+    expect(_integer(d.region_id), f"{who} has no region", "the id of a region of this frame")
+    expect(isinstance(d.name, str), f"{who} has name {brief(d.name)}", "the name of a model")
+    positive = is_finite(d.depth) and d.depth > 0
+    expect(positive, f"{who} is {brief(d.depth)}", "a finite number above 0")
+    expect(_least(d.sigma, 0.0), f"{who} has sigma {brief(d.sigma)}", "a number, at least 0")
+
+
+def _health(h: Health, size: tuple[int, int]) -> None:
+    fine = isinstance(h.status, HealthStatus) and isinstance(h.detail, str)
+    expect(fine, f"health has status {brief(h.status)}", "a HealthStatus and a sentence")
+
+
+VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] = {
+    "region": (Region, _region),
+    "hypothesis": (Hypothesis, _hypothesis),
+    "depth": (Depth, _depth),
+    "health": (Health, _health),
+}
+"""Kinds with a fixed type of value, and what judges one of them."""
+
+
+def _own(value: object, who: str, depth: int = 0) -> None:
+    """A value of a plug-in's own kind: data, in which all numbers are finite; what is missing is None."""
+    expect(depth <= DEEPEST, f"{who} nested too deep", f"at most {DEEPEST} levels")
+    if isinstance(value, int) and not isinstance(value, Enum):
+        expect(
+            value.bit_length() <= MOST_BITS,
+            f"{who} with a number of {value.bit_length()} bits",
+            f"at most {MOST_BITS}",
+        )
+        return
+    if value is None or isinstance(value, str | bytes | Enum | np.integer | np.bool_):
+        return
+    if isinstance(value, float | np.floating):
+        expect(bool(np.isfinite(value)), f"{who} as {value}", "a finite number, or None")
+    elif isinstance(value, np.ndarray):
+        _own_array(value, who)
+    else:
+        for part in _parts(value, who):
+            _own(part, who, depth + 1)
+
+
+def _parts(value: object, who: str) -> Iterable[object]:
+    if isinstance(value, Mapping):
+        return (*value.keys(), *value.values())
+    if isinstance(value, tuple | list | set | frozenset):
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        return [getattr(value, f.name) for f in fields(value)]
+    raise BehaviourError(
+        f"{who} with {a_kind(value)} in it",
+        expected="numbers, text, arrays, and lists, dicts or dataclasses of these",
+    )
+
+
+def _own_array(value: NDArray[Any], who: str) -> None:
+    expect(value.dtype.kind in "biufSU", f"{who} as an array of {value.dtype}", "numbers or text")
+    if value.dtype.kind == "f":
+        # A masked array says where nothing was measured.
+        known = value.compressed() if isinstance(value, np.ma.MaskedArray) else value
+        expect(
+            bool(np.isfinite(known).all()),
+            f"{who} with numbers that are not finite",
+            "finite numbers; mask what was not measured with numpy.ma",
+        )
+
+
+def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
+    try:
+        found = np.asarray(value)
+    except ValueError:
+        found = np.empty((), dtype=object)  # rows of unlike lengths
+    like = len(found.shape) == len(shape) and all(
+        wanted in (None, given) for wanted, given in zip(shape, found.shape, strict=True)
+    )
+    said = ", ".join("N" if n is None else str(n) for n in shape)
+    expect(like, f"{who} has shape {found.shape}", f"({said})")
+    numbers = found.dtype.kind in "iuf" and bool(np.isfinite(found).all())
+    expect(numbers, f"{who} contains a number that is not finite", "finite numbers")
+
+
+def expect(fine: bool, what: str, expected: str) -> None:
+    """Refuse what is not fine.
+
+    Raises:
+        BehaviourError: It is not.
+    """
+    if not fine:
+        raise BehaviourError(what, expected=expected)
+
+
+def is_finite(value: object) -> bool:
+    """Whether something is a number that is neither infinite nor none at all."""
+    plain = isinstance(value, int | float | np.integer | np.floating)
+    return plain and not isinstance(value, bool) and math.isfinite(value)  # type: ignore[arg-type]
+
+
+def _least(value: object, least: float) -> bool:
+    return is_finite(value) and value >= least  # type: ignore[operator]
+
+
+def _share(value: object) -> bool:
+    return is_finite(value) and 0.0 <= value <= 1.0  # type: ignore[operator]
+
+
+def _integer(value: object) -> bool:
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    return whole and abs(int(value)) < 2**63  # type: ignore[call-overload]
+
+
+def a_kind(value: object) -> str:
+    """What something is, with its article."""
+    return "nothing (None)" if value is None else _a_type(type(value))
+
+
+def _a_type(kind: type) -> str:
+    return f"{'an' if kind.__name__[:1].lower() in 'aeiou' else 'a'} {kind.__name__}"
+
+
+def brief(value: object) -> str:
+    """A value for a message: whatever it is, short and on one line."""
+    text = value if isinstance(value, str) else repr(value)
+    return " ".join(text.split())[:60]

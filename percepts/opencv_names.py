@@ -1,0 +1,38 @@
+"""File names that OpenCV can take: it dies of those that are not UTF-8, which it is given by a link."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+
+def opencv_name(path: str | os.PathLike[str]) -> str:
+    """A name by which OpenCV opens, or writes, a file.
+
+    Names on disk are bytes. Where they are not UTF-8 (an old archive, a bare `LC_ALL=POSIX`), Python stands
+    in for them with surrogates, at which OpenCV's bindings end the process. A link of a plain name leads to
+    such a file; it lasts as long as the process.
+
+    Args:
+        path: A file, there or to be written; or a URL.
+    """
+    name = os.fspath(path)
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError:
+        return _link(str(Path(name).absolute()), Path(name).suffix)
+    return name
+
+
+@lru_cache(maxsize=256)
+def _link(target: str, suffix: str) -> str:
+    folder = Path(tempfile.mkdtemp(prefix="visup-names-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    plain = suffix if suffix.isascii() else ""
+    link = folder / f"file{plain}"
+    link.symlink_to(target)
+    return str(link)

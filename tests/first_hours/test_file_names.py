@@ -1,0 +1,37 @@
+"""Names on disk are bytes: whatever they are, visup reads and writes them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.paths import ROOT
+
+BARE = {"LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+@pytest.mark.parametrize(
+    ("name", "surroundings"),
+    [(b"caf\xe9.avi", {}), ("\u00fcn\u00ef.avi".encode(), BARE)],
+    ids=["latin-1", "POSIX"],
+)
+def test_any_file_name_can_be_watched_recorded_and_replayed(
+    clip: Path, tmp_path: Path, name: bytes, surroundings: dict[str, str]
+) -> None:
+    """In a process of its own: it was one that died."""
+    source, run = os.fsencode(tmp_path) + b"/" + name, os.fsencode(tmp_path) + b"/run-" + name[:4]
+    shutil.copy(os.fsencode(clip), source)
+    known = {k: v for k, v in os.environ.items() if k not in ("LANG", "LC_CTYPE")}
+    env = {**known, **surroundings, "PYTHONPATH": str(ROOT)}
+    commands: list[list[str | bytes]] = [["watch", source, "--out", run], ["replay", run]]
+    for words in commands:
+        done = subprocess.run(
+            [sys.executable, "-m", "visup.cli", *words], env=env, capture_output=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    assert {p.name for p in Path(os.fsdecode(run)).iterdir()} >= {"annotated.webm", "report.html"}

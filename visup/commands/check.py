@@ -1,0 +1,48 @@
+"""`visup check`: whether a run could begin, and come to anything, before its first frame."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from visup.commands.options import Given, SettingsFile, takes
+from visup.commands.watch import watch_settings
+from visup.runs.settings import WatchSettings
+
+
+@takes(WatchSettings)
+def check(
+    setting: Given,
+    source: Annotated[
+        str, typer.Argument(help="Video file, folder of images, camera index or URL.")
+    ],
+    settings_file: SettingsFile = None,
+) -> None:
+    """Say whether `visup watch` with the same words could begin, and come to anything.
+
+    The source is opened and its first frame read; tasks, rules, zones, models and behaviours are loaded;
+    and the actors of each task are looked for among the models. Exit code: 0 when a run can begin, 2 when it
+    cannot.
+    """
+    from visup.runs.inputs.preflight import check_cast, readiness
+    from visup.runs.wiring import build_agent, open_video
+    from visup.terminal.console import echo
+
+    settings = watch_settings(source, setting, settings_file)
+    with open_video(settings) as video:
+        frames = "" if video.frame_count is None else f", {video.frame_count} frames"
+        width, height = video.size
+        echo(
+            f"source {video.name}: {width} x {height} pixels, {video.fps:g} frames a second{frames}"
+        )
+        notes = video.notes
+    agent = build_agent(settings)
+    try:
+        for line in readiness(settings, agent):
+            echo(line)
+        for warning in (*notes, *check_cast(settings, agent)):
+            echo(f"warning: {warning}")
+    finally:
+        agent.close()
+    echo("A run can begin.")

@@ -1,0 +1,5 @@
+"""What a run is given besides its source: zones, behaviours of the user's own, and whether all of it will do.
+
+Read `zones.py` and `plugins.py` (what is loaded), and `preflight.py` (what is known before the first
+frame).
+"""

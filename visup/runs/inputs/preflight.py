@@ -1,0 +1,104 @@
+"""What can be known before the first frame: whether a run can come to anything."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from visup.agent.model.errors import SettingsError
+from visup.runs.settings import WatchSettings
+from visup.tasks import load_tasks
+from visup.tasks.grammar.structure import task_actors
+
+if TYPE_CHECKING:
+    from visup.agent.cycle.agent import Agent
+    from visup.tasks.grammar.nodes import Task
+
+
+def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False) -> tuple[str, ...]:
+    """See whether the actors of the tasks can be recognised at all.
+
+    Args:
+        settings: Of the run.
+        agent: As it was made from them.
+        answered: Whether the operator has said beforehand who is who.
+
+    Returns:
+        A sentence on each actor for whom nothing stands; none where a behaviour of the user's own, or the
+        operator, may say who it is.
+
+    Raises:
+        SettingsError: No actor of any task can be recognised, so that nothing could ever be said.
+    """
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    lost = unrecognisable(tasks, agent.mind.actors, agent.models)
+    if not lost or answered or settings.behaviours or settings.plugins:
+        return ()
+    needed = {a for t in tasks for a in task_actors(t) if not t.actor(a).optional}
+    if needed and needed <= set(lost):
+        raise _refusal(settings, tasks, lost)
+    return tuple(
+        f"Nothing tells what the actor '{actor}' looks like: the model database has no "
+        f"{' or '.join(repr(m) for m in models)}."
+        for actor, models in lost.items()
+    )
+
+
+def unrecognisable(
+    tasks: Sequence[Task], actors: Mapping[str, tuple[str, ...]], known: Collection[str]
+) -> dict[str, tuple[str, ...]]:
+    """Actors that are told by models alone, of which there are none.
+
+    Args:
+        tasks: All tasks of a run.
+        actors: Actor -> models, as they are bound.
+        known: Names of all models that there are.
+
+    Returns:
+        Actor -> the models that it would need.
+    """
+    lost: dict[str, tuple[str, ...]] = {}
+    for task in tasks:
+        for actor in task_actors(task):
+            models = actors.get(actor) or task.models(actor)
+            if models and not set(models) & set(known):
+                lost[actor] = models
+    return lost
+
+
+def readiness(settings: WatchSettings, agent: Agent) -> Iterator[str]:
+    """What a run is about, a line each: tasks with their stages and actors, models, zones.
+
+    Args:
+        settings: Of the run.
+        agent: As it was made from them.
+    """
+    actors = agent.mind.actors
+    for task in (t for name in settings.tasks for t in load_tasks(name)):
+        cast = [f"{a} is {' or '.join(actors.get(a) or task.models(a))}".removesuffix(" is ")
+                for a in task_actors(task)]  # fmt: skip
+        yield f"task {task.name}: {', '.join(s.name for s in task.stages)}; {', '.join(cast)}"
+    if agent.models:
+        yield f"models: {', '.join(agent.models)}"
+    if agent.mind.zones:
+        yield f"zones: {', '.join(z.name for z in agent.mind.zones)}"
+
+
+def _refusal(
+    settings: WatchSettings, tasks: Sequence[Task], lost: Mapping[str, tuple[str, ...]]
+) -> SettingsError:
+    names = ", ".join(f"`{t.name}`" for t in tasks)
+    who = ", ".join(f"'{a}'" for a in lost)
+    actor, models = next(iter(lost.items()))
+    missing = (
+        f"{settings.models} has no model of them" if settings.models else "there are no models"
+    )
+    return SettingsError(
+        f"task {names} cannot be followed: nothing tells what its actors look like ({who}; {missing})",
+        expected="a model database that knows them (--models DB), and --actor NAME=MODEL where the "
+        f"names differ; or a task that says it: actor {actor} is red",
+        hint=f"outline them once: visup teach {settings.source} --models cell.models"
+        if not settings.models
+        else f"visup models list {settings.models}; then --actor {actor}=MODEL in place of "
+        f"{' or '.join(models)}",
+    )
