@@ -121,18 +121,21 @@ class _Draft:
         return occurrence in leaves_of(plan)
 
     def _spans(self, occurrence: Occurrence) -> list[float]:
-        """How long a stage took in each run: up to the begin of what came next in the course."""
+        """How long a stage took at most in each run: from what came before it to what came after.
+
+        What is over by itself (a contact) lets the next stage begin at once, so that its time counts
+        from there.
+        """
         course = leaves_of(self.plan)
         found = []
         for run in self.runs:
             begins = {o: t for o in course if (t := begin_of(run, o)) is not None}
-            mine = begins.get(occurrence)
+            mine = begins.pop(occurrence, None)
             if mine is None:
                 continue
-            later = [t for o, t in begins.items() if o != occurrence and t >= mine]
-            # The first stage is waited for from the begin of the run.
-            start = run.begin if mine == min(begins.values()) else mine
-            found.append((min(later) if later else run.end) - start)
+            earlier = [t for t in begins.values() if t < mine]
+            later = [t for t in begins.values() if t > mine]
+            found.append(min(later, default=mine) - max(earlier, default=run.begin))
         return found
 
 

@@ -47,30 +47,66 @@ Occurrence = tuple[Item, int]
 Plan = Occurrence | Series | Free
 
 
+CLOSE_S = 2.0
+"""A retreat begins so soon after the contact that it ends; relations are judged with delays."""
+
+
 def relevant(runs: Sequence[RunTrace]) -> list[list[Happening]]:
     """What each run is made of, without what only comes along with something else.
 
-    A touch that becomes a coupling is that coupling. Two that draw nearer or apart count where they
-    also meet in some run; where nobody ever meets all counts.
+    A touch that becomes a coupling is that coupling; what is coupled to the same thing moves and meets
+    as that does; an approach counts when it leads to a meeting, a retreat when it ends one. Where
+    nobody ever meets all counts.
     """
-    meets = {
-        h.symbol[1] for r in runs for h in r.happenings if h.symbol[0] in ("touching", "coupled")
-    }
-    found = []
-    for run in runs:
-        coupled = [h for h in run.happenings if h.symbol[0] == "coupled"]
-        row = [
-            h
-            for h in run.happenings
-            if (not meets or h.symbol[1] in meets) and not any(_becomes(h, c) for c in coupled)
-        ]
-        found.append(row)
-    return found
+    meetings = [[h for h in r.happenings if h.symbol[0] in MEETINGS] for r in runs]
+    if not any(meetings):
+        return [list(r.happenings) for r in runs]
+    return [_relevant(r, met) for r, met in zip(runs, meetings, strict=True)]
+
+
+MEETINGS = ("touching", "coupled")
+
+
+def _relevant(run: RunTrace, meetings: list[Happening]) -> list[Happening]:
+    real = [m for m in meetings if not _carried(m, meetings)]
+    kept = []
+    for h in run.happenings:
+        action, pair = h.symbol
+        of_pair = [m for m in real if m.symbol[1] == pair]
+        if action in MEETINGS:
+            keep = h in real and not any(_becomes(h, c) for c in of_pair)
+        elif action == "decoupled":
+            keep = any(m.end == h.begin for m in of_pair)
+        elif action == "converging":
+            keep = any(h.begin <= m.begin <= h.end + CLOSE_S for m in of_pair)
+        else:
+            keep = any(m.begin < h.begin <= m.end + CLOSE_S for m in of_pair)
+        kept += [h] if keep else []
+    return kept
+
+
+def _carried(meeting: Happening, meetings: list[Happening]) -> bool:
+    """Whether two meet only through a third thing, which one holds and which meets the other.
+
+    It then ends as soon as that is let go.
+    """
+    overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
+    for held in overlap:
+        if held.symbol[0] != "coupled" or meeting.end > held.end + CLOSE_S:
+            continue
+        for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
+            if a not in held.symbol[1] or b in held.symbol[1]:
+                continue
+            (x,) = set(held.symbol[1]) - {a}
+            if any({x, b} == set(m.symbol[1]) and m.end > meeting.end - CLOSE_S for m in overlap):
+                return True
+    return False
 
 
 def _becomes(touch: Happening, coupling: Happening) -> bool:
-    same = touch.symbol[0] == "touching" and touch.symbol[1] == coupling.symbol[1]
-    return same and touch.begin <= coupling.end and coupling.begin <= touch.end
+    if (touch.symbol[0], coupling.symbol[0]) != ("touching", "coupled"):
+        return False
+    return touch.begin <= coupling.end and coupling.begin <= touch.end
 
 
 def with_loops(words: Sequence[Word]) -> tuple[list[Word], dict[Loop, tuple[int, int]]]:
