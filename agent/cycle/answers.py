@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.events import Event
 from visup.agent.model.mind import Mind
@@ -82,10 +82,12 @@ def resolve_model(
     meant |= {_plain(a): a if _shared(a, played) else _model(played[a], own) for a in played}
     if _plain(said) in meant:
         return meant[_plain(said)]
+    spelt = {_plain(n): n for n in (*sorted(_models(mind) | set(models)), *played)}
+    near = closest(_plain(said), spelt)
     raise SettingsError(
         f"'{said}' is neither a model nor an actor",
-        expected=f"one of: {', '.join([*sorted(meant), 'unknown'])}",
-        hint=did_you_mean(_plain(said), meant),
+        expected=f"one of: {', '.join([*sorted(spelt.values()), 'unknown'])}",
+        hint=near and f"did you mean '{spelt[near]}'?",
     )
 
 

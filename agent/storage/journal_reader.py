@@ -135,7 +135,7 @@ class Recording:
                     for row in db.execute(sql, given):
                         yield path, row
             except (sqlite3.Error, ValueError, TypeError, OverflowError) as fault:
-                raise _damaged(str(path), str(fault)) from fault
+                raise _unreadable(path, fault) from fault
 
     def _record(self, text: Any) -> dict[str, Any]:
         loaded = self._loaded(text)
@@ -176,6 +176,12 @@ def checked(observation: Observation, where: str) -> Observation:
 LONGEST_FAULT = 300
 
 
+def is_run(place: str | Path) -> bool:
+    """Whether a path is that of a recorded run: its folder, or its journal."""
+    path = Path(place)
+    return (path / JOURNAL).is_file() or (path.is_file() and path.name == JOURNAL)
+
+
 def export_events(journal: Path, target: Path) -> None:
     """Write `events.jsonl` from a journal: one event a line.
 
@@ -209,6 +215,21 @@ def _opened(path: Path) -> sqlite3.Connection:
         db = sqlite3.connect(f"{uri}?mode=ro&immutable=1", uri=True, check_same_thread=False)
     db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
     return db
+
+
+def _unreadable(path: Path, fault: Exception) -> OutputError:
+    """What is wrong with a journal: that it may not be read is no damage."""
+    try:
+        with path.open("rb"):
+            pass
+    except OSError as denied:
+        why = denied.strerror or str(denied)
+        return OutputError(
+            f"the journal cannot be read ({why})",
+            where=str(path),
+            hint="check the permissions of the file and its folder",
+        )
+    return _damaged(str(path), str(fault))
 
 
 def _damaged(where: str, what: str) -> OutputError:

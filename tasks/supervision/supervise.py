@@ -8,6 +8,7 @@ should be seen next and what the verdict is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from visup.agent import (
     AlertCondition,
@@ -90,19 +91,35 @@ def task_reasoner(
         'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
         'verdict', and concerns 'stage_failing' and 'invariant_broken'.
     """
-    models = tuple(_model(t, actions or known_actions(), settings) for t in tasks)
+    known = actions or known_actions()
+    return TaskReasoner(tuple(_model(t, known, settings) for t in tasks))
 
-    def supervise_tasks(mind: Mind, observation: Observation) -> Outcome:
-        before = _recall(mind, models)
-        each = zip(models, before, strict=True)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskReasoner:
+    """Supervises tasks; see `task_reasoner`.
+
+    Attributes:
+        models: The tasks, made ready.
+    """
+
+    models: tuple[MonitoredPhases, ...]
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks."""
+        return tuple(m.task for m in self.models)
+
+    def __call__(self, mind: Mind, observation: Observation) -> Outcome:
+        """Judge one step; see `Reasoner`."""
+        before = _recall(mind, self.models)
+        each = zip(self.models, before, strict=True)
         seen = tuple(_follow(f, m, mind) if _due(m, mind.time) else m for f, m in each)
         new = _inferred(before, seen, mind.time)
         believed = mind.remember(MEMORY, new, tasks=tuple(m.belief for m in new))
-        steps = list(zip(models, before, new, strict=True))
+        steps = list(zip(self.models, before, new, strict=True))
         events = tuple(e for step in steps for e in _events(*step, mind))
         return Outcome(believed, events, tuple(c for f, _, m in steps for c in _concerns(f, m)))
-
-    return supervise_tasks
 
 
 def finish(belief: TaskBelief) -> Verdict:

@@ -309,3 +309,26 @@ def test_a_short_soak_is_flat_and_repeats(monkeypatch: pytest.MonkeyPatch) -> No
     assert figures["total"]["rss_grown_mb"] < 20
     with pytest.raises(SettingsError):
         evaluate_soak(10)
+
+
+@pytest.mark.parametrize(
+    ("surroundings", "name"),
+    [
+        ({}, "visup"),
+        ({"OTEL_SERVICE_NAME": "cell-7"}, "cell-7"),
+        ({"OTEL_RESOURCE_ATTRIBUTES": "service.name=cell-8"}, "cell-8"),
+    ],
+)
+def test_telemetry_tells_whose_it_is(
+    monkeypatch: pytest.MonkeyPatch, surroundings: dict[str, str], name: str
+) -> None:
+    pytest.importorskip("opentelemetry.sdk", reason="the extra visup[otel] is not installed")
+    from visup.sinks.telemetry import service_resource
+
+    for variable in ("OTEL_SERVICE_NAME", "OTEL_RESOURCE_ATTRIBUTES"):
+        monkeypatch.delenv(variable, raising=False)
+    for variable, value in surroundings.items():
+        monkeypatch.setenv(variable, value)
+    attributes = service_resource().attributes
+    assert attributes["service.name"] == name
+    assert attributes["service.version"]

@@ -163,7 +163,7 @@ def test_the_end_is_told_and_the_beginning_can_be_reached() -> None:
     assert (stopped.taken, stopped.ended, it.at) == (4, True, 4)
     assert it.back(4) is None
     assert it.mind.frame_index == -1
-    with pytest.raises(SettingsError, match="there is no step -1"):
+    with pytest.raises(SettingsError, match="there is no step to go back"):
         it.back()
     with pytest.raises(SettingsError, match="there is no step 9"):
         it.go(9)

@@ -120,7 +120,7 @@ SCRIPT = {
     "delete 7": "there is no breakpoint 7",
     "assert nonsense": "there is no relation",
     "help break": "stop there in every run",
-    "back 99": "there is no step",
+    "back 99": "there are no 99 steps to go back",
     "diff 3 99": "there is no step",
     "run until aproach": "did you mean 'approach'",
 }

@@ -62,11 +62,12 @@ class Setting:
             kind = list[Path] | None if Path in get_args(kind) else list[str] | None
             default = None
         flags = (self.option.flag,) if self.option.flag else ()
+        number = next((k for k in (int, float) if k in (kind, *get_args(kind))), None)
         told = typer.Option(
             *flags,
-            metavar=self.option.metavar,
+            metavar=self.option.metavar or (number and _METAVARS[number]),
             help=self.option.help,
-            min=self.option.at_least,
+            parser=number and number_parser(number, self.option.at_least),
         )
         annotation = Annotated[kind, told]  # type: ignore[valid-type]
         return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
@@ -76,6 +77,31 @@ class Setting:
         if not self.repeated:
             return value
         return self.option.parse(value) if self.option.parse and value else tuple(value or ())
+
+
+_METAVARS = {int: "N", float: "NUMBER"}
+
+
+def number_parser(kind: type[int] | type[float], at_least: float | None) -> Callable[[Any], Any]:
+    """What reads a number as it is typed, and says in words what is wrong with it.
+
+    Args:
+        kind: `int` or `float`.
+        at_least: The smallest value, or None.
+    """
+    wanted = "a whole number" if kind is int else "a number"
+    expected = wanted if at_least is None else f"{wanted}, {at_least:g} or more"
+
+    def read(text: Any) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            raise typer.BadParameter(f"'{text}' is not {wanted}; expected {expected}") from None
+        if at_least is not None and not value >= at_least:
+            raise typer.BadParameter(f"{text} is too small; expected {expected}")
+        return value
+
+    return read
 
 
 def settings_of(record: type) -> Iterator[Setting]:

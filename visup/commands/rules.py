@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.options import Given, takes
+from visup.commands.options import REPLAYED, Given, takes
 from visup.runs.settings import WatchSettings
 from visup.terminal.console import echo, echo_json
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from visup.agent import Mind
     from visup.rules.formula.nodes import Rule
 
@@ -78,27 +80,43 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
 def explain(
     setting: Given,
     source: Annotated[
-        str, typer.Argument(help="Video file, folder of images, camera index or URL.")
+        str, typer.Argument(help="Video file, folder of images, camera, URL, or a run folder.")
     ],
     at: Annotated[float, typer.Option("--at", min=0.0, help="Seconds of the video.")],
     rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
 ) -> None:
     """Say why rules were true, false or unknown of each choice of objects at a moment of a video."""
     from visup.agent.model.errors import SettingsError
-    from visup.runs.wiring import build_agent, open_video
 
-    settings = WatchSettings(source, **setting)
-    agent, mind = build_agent(settings), None
-    with open_video(settings) as video:
-        for frame in video:
-            mind = agent.step(frame).mind
-            if mind.time >= at:
-                break
+    mind = None
+    for mind in _minds(source, setting):
+        if mind.time >= at:
+            break
     if mind is None or mind.time < at:
         raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
     told = explanations(mind, rule)
     for text in told or [f"at {mind.time:g} s too few objects are in view for any choice"]:
         echo(text)
+
+
+def _minds(source: str, setting: Given) -> Iterator[Mind]:
+    """The mind after each step: of a video that is watched, or of a recorded run."""
+    from visup.agent.storage.journal_reader import Recording, is_run
+    from visup.runs.replay import settings_for
+    from visup.runs.wiring import build_agent, open_video, reasoning_agent
+
+    if is_run(source):
+        recording = Recording.open(Path(source))
+        given = {k: v for k, v in setting.items() if k in REPLAYED}
+        agent, answers = reasoning_agent(settings_for(recording, **given)), recording.answers()
+        for seen in recording.observations():
+            yield agent.reason(seen, answers.get(seen.frame_index, {})).mind
+        return
+    settings = WatchSettings(source, **setting)
+    agent = build_agent(settings)
+    with open_video(settings) as video:
+        for frame in video:
+            yield agent.step(frame).mind
 
 
 def explanations(mind: Mind, only: str | None) -> list[str]:

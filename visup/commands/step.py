@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -33,26 +34,23 @@ def step(
 ) -> None:
     """Step through a video or a recorded run, forth and back, and look into the agent's mind.
 
-    Commands are read from the terminal, or from a pipe: one a line, see `help`.
+    Commands are read from the terminal, or from a pipe: one a line, see `help`. Exit code: 0; from a pipe 2
+    when a command could not be obeyed.
     """
+    from visup.agent.storage.journal_reader import is_run
     from visup.terminal.prompt import read_commands
     from visup.terminal.session import Session
 
     with ExitStack() as stack:
-        if _is_run(source):
+        if is_run(source):
             agent, frames = _recorded(Path(source), setting, settings_file)
         else:
             agent, frames = _live(watch_settings(source, setting, settings_file), stack)
         session = Session(agent, frames)
+        at_prompt = sys.stdin.isatty()
         code = session.run(read_commands(session))
-    raise typer.Exit(code)
-
-
-def _is_run(source: str) -> bool:
-    from visup.agent.storage.journal_reader import JOURNAL
-
-    path = Path(source)
-    return (path / JOURNAL).is_file() or (path.is_file() and path.name == JOURNAL)
+    # At a prompt a slip is put right by the next line; from a pipe nobody would know of it.
+    raise typer.Exit(0 if at_prompt else code)
 
 
 def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:

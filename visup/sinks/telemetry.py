@@ -14,6 +14,7 @@ from typing import Any
 from visup.agent import ReportState
 from visup.agent.model.errors import ExtraMissingError, SettingsError
 from visup.agent.model.step import Step
+from visup.version import __version__
 
 NAME = "visup"
 
@@ -103,9 +104,21 @@ def _providers(place: str) -> tuple[Any, Any]:
         spans, metrics = _exporters(place)
     except ModuleNotFoundError as missing:
         raise ExtraMissingError("a sink for OpenTelemetry", "otel") from missing
-    traces = TracerProvider()
+    resource = service_resource()
+    traces = TracerProvider(resource=resource)
     traces.add_span_processor(BatchSpanProcessor(spans))
-    return traces, MeterProvider([PeriodicExportingMetricReader(metrics)])
+    return traces, MeterProvider([PeriodicExportingMetricReader(metrics)], resource=resource)
+
+
+def service_resource() -> Any:
+    """Who tells: the service `visup` with its version, unless the environment says otherwise.
+
+    `OTEL_SERVICE_NAME` and `OTEL_RESOURCE_ATTRIBUTES` go before, as they do everywhere.
+    """
+    from opentelemetry.sdk.resources import OTELResourceDetector, Resource
+
+    own = Resource.create({"service.name": NAME, "service.version": __version__})
+    return own.merge(OTELResourceDetector().detect())
 
 
 def _exporters(place: str) -> tuple[Any, Any]:

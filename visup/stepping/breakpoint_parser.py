@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from visup.agent import Mind
 from visup.agent.contract.phases import Phase
-from visup.agent.model.did_you_mean import closest, did_you_mean
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
 from visup.rules.safety.expression import expression
 from visup.stepping.breakpoints import (
@@ -22,20 +22,22 @@ from visup.stepping.breakpoints import (
     StopCondition,
     TimeStop,
     WhenStop,
-    rule_names,
-    stage_names,
 )
+from visup.stepping.names import Names, known_names
 from visup.wording import EVENT_KINDS
 
 
-def parse_condition(what: str | Phase | Predicate | StopCondition, mind: Mind) -> StopCondition:
+def parse_condition(
+    what: str | Phase | Predicate | StopCondition, mind: Mind, names: Names | None = None
+) -> StopCondition:
     """The condition that is meant.
 
     Args:
         what: A phase, a function of the step, a condition, or text: `phase match`, `event alert`,
             `rule NAME`, `rule NAME changes`, `stage NAME`, `object 2`, `time 12.5`, `frame 300`,
             `when EXPRESSION`, `change EXPRESSION`; or without its first word, where that is clear.
-        mind: Knows stages and rules.
+        mind: Knows stages and rules, but none before its first step.
+        names: Those that there are; of the mind when left out.
 
     Raises:
         SettingsError: Nothing is meant by it.
@@ -47,10 +49,11 @@ def parse_condition(what: str | Phase | Predicate | StopCondition, mind: Mind) -
         return what if isinstance(what, StopCondition) else PredicateStop(what)
     first, _, rest = what.strip().partition(" ")
     reader = _READERS.get(first) if rest else None
-    return reader(rest.strip(), mind) if reader else _guessed(what.strip(), mind)
+    names = names or known_names(mind)
+    return reader(rest.strip(), names) if reader else _guessed(what.strip(), names)
 
 
-def _guessed(word: str, mind: Mind) -> StopCondition:
+def _guessed(word: str, names: Names) -> StopCondition:
     """What a word means that is told without its kind."""
     try:
         return TimeStop(float(word))
@@ -60,42 +63,40 @@ def _guessed(word: str, mind: Mind) -> StopCondition:
         return WhenStop(expression(word))
     if word in tuple(Phase):
         return PhaseStop(Phase(word))
-    found: list[StopCondition] = [StageStop(word)] if word in stage_names(mind) else []
-    found += [RuleStop(word)] if word in rule_names(mind) else []
-    if not found or word in EVENT_KINDS:
-        found.append(_event(word, mind))
+    found: list[StopCondition] = [StageStop(word)] if word in names.stages else []
+    found += [RuleStop(word)] if word in names.rules else []
+    if word in EVENT_KINDS:
+        found.append(EventStop(word))
+    if not found:
+        raise _not_known(word, names)
     return found[0] if len(found) == 1 else AnyStop(word, tuple(found))
 
 
-def _event(kind: str, mind: Mind) -> StopCondition:
-    """Any word may be a plug-in's kind of event; one that is nearly another word is a slip."""
-    known = [*EVENT_KINDS, *stage_names(mind), *rule_names(mind), *Phase]
-    close = closest(kind, known, 0.8)
-    if not kind.isidentifier() or (close and kind not in known):
-        raise SettingsError(
-            f"'{kind}' is not known",
-            expected="a phase, event, rule, stage, object, time, frame or expression",
-            hint=f"did you mean '{close}'?" if close else None,
-        )
-    return EventStop(kind)
+def _not_known(word: str, names: Names) -> SettingsError:
+    """What is no known word is not taken for an event: a slip would be waited for to the end."""
+    near = did_you_mean(word, [*EVENT_KINDS, *names.stages, *names.rules, *Phase])
+    own = f"for an event of your own: event {word}" if word.isidentifier() else None
+    return SettingsError(
+        f"'{word}' is not known",
+        expected="a phase, event, rule, stage, object, time, frame or expression",
+        hint=near or own,
+    )
 
 
-def _rule(text: str, mind: Mind) -> StopCondition:
+def _rule(text: str, names: Names) -> StopCondition:
     name, _, more = text.partition(" ")
-    known = rule_names(mind)
-    if known and name not in known:
-        raise _unknown("rule", name, known)
+    if names.rules and name not in names.rules:
+        raise _unknown("rule", name, names.rules)
     return RuleStop(name, more.strip() == "changes")
 
 
-def _stage(name: str, mind: Mind) -> StopCondition:
-    known = stage_names(mind)
-    if known and name not in known:
-        raise _unknown("stage", name, known)
+def _stage(name: str, names: Names) -> StopCondition:
+    if names.stages and name not in names.stages:
+        raise _unknown("stage", name, names.stages)
     return StageStop(name)
 
 
-def _phase(name: str, mind: Mind) -> StopCondition:
+def _phase(name: str, names: Names) -> StopCondition:
     if name not in tuple(Phase):
         raise _unknown("phase", name, tuple(Phase))
     return PhaseStop(Phase(name))
@@ -108,16 +109,16 @@ def _number(text: str, kind: str) -> float:
         raise SettingsError(f"'{text}' is not a number", expected=f"such as: {kind} 12") from None
 
 
-_READERS: Mapping[str, Callable[[str, Mind], StopCondition]] = {
+_READERS: Mapping[str, Callable[[str, Names], StopCondition]] = {
     "phase": _phase,
-    "event": lambda text, mind: EventStop(text),
+    "event": lambda text, names: EventStop(text),
     "rule": _rule,
     "stage": _stage,
-    "object": lambda text, mind: ObjectStop(int(_number(text, "object"))),
-    "time": lambda text, mind: TimeStop(_number(text, "time")),
-    "frame": lambda text, mind: FrameStop(int(_number(text, "frame"))),
-    "when": lambda text, mind: WhenStop(expression(text)),
-    "change": lambda text, mind: WhenStop(expression(text), True),
+    "object": lambda text, names: ObjectStop(int(_number(text, "object"))),
+    "time": lambda text, names: TimeStop(_number(text, "time")),
+    "frame": lambda text, names: FrameStop(int(_number(text, "frame"))),
+    "when": lambda text, names: WhenStop(expression(text)),
+    "change": lambda text, names: WhenStop(expression(text), True),
 }
 
 

@@ -258,7 +258,7 @@ class AnyStop:
 
 
 def stage_names(mind: Mind) -> tuple[str, ...]:
-    """The stages of all tasks."""
+    """The stages of all tasks; none before the first step."""
     return tuple(dict.fromkeys(s.stage for t in mind.tasks for s in t.stages))
 
 

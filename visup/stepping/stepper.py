@@ -25,6 +25,7 @@ from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import ReasonFinder
 from visup.stepping.explanations.why_not import LastStep
 from visup.stepping.history import LATEST, SPACING, StepHistory
+from visup.stepping.names import Names, known_names
 from visup.stepping.observation_sources import (
     LiveObservations,
     ObservationSource,
@@ -104,7 +105,7 @@ class Stepper(Timeline):
         Raises:
             SettingsError: Nothing is meant by `until`.
         """
-        goal = (parse_condition(until, self.mind),) if until is not None else ()
+        goal = (self._condition(until),) if until is not None else ()
         most = n if n is not None or goal else 1
         stops = (*goal, *(b.stop for b in self.breakpoints.values() if b.enabled))
         phases = frozenset(s.phase for s in stops if isinstance(s, PhaseStop))
@@ -154,9 +155,17 @@ class Stepper(Timeline):
 
     def break_at(self, what: str | Phase | Predicate | StopCondition) -> Breakpoint:
         """Set a breakpoint; see `visup.stepping.breakpoint_parser.parse_condition`."""
-        made = Breakpoint(max(self.breakpoints, default=0) + 1, parse_condition(what, self.mind))
+        made = Breakpoint(max(self.breakpoints, default=0) + 1, self._condition(what))
         self.breakpoints[made.id] = made
         return made
+
+    @property
+    def names(self) -> Names:
+        """The stages and rules that may be named, also before the first step."""
+        return known_names(self.mind, self.agent.reasoners)
+
+    def _condition(self, what: str | Phase | Predicate | StopCondition) -> StopCondition:
+        return parse_condition(what, self.mind, self.names)
 
     def delete(self, number: int) -> None:
         """Delete a breakpoint.

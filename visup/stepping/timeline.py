@@ -149,8 +149,16 @@ class Timeline:
 
         Returns:
             The step after which it is now, or None where the timeline begins.
+
+        Raises:
+            SettingsError: There are not so many.
         """
-        return self.go(self.at - n + (self._paused is not None))
+        number = self.at - n + (self._paused is not None)
+        if number < self.begin:
+            steps = self.at - self.begin + (self._paused is not None)
+            words = "is no step" if n == 1 else f"are no {n} steps"
+            raise SettingsError(f"there {words} to go back", expected=f"at most {steps}")
+        return self.go(number)
 
     def go(self, number: int) -> Step | None:
         """Be after step `number`; later ones are made if need be, and breakpoints are not looked at.

@@ -7,6 +7,7 @@ cell, once `visup.terminal.display` can be imported (see `visup/agent/model/disp
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import singledispatch
@@ -85,9 +86,15 @@ def html_of(text: RenderableType) -> str:
     console = Console(record=True, width=WIDTH + 20, file=StringIO(), force_jupyter=False)
     console.print(text)
     style = "font-family:Menlo,'DejaVu Sans Mono',monospace;line-height:1.2;white-space:pre"
-    return console.export_html(
+    made = console.export_html(
         inline_styles=True, code_format=f'<pre style="{style}">{{code}}</pre>'
     )
+    # Frames of tables are drawn in characters, which no font of a notebook joins.
+    return _UPRIGHT.sub(" ", _RULE.sub("", made))
+
+
+_RULE = re.compile("(?m)^[┏┓┗┛┡┩┳┻╇━┌┐└┘├┤┬┴┼─]+\n")
+_UPRIGHT = re.compile("[┃│]")
 
 
 def _brief(value: object, most: int = 60) -> str:

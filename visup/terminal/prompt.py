@@ -12,7 +12,6 @@ from visup.agent import Presence, Truth
 from visup.agent.contract.phases import Phase
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.predicates.vocabulary import RULES
-from visup.stepping.breakpoints import rule_names, stage_names
 from visup.stepping.explanations import questions as asking
 from visup.terminal.session import Session
 from visup.terminal.session_commands import COMMANDS
@@ -30,8 +29,8 @@ def _objects(session: Session) -> list[str]:
 
 
 def _names(session: Session) -> list[str]:
-    mind = session.stepper.mind
-    return [*stage_names(mind), *rule_names(mind)]
+    names = session.stepper.names
+    return [*names.stages, *names.rules]
 
 
 _WORDS: Mapping[str, Words] = {

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from visup.agent import Frame
 from visup.agent.cycle.agent import Agent
+from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import VisupError
 from visup.agent.model.step import Step
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
@@ -18,7 +19,7 @@ from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
 from visup.terminal.console import make_console
 from visup.terminal.narrator import event_row
 from visup.terminal.session_commands import COMMANDS
-from visup.terminal.session_views import VIEWS, number_in, refusal, usage
+from visup.terminal.session_views import VIEWS, Refusal, number_in, refusal, usage
 from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
 from visup.wording import prose, worded_once
 
@@ -70,10 +71,10 @@ class Session:
         """Obey commands until 'quit' or their end.
 
         Returns:
-            Exit code, 0.
+            Exit code: 0, or 2 when a command could not be obeyed.
         """
         self.console.print("[dim]'step' goes on by one frame, 'help' shows the commands.[/dim]")
-        last = "step"
+        last, refused = "step", False
         for entered in commands:
             command = entered.split(" #")[0].strip() or last
             if command.startswith("#"):
@@ -82,19 +83,23 @@ class Session:
                 break
             last = command
             answer = self.execute(command)
+            refused |= isinstance(answer, Refusal)
             if answer is not None:
                 self.console.print(answer)
-        return 0
+        return 2 if refused else 0
 
     def execute(self, command: str) -> Answer:
         """Carry out one command; a unique beginning of its name will do."""
-        word, *rest = command.split()
+        word, *rest = (
+            command.replace("?", "help ", 1).split() if command[0] == "?" else command.split()
+        )
         if word.endswith("!"):
             word, rest = word[:-1], ["!", *rest]
         names = [n for n in _NAMES if n.startswith(word)]
         name = word if word in _NAMES else names[0] if len(names) == 1 else None
         if name is None:
-            meant = f" ({', '.join(names)}?)" if names else ""
+            near = did_you_mean(word, _NAMES)
+            meant = f" ({', '.join(names)}?)" if names else f" ({near})" if near else ""
             return refusal(f"'{word}' is not a command{meant}; 'help' lists them")
         try:
             if name in VIEWS:
@@ -115,7 +120,9 @@ class Session:
         return self._advance(None, what or _never)
 
     def _advance(self, count: int | None, what: str | Callable[[Step], bool]) -> Answer:
-        stop: StopCondition | None = parse_condition(what, self.stepper.mind) if what else None
+        stop: StopCondition | None = (
+            parse_condition(what, self.stepper.mind, self.stepper.names) if what else None
+        )
         if stop is not None and self._is_past(stop):
             return refusal(f"{stop.text} is past: 'go' and 'back' lead there")
         stopped = self.stepper.step(count, stop, self._tell)

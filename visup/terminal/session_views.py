@@ -32,9 +32,13 @@ View = Callable[[Stepper, Words], RenderableType]
 _NO_STEP = Text("no step was taken yet")
 
 
-def refusal(text: str) -> Text:
+class Refusal(Text):
     """An answer to what cannot be done."""
-    return Text(text, style="yellow")
+
+
+def refusal(text: str) -> Refusal:
+    """An answer to what cannot be done."""
+    return Refusal(text, style="yellow")
 
 
 def usage(name: str) -> str:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from visup.agent import Frame, Region
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.evaluation.figures import Progress, silent
+from visup.evaluation.motion.mask_pairs import mask_pairs
 from visup.evaluation.motion.mask_scores import (
     UNSCORED,
     MaskOverlaps,
@@ -44,14 +45,14 @@ class LabelledSequence:
     Attributes:
         name: Path below the folder that was named.
         source: What to open as video.
-        masks: Its masks in order of frames; empty for MOT folders.
+        masks: Index of a frame -> its mask; frames without truth have none, and MOT folders none at all.
         truth: `truth.json` of a mission, or None.
         boxes: MOT ground truth, or None.
     """
 
     name: str
     source: Path
-    masks: tuple[Path, ...] = ()
+    masks: Mapping[int, Path] = field(default_factory=dict)
     truth: Path | None = None
     boxes: Path | None = None
 
@@ -116,10 +117,11 @@ def find_sequences(folder: Path) -> list[LabelledSequence]:
         name = place.name if place == folder else str(place.relative_to(folder))
         masks = tuple(sorted((place / "masks").glob("*.png")))
         if (place / "frames").is_dir() and masks:
-            out.append(LabelledSequence(name, place / "frames", masks))
+            source = place / "frames"
+            out.append(LabelledSequence(name, source, mask_pairs(source, masks)))
         elif (place / "video.mp4").is_file() and masks and (place / "truth.json").is_file():
-            truth = place / "truth.json"
-            out.append(LabelledSequence(name, place / "video.mp4", masks, truth))
+            truth, source = place / "truth.json", place / "video.mp4"
+            out.append(LabelledSequence(name, source, mask_pairs(source, masks), truth))
         elif (place / "img1").is_dir() and (place / "gt" / "gt.txt").is_file():
             out.append(LabelledSequence(name, place, boxes=place / "gt" / "gt.txt"))
     if not out:
@@ -149,7 +151,7 @@ def _run(sequence: LabelledSequence, every: int, limit: int | None) -> SequenceM
             tally.dis_ms.append(1e3 * (time.perf_counter() - start))
         before = grey
         tally.boxes[frame.index] = {r.id: _box(r) for r in regions}
-        if frame.index < len(sequence.masks):
+        if frame.index in sequence.masks:
             labels = _labels(sequence.masks[frame.index], frame.size)
             masks = {r.id: r.full_mask(frame.size) for r in regions}
             _tally_masks(tally, labels, masks, inner=number > 0 and not last)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from visup.agent import Depth, Hypothesis, Observation, Percept, Region
+from visup.agent import Depth, Health, Hypothesis, Observation, Percept, Region
 from visup.agent.model.display import enable_display
 from visup.rules.safety.explain import RuleExplanation
 
@@ -102,6 +102,8 @@ def percept_text(value: object) -> str:
         case Depth():
             far = f"{value.depth:.1f} ± {value.sigma:.1f}"
             return f"that region {value.region_id} as {value.name} is {far} away"
+        case Health():
+            return f"camera {value.status.value}" + (f": {value.detail}" if value.detail else "")
     text = str(value)
     return text if len(text) <= 70 else f"{text[:67]}..."
 

@@ -1,0 +1,57 @@
+"""`visup step` from a pipe: what cannot be meant is refused, with what was probably meant, and a code."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli import Call
+from visup.runs.demo import demo_settings
+
+TASK = ("--task", "dock", "--models", demo_settings().models, "--actor", "satellite=spartan")
+
+
+def piped(monkeypatch: pytest.MonkeyPatch, *commands: str) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO("".join(f"{c}\n" for c in commands)))
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("break foobar", "'foobar' is not known"),
+        ("break entri", "did you mean 'entry'?"),
+        ("step until capturd", "did you mean 'captured'?"),
+        ("rnu", "did you mean 'run'?"),
+        ("back 9999", "there are no 9999 steps to go back\n  expected: at most 0"),
+        ("break rule collision", "did you mean 'collision_course'?"),
+    ],
+)
+def test_a_slip_is_refused_before_the_first_step_too(
+    visup: Call, clip: Path, monkeypatch: pytest.MonkeyPatch, command: str, told: str
+) -> None:
+    piped(monkeypatch, command)
+    done = visup("step", clip, *TASK)
+    assert told in done.out
+    assert done.code == 2
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("?", "step"),
+        ("? break", "WHAT is one of"),
+        ("break captured", "stage captured"),
+        ("break event my_own", "event my_own"),
+        ("break collision_course", "rule collision_course"),
+    ],
+)
+def test_what_is_meant_is_understood_before_the_first_step(
+    visup: Call, clip: Path, monkeypatch: pytest.MonkeyPatch, command: str, told: str
+) -> None:
+    piped(monkeypatch, command)
+    done = visup("step", clip, *TASK)
+    assert told in done.out
+    assert done.code == 0

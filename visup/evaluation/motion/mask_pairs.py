@@ -1,0 +1,54 @@
+"""Which mask is the truth of which frame: by name, never by order, since truth may be sparse."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from visup.agent.model.errors import SettingsError
+from visup.percepts.video.image_folder import images_in
+
+_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+
+
+def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
+    """The masks of a sequence by the frames whose truth they are.
+
+    A mask belongs to the image of its name (`00012.png` to `00012.jpg`), or else to the one image whose last
+    number is its own (`mask_12.png` to `frame_0012.jpg`); in a video, to the frame of that number, from 0.
+
+    Args:
+        source: A folder of images, or a video file.
+        masks: The mask files; frames without one have no truth.
+
+    Returns:
+        Index of a frame -> its mask.
+
+    Raises:
+        SettingsError: A mask belongs to no frame, or two belong to one.
+    """
+    frames = images_in(source) if source.is_dir() else []
+    names = {f.stem: index for index, f in enumerate(frames)}
+    numbers: dict[int, list[int]] = {}
+    for index, frame in enumerate(frames):
+        numbers.setdefault(_number(frame), []).append(index)
+    pairs: dict[int, Path] = {}
+    for mask in masks:
+        of_number = numbers.get(_number(mask), []) if frames else [_number(mask)]
+        index = names.get(mask.stem, of_number[0] if len(of_number) == 1 else -1)
+        if index < 0 or index in pairs:
+            what = "a second truth of a frame" if index in pairs else "the truth of no frame"
+            raise SettingsError(
+                f"this mask is {what}",
+                where=str(mask),
+                expected=f"a mask is named as its frame in {source.name}",
+            )
+        pairs[index] = mask
+    return pairs
+
+
+def _number(path: Path) -> int:
+    """The last number in a file's name; -1 where there is none."""
+    found = _NUMBER.search(path.stem)
+    return int(found[1]) if found else -1
