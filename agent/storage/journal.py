@@ -1,7 +1,9 @@
 """The journal: what happened in a run, in SQLite files, written step by step.
 
 Write-ahead logging makes each step durable as a whole: after a crash the journal holds every step
-up to the last one that was committed, and can be read while the run goes on. A run of days goes on in
+up to the last one that was committed, and can be read while the run goes on. What is told must also
+outlast the loss of power: a step with events or alerts is on the disk, with all before it, once it is
+recorded; quiet ones follow with the next. A run of days goes on in
 further files (segments) beside the first one. What was perceived is kept in full, so that a run can be
 reasoned about again without its video. Read next: `journal_reader.py`, which reads all this back.
 """
@@ -25,6 +27,7 @@ from visup.agent.model.events import Alert, Event
 from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import TaskBelief
+from visup.agent.storage.atomic import sync
 from visup.agent.storage.codec import pack_observation
 from visup.agent.storage.file_lock import acquire_lock
 from visup.agent.storage.jsonable import event_record, object_summary, to_jsonable
@@ -96,6 +99,7 @@ class Journal:
             if resume:
                 begun = [one for one in segments(path) if self._take_over(one)]
                 self._db = _connected(begun[-1])
+                self._durable = False
             else:
                 self._begin()
         except BaseException:
@@ -103,9 +107,10 @@ class Journal:
             raise
 
     def note(self, **facts: Any) -> None:
-        """Store facts about the run (settings, source, verdict, ...), replacing older ones."""
+        """Store facts about the run (settings, source, verdict, ...), replacing older ones, on the disk."""
         rows = [(key, _text(to_jsonable(value))) for key, value in facts.items()]
-        self._write([("INSERT OR REPLACE INTO run VALUES (?, ?)", row) for row in rows])
+        sql = "INSERT OR REPLACE INTO run VALUES (?, ?)"
+        self._write([(sql, row) for row in rows], durable=True)
 
     def record(self, step: Step, frame: Frame | None = None) -> None:
         """Write one step, wholly or not at all.
@@ -127,7 +132,7 @@ class Journal:
         ]
         if self._is_full(step.time):
             self._next_segment()
-        self._write(statements)
+        self._write(statements, durable=bool(step.events or step.alerts))
         self._last_event += len(step.events)
         self.last_frame = step.frame_index
         self._begun = step.time if self._begun is None else self._begun
@@ -155,10 +160,12 @@ class Journal:
     def _open(self, path: Path, number: int) -> None:
         try:
             self._db = _connected(path)
+            self._durable = False
             # One transaction: a run killed meanwhile leaves an empty file or a whole journal.
             marks = f"PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};"
             self._db.executescript(f"BEGIN;{SCHEMA}{marks}COMMIT;")
-        except sqlite3.Error as fault:
+            sync(path.parent)
+        except (sqlite3.Error, OSError) as fault:
             raise _unwritable(path, fault) from fault
         self._sizes.append(0)
         self._begun = None
@@ -219,8 +226,11 @@ class Journal:
                 db.close()
                 self._sizes[i] = 0
 
-    def _write(self, statements: list[Statement]) -> None:
+    def _write(self, statements: list[Statement], *, durable: bool) -> None:
         try:
+            if durable != self._durable:
+                self._db.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
+                self._durable = durable
             if len(statements) == 1:  # is a transaction by itself
                 self._db.execute(*statements[0])
                 return
@@ -350,7 +360,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 _TEXT = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
-def _unwritable(path: Path, fault: sqlite3.Error) -> OutputError:
+def _unwritable(path: Path, fault: sqlite3.Error | OSError) -> OutputError:
     return OutputError(
         f"the journal cannot be written ({fault})",
         where=str(path),

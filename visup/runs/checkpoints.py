@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -19,6 +20,13 @@ from visup.version import __version__
 
 CHECKPOINT = "state.bin"
 LARGEST_STATE_BYTES = 2**30
+PACKED = b"VISUPSTZ"
+"""Before a state that is compressed."""
+BYTES_AN_HOUR = 160e6
+BYTES_AT_ONCE = 40e6
+"""What states may write in an hour of the source, and what they may save up of it: at most 200 MB in any
+hour. Between two states nearly all of what behaviours hold has changed, so that differences would be no
+smaller; compressed they take an eighth. A state that is large is kept more seldom."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +53,22 @@ class CheckpointWriter:
 
     Attributes:
         note: Why none can be kept, or None.
-        largest: Size of the largest state so far, bytes.
+        largest: Size of the largest state so far, bytes in memory.
+        written: Bytes that were written so far.
     """
 
     def __init__(self, folder: Path, every_s: float) -> None:
         self.note: str | None = None
         self.largest = 0
+        self.written = 0
         self._path = folder / CHECKPOINT
         self._every_s = every_s
         self._last: float | None = None
         self._disk = ThreadPoolExecutor(max_workers=1, thread_name_prefix="state")
+        self._seen: float | None = None
         self._writing: Future[None] | None = None
+        self._left = BYTES_AT_ONCE
+        self._size = 0.0
 
     def offer(self, agent: Agent, step: Step, kept: Callable[[], Mapping[str, Any]]) -> None:
         """Keep the state after a step when it is time to.
@@ -66,8 +79,15 @@ class CheckpointWriter:
             kept: Tells what the recorder remembers.
         """
         self._last = step.time if self._last is None else self._last
+        if self._seen is not None:
+            saved = max(0.0, step.time - self._seen) * BYTES_AN_HOUR / 3600.0
+            self._left = min(BYTES_AT_ONCE, self._left + saved)
+        self._seen = step.time
         busy = self._writing is not None and not self._writing.done()
-        if not self._every_s or self.note or busy or step.time - self._last < self._every_s:
+        early = step.time - self._last < self._every_s or self._left < min(
+            self._size, BYTES_AT_ONCE
+        )
+        if not self._every_s or self.note or busy or early:
             return
         self._last = step.time
         try:
@@ -76,7 +96,16 @@ class CheckpointWriter:
             self.note = f"no checkpoint of this run is kept ({fault}): resuming it perceives all frames again"
             return
         self.largest = max(self.largest, len(data))
-        self._writing = self._disk.submit(_replace, self._path, data)
+        self._writing = self._disk.submit(self._write, data)
+
+    def _write(self, data: bytes) -> None:
+        packed = PACKED + zlib.compress(data, 1)
+        # Where it cannot be written the older state stays; the disk's trouble is told of the journal.
+        with suppress(OSError):
+            write_whole(self._path, packed)
+        self.written += len(packed)
+        self._size = float(len(packed))
+        self._left -= len(packed)
 
     def close(self) -> None:
         """Wait for the disk."""
@@ -103,7 +132,7 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
         It, or None when there is none that can be used, and then why, when there is one.
     """
     try:
-        told = load_state(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES))
+        told = load_state(_unpacked(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES)))
         if told["visup"] != __version__:
             return None, f"its checkpoint is of visup {told['visup']}"
         return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None
@@ -113,7 +142,19 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
         return None, str(fault)
 
 
-def _replace(path: Path, data: bytes) -> None:
-    # Where it cannot be written the older state stays; that the disk is in trouble is told of the journal.
-    with suppress(OSError):
-        write_whole(path, data)
+def _unpacked(data: bytes) -> bytes:
+    """A state as it was before it was compressed.
+
+    Raises:
+        ValueError: It is damaged, or larger than a state may be.
+    """
+    if not data.startswith(PACKED):
+        return data
+    inflater = zlib.decompressobj()
+    try:
+        state = inflater.decompress(data[len(PACKED) :], LARGEST_STATE_BYTES)
+    except zlib.error as fault:
+        raise ValueError("its check sum is wrong") from fault
+    if not inflater.eof:
+        raise ValueError("it is cut off or too large")
+    return state

@@ -50,6 +50,7 @@ class Recorder:
         journal: The journal.
         facts: What was noted about the run.
         notes: What the user should know.
+        complete: Whether all that was to be written so far was written, but for the annotated video.
 
     Raises:
         OutputError: The journal cannot be begun.
@@ -81,6 +82,7 @@ class Recorder:
         if not resume:
             self.journal.note(**self.facts)
         self.notes = source.notes
+        self.complete = True
         self.collector = Collector()
         self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
         path = _free(folder / "annotated.webm")
@@ -141,6 +143,7 @@ class Recorder:
         if self._waiting:
             left = f"{len(self._waiting) + self._lost} steps could not be recorded: {self._fault}"
             self.notes = (*self.notes, left)
+            self.complete = False
         report = None
         try:
             verdict = result.verdict.value if result.verdict else None
@@ -154,6 +157,7 @@ class Recorder:
         except OutputError as fault:
             # The verdict must reach the user even when there is no room to write it down.
             self.notes = (*self.notes, str(fault))
+            self.complete = False
         return report, self.notes
 
     def _write(self) -> None:
@@ -174,6 +178,7 @@ class Recorder:
             except Exception as fault:
                 # What is derived may be lost; supervision and the journal go on.
                 del self._derived[name]
+                self.complete &= name != "report"
                 said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
                 self.notes = (*self.notes, said)
 
@@ -192,6 +197,7 @@ class Recorder:
             raise
         except Exception as fault:
             # The run itself is recorded already; a report that cannot be made must not hide it.
+            self.complete = False
             self.notes = (f"the report was not made: {type(fault).__name__}: {fault}",)
             return None
         return path

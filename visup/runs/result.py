@@ -10,7 +10,7 @@ from visup.agent import Verdict
 
 
 class ExitCode(IntEnum):
-    """What `visup watch` and `visup replay` end with; where several are true, the first of 1, 4, 130, 3."""
+    """What `visup watch` and `visup replay` end with; of several the first of 1, 4, 5, 130, 3."""
 
     GOOD = 0
     """It went well; without a task: nothing unsafe was seen, from the first frame to the last."""
@@ -22,6 +22,8 @@ class ExitCode(IntEnum):
     """The task was still in progress when the source ended, and nothing was wrong."""
     SOURCE_BROKE_OFF = 4
     """The source is cut off or damaged; nothing was wrong in the part that was seen."""
+    NOT_RECORDED = 5
+    """The run or its report could not be written whole, as on a full disk; nothing was wrong else."""
     STOPPED = 130
     """The user stopped it (Ctrl-C); nothing was wrong until then."""
 
@@ -40,6 +42,7 @@ class RunResult:
         has_task: Whether there was a task to judge.
         stopped: Whether the user stopped it.
         seconds: Time of the last frame.
+        recorded: Whether all that was to be written was written.
     """
 
     verdict: Verdict | None
@@ -51,6 +54,7 @@ class RunResult:
     has_task: bool = True
     stopped: bool = False
     seconds: float = 0.0
+    recorded: bool = True
 
     @property
     def exit_code(self) -> ExitCode:
@@ -59,6 +63,8 @@ class RunResult:
             return ExitCode.BAD
         if self.problem and not self.stopped:
             return ExitCode.SOURCE_BROKE_OFF
+        if not self.recorded:
+            return ExitCode.NOT_RECORDED
         if self.stopped:
             return ExitCode.STOPPED
         return ExitCode.UNFINISHED if self.verdict is Verdict.IN_PROGRESS else ExitCode.GOOD

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, cast
 from visup.agent import Frame, Severity, Verdict
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
+from visup.agent.storage.atomic import sync
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
@@ -49,6 +50,7 @@ def fresh_folder(out: Path | None, source: str) -> Path:
         probe = out / ".writable"
         probe.touch()
         probe.unlink()
+        sync(out.parent)  # that there is a folder is to be known after the power was lost, too
     except OSError as fault:
         raise OutputError(
             f"the output folder cannot be written: {fault.strerror}",
@@ -287,7 +289,13 @@ class _Run:
             return result
         ended = self.source.ended.value if self.source.ended and not self._stopped else "stopped"
         report, more = self._recorder.finish(result, ended, mind.tasks)
-        return replace(result, folder=self._folder, report=report, notes=(*notes, *more))
+        return replace(
+            result,
+            folder=self._folder,
+            report=report,
+            notes=(*notes, *more),
+            recorded=self._recorder.complete,
+        )
 
     def _attending(self, operator: HumanOperator, past: InterruptedRun | None) -> Observer:
         """The operator, who does not say again what was taken up before the run was killed."""
