@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
+from visup.agent.storage.picture_size import check_picture_size
+from visup.agent.storage.text_file import read_bounded
 from visup.percepts.video.quiet_decoder import quiet
 from visup.percepts.video.source import DEFAULT_FPS, Ending, VideoSource, to_bgr
 
@@ -22,6 +24,9 @@ VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v", ".m
 USUAL_FOLDERS = ("img1", "frames", "images")
 JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
 PNG_START, PNG_END = b"\x89PNG", b"IEND"
+
+
+LARGEST_FILE_BYTES = 2**28
 
 
 class UnreadableImageError(Exception):
@@ -117,13 +122,17 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     import cv2
 
     try:
-        data = path.read_bytes()
+        data = read_bounded(path, LARGEST_FILE_BYTES)
     except OSError as e:
         raise UnreadableImageError(f"cannot be read ({e.strerror or e})") from e
     if not data:
         raise UnreadableImageError("is empty")
     if _ends_early(data):
         raise UnreadableImageError("is cut off")
+    try:
+        check_picture_size(data)
+    except ValueError as e:
+        raise UnreadableImageError(str(e)) from e
     # JPEG has no alpha, and only the colour flag honours the camera's orientation.
     flags = cv2.IMREAD_COLOR if data.startswith(JPEG_START) else cv2.IMREAD_UNCHANGED
     try:

@@ -9,6 +9,7 @@ import numpy as np
 
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
+from visup.agent.storage.picture_size import check_pixels
 from visup.percepts.video.capture import (
     Capture,
     CaptureFactory,
@@ -64,6 +65,21 @@ class ContainerClock:
         return told
 
 
+def check_frame_size(name: str, capture: Capture) -> None:
+    """Refuse a video whose frames are too large, before the first one is decoded.
+
+    Raises:
+        SourceError: They are.
+    """
+    import cv2
+
+    try:
+        check_pixels(capture.get(cv2.CAP_PROP_FRAME_WIDTH), capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    except ValueError as fault:
+        capture.release()
+        raise SourceError(f"a frame of the video {fault}", where=name) from fault
+
+
 class VideoFile(VideoSource):
     """A recording: its frames, its times, and whether all that it announces was there.
 
@@ -86,6 +102,7 @@ class VideoFile(VideoSource):
         self._read = 0
         self._last_time = 0.0
         self._grabbed_index = -1
+        check_frame_size(name, capture)
         first = self._advance(every=1)
         if first is None:
             capture.release()

@@ -6,6 +6,8 @@ import json
 import os
 import re
 import sqlite3
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -248,3 +250,22 @@ def test_the_doctor_knows_what_visup_depends_on() -> None:
 def bare(requirement: str) -> str:
     """The name of a library, without its version and extras."""
     return re.split(r"[\[>=]", requirement)[0]
+
+
+@pytest.mark.parametrize("megabytes", [400, 800, 1200])
+def test_too_little_memory_is_told_and_not_died_of(megabytes: int, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource", reason="this system has no limits of memory")
+    done = subprocess.run(
+        [sys.executable, "-m", "visup.cli", "watch", "clip.mp4"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        preexec_fn=lambda: resource.setrlimit(
+            resource.RLIMIT_AS, (megabytes << 20, megabytes << 20)
+        ),
+    )
+    assert done.returncode == 2, done.stderr
+    assert "memory" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -13,6 +13,7 @@ from visup.agent.cycle.answers import resolve_model
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.model.mind import Mind
 from visup.agent.storage.journal_reader import _unreadable
+from visup.runs.settings import complete_task
 from visup.terminal.display import html_of
 from visup.terminal.tables import table
 
@@ -83,3 +84,12 @@ def test_notebooks_show_no_frames_made_of_characters() -> None:
     made = html_of(shown)
     assert "touching" in made
     assert not set("┏┓┗┛┡┩┳┻╇━│┃└┘┴┬") & set(made)
+
+
+def test_shells_complete_task_names_and_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dot.task").touch()
+    assert complete_task("do") == ["dock", "dock_with_retry", "dot.task"]
+    assert complete_task("nothing") == []

@@ -14,7 +14,9 @@ from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Severi
 from visup.agent.model.object_beliefs import Candidate
 from visup.agent.model.step import Step
 from visup.story import Detail, Narrative, summary_lines
+from visup.story.life_sentences import lives_sentence
 from visup.story.line_budget import LineBudget
+from visup.story.lives import ObjectLife
 from visup.testing import region_of
 from visup.wording import worded_once
 
@@ -81,6 +83,17 @@ def test_lives_of_one_course_share_a_line() -> None:
     assert [e.text for e in told(steps)] == [
         "Objects 4, 5, 6, 7 and 2 more crossed from left to right, 3.0 s."
     ]
+
+
+def test_who_comes_twice_is_named_once() -> None:
+    one = ObjectLife(17, SIZE, 1.0, 2.0, (0, 0, 9, 9), (50, 0, 9, 9))
+    lives = [one, replace(one, since=4.0, until=7.0), replace(one, id=18)]
+    assert lives_sentence(lives) == (
+        "Objects 17 and 18 came in from the left and were last seen there, 1.0 to 3.0 s each."
+    )
+    assert lives_sentence(lives[:2]) == (
+        "Object 17 came in from the left and was last seen there, 3.0 s."
+    )
 
 
 def test_specks_and_glimpses_are_only_counted() -> None:

@@ -68,6 +68,7 @@ class Setting:
             metavar=self.option.metavar or (number and _METAVARS[number]),
             help=self.option.help,
             parser=number and number_parser(number, self.option.at_least),
+            autocompletion=self.option.complete,
         )
         annotation = Annotated[kind, told]  # type: ignore[valid-type]
         return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

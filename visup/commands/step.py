@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 OPTIONS = (
     *("tasks", "models", "rules", "actors", "every", "behaviours", "plugins", "fps"),
-    *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention"),
+    *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention", "preset"),
 )
 """Settings of a run that matter when it is stepped: nothing is late here, and nothing recorded."""
 

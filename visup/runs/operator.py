@@ -130,13 +130,16 @@ class HumanOperator:
                     name = event.data["names"][0]
                     self.tell(f"Type an answer such as {event.objects[0]}={name} at any time.")
             for line in self.typed():
-                self._take(agent, line)
+                self._take(agent, line, step.time)
 
         return after
 
-    def _take(self, agent: Agent, line: str) -> None:
-        """A typed line: ID=NAME, or a name alone while one question waits."""
-        waiting = agent.mind.questions
+    def _take(self, agent: Agent, line: str, now: float) -> None:
+        """A typed line: ID=NAME, or a name alone while one question waits.
+
+        A name that was typed before the question could be read is no answer to it.
+        """
+        waiting = [q for q in agent.mind.questions if q.asked < now]
         if "=" not in line and line.strip() and len(waiting) == 1:
             line = f"{waiting[0].object_id}={line}"
         try:

@@ -24,6 +24,7 @@ class Option:
         metavar: What stands for its value in the help.
         parse: The setting from the texts that were given, where it is not simply them.
         at_least: The smallest value, or None.
+        complete: Gives what may stand for its value, from its beginning, to a shell that completes.
     """
 
     help: str
@@ -31,6 +32,24 @@ class Option:
     metavar: str | None = None
     parse: Callable[[Any], Any] | None = None
     at_least: float | None = None
+    complete: Callable[[str], list[str]] | None = None
+
+
+def complete_task(begun: str) -> list[str]:
+    """Shipped tasks and task files that a word may become."""
+    from visup.tasks import shipped_tasks
+
+    place = Path(begun)
+    folder, start = (place, "") if begun.endswith("/") else (place.parent, place.name)
+    files = sorted(folder.glob(f"{start}*.task")) if folder.is_dir() else []
+    return [*(t for t in shipped_tasks() if t.startswith(begun)), *map(str, files)]
+
+
+def complete_preset(begun: str) -> list[str]:
+    """Presets that a word may become."""
+    from visup.runs.inputs.presets import PRESETS
+
+    return [name for name in PRESETS if name.startswith(begun)]
 
 
 def parse_actors(bindings: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -77,7 +96,10 @@ class WatchSettings:
     source: str
     """File, folder of images, camera index or URL."""
     tasks: Annotated[
-        tuple[str, ...], Option("Task file, or the name of a shipped task.", "--task", "FILE")
+        tuple[str, ...],
+        Option(
+            "Task file, or the name of a shipped task.", "--task", "FILE", complete=complete_task
+        ),
     ] = ()
     models: Annotated[
         Path | None, Option("Model database (see `visup models build`).", metavar="DB")
@@ -136,6 +158,14 @@ class WatchSettings:
     ] = None
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
+    preset: Annotated[
+        str | None,
+        Option(
+            "Rules, memory and pace for a kind of scene: traffic, cell, orbit or bench "
+            "(see `visup presets`).",
+            complete=complete_preset,
+        ),
+    ] = None
     attention: Annotated[
         bool, Option("Match well-known objects less often, which saves time.", "--attention")
     ] = False
@@ -148,6 +178,10 @@ class WatchSettings:
         fov = self.fov_vertical_deg
         if fov is not None and not 0 < fov < 180:
             raise SettingsError(f"--fov is {fov}", expected="degrees between 0 and 180")
+        if self.preset is not None:
+            from visup.runs.inputs.presets import preset_named
+
+            preset_named(self.preset)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,9 @@ from visup.percepts.video import VideoSource, open_source
 from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
 from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
-from visup.rules.reasoners import default_reasoners
+from visup.rules.reasoners import ReasonerSettings, default_reasoners
 from visup.runs.inputs.plugins import user_behaviours
+from visup.runs.inputs.presets import preset_named
 from visup.runs.inputs.zones import load_ground, load_zones
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
@@ -58,12 +59,15 @@ def open_video(settings: WatchSettings) -> VideoSource:
     Raises:
         SourceError: It cannot be opened.
     """
-    return open_source(
+    source = open_source(
         settings.source,
         every=settings.every,
         fps=settings.fps,
         patience_s=settings.patience_s,
     )
+    if settings.preset and settings.every == 1:
+        source.every = preset_named(settings.preset).every(source.fps)
+    return source
 
 
 def build_agent(
@@ -222,14 +226,19 @@ def _places(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
 
 
 def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
-    return tuple(r for path in settings.rules for r in load_rules(path)) or shipped_rules()
+    own = tuple(r for path in settings.rules for r in load_rules(path))
+    without = preset_named(settings.preset).without if settings.preset else ()
+    return own or tuple(r for r in shipped_rules() if r.name not in without)
 
 
 def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
 ) -> Reasoners:
     traits = any(map(asks_for_traits, tasks))
-    interpreting = default_reasoners(rules=_rules(settings), traits=traits)
+    usual = ReasonerSettings()
+    if settings.preset:
+        usual = ReasonerSettings(objects=preset_named(settings.preset).objects)
+    interpreting = default_reasoners(usual, _rules(settings), traits=traits)
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)
     activation = (ActivationReasoner(rules),) if rules else ()

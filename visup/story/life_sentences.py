@@ -21,15 +21,20 @@ def who(life: ObjectLife) -> str:
     return f"object {_with_colour(life)}"
 
 
-def course(life: ObjectLife) -> str:
-    """What an object did from its coming to its going, as a verb and places."""
+def course(life: ObjectLife, was: str = "was") -> str:
+    """What an object did from its coming to its going, as a verb and places.
+
+    Args:
+        life: Of the object, or of one of several that did the same.
+        was: `were` when several are spoken of.
+    """
     came, went = life.came_from, life.went_to
     if came and went:
         crossed = f"crossed from {came} to {went}"
         return crossed if came != went else f"came in from the {came} and went out there again"
     if came:
         seen_last = "there" if came in life.ended_at else life.ended_at
-        return f"came in from the {came} and was last seen {seen_last}"
+        return f"came in from the {came} and {was} last seen {seen_last}"
     if went:
         origin = "" if went in life.begun_at else f" from {_place(life.begun_at)}"
         return f"went out to the {went}{origin}"
@@ -52,6 +57,8 @@ def lives_sentence(lives: Sequence[ObjectLife]) -> str:
     Args:
         lives: At least one.
     """
+    each = {x.id: x for x in sorted(lives, key=lambda x: x.seconds)}
+    lives = [each[i] for i in dict.fromkeys(x.id for x in lives)]
     if len(lives) == 1:
         return life_sentence(lives[0])
     shortest, longest = min(x.seconds for x in lives), max(x.seconds for x in lives)
@@ -59,7 +66,7 @@ def lives_sentence(lives: Sequence[ObjectLife]) -> str:
     shown = [_with_colour(x) for x in lives[:MOST_NAMED]]
     rest = len(lives) - len(shown)
     last = f"{rest} more" if rest else shown.pop()
-    return f"Objects {', '.join(shown)} and {last} {course(lives[0])}, {lasted}."
+    return f"Objects {', '.join(shown)} and {last} {course(lives[0], 'were')}, {lasted}."
 
 
 def stay_sentence(life: ObjectLife) -> str:

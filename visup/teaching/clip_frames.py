@@ -7,15 +7,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Frame
 from visup.agent.model.errors import SourceError
-from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import VideoSource, open_source
-from visup.percepts.video.source import to_bgr
+from visup.percepts.video.image_folder import UnreadableImageError, read_image
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 """Endings of the files that are read as one picture."""
@@ -126,7 +124,7 @@ class ClipFrames:
 
 
 def _read_picture(path: Path) -> Picture:
-    picture = cv2.imread(opencv_name(path), cv2.IMREAD_UNCHANGED)
-    if picture is None:
-        raise SourceError("this is not a picture that can be read", where=str(path))
-    return to_bgr(picture)
+    try:
+        return read_image(path)
+    except UnreadableImageError as fault:
+        raise SourceError(f"this picture {fault}", where=str(path)) from fault

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.percepts.opencv_names import opencv_name
+from visup.agent.storage.picture_size import check_picture_size
+from visup.agent.storage.text_file import read_bounded
 from visup.percepts.shape.building.build_parts import BuildPart, is_made, parts_of, read_part
 from visup.percepts.shape.building.mesh_views import half_sphere_directions, load_mesh, render_views
 from visup.percepts.shape.database.model_database import ModelDatabase
@@ -41,6 +42,7 @@ MOST_CLUSTERED = 400
 PICTURES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
 """Endings of the picture files that are read as silhouettes."""
 
+LARGEST_PICTURE_BYTES = 2**28
 UNSCORED = 128
 """Value of mask pixels that belong to no object for certain."""
 
@@ -58,7 +60,14 @@ def read_silhouette(path: Path) -> NDArray[np.bool_]:
 
 
 def _read_grey(path: Path) -> NDArray[np.uint8]:
-    image = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE) if path.is_file() else None
+    try:
+        data = read_bounded(path, LARGEST_PICTURE_BYTES)
+        check_picture_size(data)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+    except ValueError as e:
+        raise DatabaseError(f"this picture {e}", where=str(path)) from e
+    except (OSError, cv2.error):
+        image = None
     if image is None:
         raise DatabaseError(
             "this is not a picture that can be read"

@@ -132,6 +132,22 @@ def test_what_is_typed_or_given_beforehand_reaches_the_mind() -> None:
         HumanOperator({1: "nobody"}).attend(agent_of(doubtful))
 
 
+def test_a_name_typed_before_the_question_could_be_read_is_no_answer() -> None:
+    asked: list[float] = []
+    agent = agent_of(doubtful)
+
+    def typed() -> list[str]:
+        """A name in the very step that asks; one with its object's id would do."""
+        new = [q.asked for q in agent.mind.questions if q.asked not in asked]
+        asked.extend(new)
+        return ["guitar\n"] if new else []
+
+    agent.observers = (HumanOperator(typed=typed, tell=lambda text: None).attend(agent),)
+    last = steps(agent, 0, 120)[-1]
+    assert asked
+    assert not last.mind.answers
+
+
 @pytest.mark.parametrize("line", ["arm", "=arm", "x=arm", "2="])
 def test_lines_that_are_no_answers_are_refused(line: str) -> None:
     with pytest.raises(SettingsError):

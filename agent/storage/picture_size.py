@@ -1,0 +1,49 @@
+"""How large a picture is, told by its header: before memory is taken for its pixels."""
+
+from __future__ import annotations
+
+import warnings
+from io import BytesIO
+
+MOST_PIXELS = 2**26
+"""Pixels of a picture or frame, 67 million: twice those of a video of 8K. Beyond, decoding alone takes
+seconds and gigabytes."""
+
+
+def picture_size(data: bytes) -> tuple[int, int] | None:
+    """Width and height of a picture file in pixels, or None where its header cannot be read."""
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(BytesIO(data)) as picture:
+                return picture.size
+    except Image.DecompressionBombError:
+        return 2**31, 2**31
+    except Exception:
+        # Pillow raises whatever its readers do; the picture's own decoder has the last word.
+        return None
+
+
+def check_picture_size(data: bytes) -> None:
+    """Refuse a picture that is too large to be decoded.
+
+    Raises:
+        ValueError: It is; says how large.
+    """
+    size = picture_size(data)
+    if size is not None:
+        check_pixels(*size)
+
+
+def check_pixels(width: float, height: float) -> None:
+    """Refuse a picture of so many pixels.
+
+    Raises:
+        ValueError: They are too many.
+    """
+    if width * height > MOST_PIXELS:
+        raise ValueError(
+            f"has {width:.0f}x{height:.0f} pixels; visup decodes at most {MOST_PIXELS / 1e6:.0f} million"
+        )
