@@ -51,20 +51,33 @@ def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None
         return None
     rest = "\n".join([where.text[where.column - 1 :], *text.split("\n")[where.line :]])
     if m := _IN_PLACE.search(hint):
-        old = re.match(r"\s*" + r"\s+".join(map(re.escape, m[2].split())), rest)
-        return None if old is None else _replacing(where, old, m[1])
+        pattern = r"\s+".join(map(re.escape, m[2].split()))
+        if old := re.match(rf"\s*{pattern}", rest):
+            return _replacing(where, old, m[1])
+        return _on_line(where, pattern, m[1])
     if m := _PUT.search(hint):
         spaced = m[1] if m[1] in ",:)]" else f" {m[1]} "
         return TextFix(where.line, where.column, 0, spaced)
     if m := _OUT.search(hint):
         word = rf"\b{re.escape(m[1])}\b" if m[1].isidentifier() else re.escape(m[1])
         found = re.search(rf"{word}\s*,\s*|,\s*{word}|{word}", rest)
-        return None if found is None else _replacing(where, found, "")
+        if found is None or found.start() > len(where.text) - where.column + 1:
+            return _on_line(where, word, "")
+        return _replacing(where, found, "")
     if m := _MEANT.search(hint):
         return _renamed(where, rest, m[1])
     if m := _WRITE.search(hint):
         return TextFix(where.line, where.column, where.length, m[1])
     return None
+
+
+def _on_line(where: SourceLocation, pattern: str, new: str) -> TextFix | None:
+    """Something replaced that stands elsewhere on the line, nearest to the caret."""
+    found = list(re.finditer(pattern, where.text))
+    if not found:
+        return None
+    nearest = min(found, key=lambda m: abs(m.start() - where.column + 1))
+    return TextFix(where.line, nearest.start() + 1, nearest.end() - nearest.start(), new)
 
 
 def _replacing(where: SourceLocation, old: re.Match[str], new: str) -> TextFix:

@@ -175,7 +175,7 @@ def place_of(text: str, error: UnexpectedInput) -> tuple[int, int]:
     if isinstance(error, UnexpectedToken) and error.token.type != "$END":
         return error.token.start_pos or 0, len(error.token)
     if isinstance(error, UnexpectedCharacters):
-        return error.pos_in_stream, 1
+        return int(error.pos_in_stream or 0), 1
     return len(text.rstrip()), 0
 
 

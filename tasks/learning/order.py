@@ -47,6 +47,8 @@ Occurrence = tuple[Item, int]
 Plan = Occurrence | Series | Free
 
 
+LET_GO_S = 0.6
+"""What is carried meets others no longer than so long after it was let go."""
 CLOSE_S = 2.0
 """A retreat begins so soon after the contact that it ends; relations are judged with delays."""
 
@@ -92,7 +94,7 @@ def _carried(meeting: Happening, meetings: list[Happening]) -> bool:
     """
     overlap = [m for m in meetings if m.begin <= meeting.begin + CLOSE_S and m.end >= meeting.begin]
     for held in overlap:
-        if held.symbol[0] != "coupled" or meeting.end > held.end + CLOSE_S:
+        if held.symbol[0] != "coupled" or meeting.end > held.end + LET_GO_S:
             continue
         for a, b in (meeting.symbol[1], meeting.symbol[1][::-1]):
             if a not in held.symbol[1] or b in held.symbol[1]:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands.test_cli import Call, visup
+from tests.cli import Call
+from tests.commands.test_cli import visup
 from tests.tasks.learning.test_learning import ARM, NAMES, PART, picked
 from visup.agent import Mind
 from visup.runs import learning_runs
