@@ -14,12 +14,17 @@ from visup.commands.watch import watch_settings
 from visup.runs.settings import WatchSettings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
     from visup.agent.cycle.agent import Agent
     from visup.stepping import ObservationSource
 
 OPTIONS = (
     *("tasks", "models", "rules", "actors", "every", "behaviours", "plugins", "fps"),
-    *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention"),
+    *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention", "preset"),
 )
 """Settings of a run that matter when it is stepped: nothing is late here, and nothing recorded."""
 
@@ -43,10 +48,11 @@ def step(
 
     with ExitStack() as stack:
         if is_run(source):
-            agent, frames = _recorded(Path(source), setting, settings_file)
+            agent, frames, video = _recorded(Path(source), setting, settings_file)
         else:
-            agent, frames = _live(watch_settings(source, setting, settings_file), stack)
-        session = Session(agent, frames)
+            settings = watch_settings(source, setting, settings_file)
+            (agent, frames), video = _live(settings, stack), settings.source
+        session = Session(agent, frames, picture=_pictures(video, stack))
         at_prompt = sys.stdin.isatty()
         code = session.run(read_commands(session))
     # At a prompt a slip is put right by the next line; from a pipe nobody would know of it.
@@ -61,9 +67,25 @@ def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
     return agent, stack.enter_context(open_video(settings))
 
 
+def _pictures(source: str, stack: ExitStack) -> Callable[[int], NDArray[np.uint8]] | None:
+    """Frames by their number, of a source that can be read again; None for cameras and what is gone."""
+    from visup.teaching.clip_frames import ClipFrames
+
+    if not Path(source).exists() or Path(source).is_char_device():
+        return None
+    opened: list[ClipFrames] = []
+
+    def picture(number: int) -> NDArray[np.uint8]:
+        if not opened:
+            opened.append(stack.enter_context(ClipFrames(source)))
+        return opened[0].at(number)
+
+    return picture
+
+
 def _recorded(
     run: Path, given: Given, settings_file: Path | None
-) -> tuple[Agent, ObservationSource]:
+) -> tuple[Agent, ObservationSource, str]:
     from visup.agent.model.errors import SettingsError
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import settings_for
@@ -78,4 +100,5 @@ def _recorded(
             expected="--task, --rules, --actor or --zones",
         )
     recording = Recording.open(run)
-    return reasoning_agent(settings_for(recording, **given)), RecordedObservations(recording)
+    settings = settings_for(recording, **given)
+    return reasoning_agent(settings), RecordedObservations(recording), settings.source

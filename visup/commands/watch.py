@@ -203,14 +203,21 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
         word,
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[rate]}"),
         progress.TimeRemainingColumn(),
         console=console,
         transient=True,
         disable=not (shown and console.is_terminal),
     )
     with bar:
-        task = bar.add_task(word, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task = bar.add_task(word, total=None, rate="")
+
+        def tell(done: int, total: int | None) -> None:
+            took = bar.tasks[0].elapsed or 0.0
+            rate = f"{done / took:.1f} frames/s" if took > 1.0 else ""
+            bar.update(task, completed=done, total=total, rate=rate)
+
+        yield tell
 
 
 def _print_result(console: Console, result: RunResult, *, as_json: bool) -> None:

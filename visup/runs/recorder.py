@@ -86,7 +86,7 @@ class Recorder:
         self.collector = Collector()
         self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
         path = _free(folder / "annotated.webm")
-        self.video = AnnotatedVideo(path, source.fps / settings.every) if options.video else None
+        self.video = AnnotatedVideo(path, source.fps / source.every) if options.video else None
         self._wants_report = options.report
         self._derived = {"report": self.collector.add} if options.report else {}
         if self.video:

@@ -250,7 +250,7 @@ class _Run:
     def watch(self, frames: Iterable[Frame], progress: Progress | None) -> Iterator[Step]:
         """Step through frames until they end or the user stops."""
         count = self.source.frame_count
-        total = None if count is None else -(-count // self._settings.every)
+        total = None if count is None else -(-count // self.source.every)
         try:
             for step in self._agent.steps(frames):
                 self._steps += 1

@@ -45,6 +45,13 @@ def complete_task(begun: str) -> list[str]:
     return [*(t for t in shipped_tasks() if t.startswith(begun)), *map(str, files)]
 
 
+def complete_preset(begun: str) -> list[str]:
+    """Presets that a word may become."""
+    from visup.runs.inputs.presets import PRESETS
+
+    return [name for name in PRESETS if name.startswith(begun)]
+
+
 def parse_actors(bindings: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Actors from `NAME=MODEL` or `NAME=MODEL,MODEL`.
 
@@ -151,6 +158,20 @@ class WatchSettings:
     ] = None
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
+    detections: Annotated[
+        Path | None,
+        Option(
+            "Boxes of a detector (MOT or COCO file), in place of visup's own eyes.", metavar="FILE"
+        ),
+    ] = None
+    preset: Annotated[
+        str | None,
+        Option(
+            "Rules, memory and pace for a kind of scene: traffic, cell, orbit or bench "
+            "(see `visup presets`).",
+            complete=complete_preset,
+        ),
+    ] = None
     attention: Annotated[
         bool, Option("Match well-known objects less often, which saves time.", "--attention")
     ] = False
@@ -163,6 +184,10 @@ class WatchSettings:
         fov = self.fov_vertical_deg
         if fov is not None and not 0 < fov < 180:
             raise SettingsError(f"--fov is {fov}", expected="degrees between 0 and 180")
+        if self.preset is not None:
+            from visup.runs.inputs.presets import preset_named
+
+            preset_named(self.preset)
 
 
 @dataclass(frozen=True, slots=True)

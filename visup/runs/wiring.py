@@ -15,6 +15,7 @@ from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
+from visup.percepts.detections import DetectionsBehaviour, read_detections
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
@@ -23,8 +24,9 @@ from visup.percepts.video import VideoSource, open_source
 from visup.rules.activation.activation import ActivationReasoner, activation_rules, always_active
 from visup.rules.activation.attention import AttentionReasoner
 from visup.rules.language.parser import load_rules, shipped_rules
-from visup.rules.reasoners import default_reasoners
+from visup.rules.reasoners import ReasonerSettings, default_reasoners
 from visup.runs.inputs.plugins import user_behaviours
+from visup.runs.inputs.presets import preset_named
 from visup.runs.inputs.zones import load_ground, load_zones
 from visup.runs.runtime_faults import runtime_fault_reasoner
 from visup.runs.settings import WatchSettings
@@ -58,12 +60,15 @@ def open_video(settings: WatchSettings) -> VideoSource:
     Raises:
         SourceError: It cannot be opened.
     """
-    return open_source(
+    source = open_source(
         settings.source,
         every=settings.every,
         fps=settings.fps,
         patience_s=settings.patience_s,
     )
+    if settings.preset and settings.every == 1:
+        source.every = preset_named(settings.preset).every(source.fps)
+    return source
 
 
 def build_agent(
@@ -90,9 +95,11 @@ def build_agent(
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     known, taught = _names(database)
+    boxes = _boxes(settings)
+    known = (*known, *(n for n in (boxes.names if boxes else ()) if n not in known))
     actors = with_taught_actors(tasks, settings.actors, known, taught)
     behaviours = [
-        *_behaviours(settings, database, declared_sizes(tasks, actors), _places(tasks)),
+        *_behaviours(settings, database, boxes, declared_sizes(tasks, actors), _places(tasks)),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
         *also,
     ]
@@ -107,6 +114,13 @@ def build_agent(
         models=known,
         limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
+
+
+def _boxes(settings: WatchSettings) -> DetectionsBehaviour | None:
+    """What sees in place of visup's own eyes, where a detector has."""
+    if settings.detections is None:
+        return None
+    return DetectionsBehaviour(read_detections(settings.detections))
 
 
 def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:
@@ -194,6 +208,7 @@ def _limits(settings: WatchSettings, live: bool) -> Limits:
 def _behaviours(
     settings: WatchSettings,
     database: ModelDatabase | None,
+    boxes: DetectionsBehaviour | None,
     sizes_m: Mapping[str, float],
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
@@ -201,6 +216,8 @@ def _behaviours(
     moving: Behaviour = AppearanceBehaviour(taught) if taught else MotionBehaviour()
     if places:
         moving = PlacedBehaviour(places, taught)
+    if boxes:
+        return [HealthBehaviour(), boxes, *user_behaviours(settings)]
     seeing: list[Behaviour] = [HealthBehaviour(), moving]
     if database is not None:
         seeing += [
@@ -222,14 +239,19 @@ def _places(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
 
 
 def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
-    return tuple(r for path in settings.rules for r in load_rules(path)) or shipped_rules()
+    own = tuple(r for path in settings.rules for r in load_rules(path))
+    without = preset_named(settings.preset).without if settings.preset else ()
+    return own or tuple(r for r in shipped_rules() if r.name not in without)
 
 
 def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
 ) -> Reasoners:
     traits = any(map(asks_for_traits, tasks))
-    interpreting = default_reasoners(rules=_rules(settings), traits=traits)
+    usual = ReasonerSettings()
+    if settings.preset:
+        usual = ReasonerSettings(objects=preset_named(settings.preset).objects)
+    interpreting = default_reasoners(usual, _rules(settings), traits=traits)
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)
     activation = (ActivationReasoner(rules),) if rules else ()

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from visup.agent import Frame
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.did_you_mean import did_you_mean
-from visup.agent.model.errors import VisupError
+from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.model.step import Step
+from visup.report.annotate import annotate
+from visup.report.pictures import png, text_picture
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
 from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
 from visup.terminal.console import make_console
@@ -33,6 +38,7 @@ class Session:
         agent: The agent.
         frames: Where its frames come from, or a feed of what was perceived.
         console: Where to write; standard output by default.
+        picture: Gives the frame of a number, (H, W, 3) uint8 BGR, where frames can be had again.
 
     Attributes:
         timelines: The run, and the branches that were begun from one another; the last one is stepped.
@@ -43,7 +49,9 @@ class Session:
         agent: Agent,
         frames: Iterable[Frame] | ObservationSource,
         console: Console | None = None,
+        picture: Callable[[int], NDArray[np.uint8]] | None = None,
     ) -> None:
+        self._picture = picture
         self.timelines = [Stepper(agent, frames)]
         self.console = console or make_console()
         self._marks: dict[str, Bookmark] = {}
@@ -95,7 +103,7 @@ class Session:
         )
         if word.endswith("!"):
             word, rest = word[:-1], ["!", *rest]
-        names = [n for n in _NAMES if n.startswith(word)]
+        names = [_SHORT[word]] if word in _SHORT else [n for n in _NAMES if n.startswith(word)]
         name = word if word in _NAMES else names[0] if len(names) == 1 else None
         if name is None:
             near = did_you_mean(word, _NAMES)
@@ -192,6 +200,26 @@ class Session:
         self._marks[words[0]] = self.stepper.snapshot()
         return Text(f"step {self.stepper.at} is '{words[0]}'", style="dim")
 
+    def _show(self, words: Sequence[str]) -> Answer:
+        mind = self.stepper.mind
+        if mind.frame_index < 0:
+            return refusal("no step was taken yet")
+        if self._picture is None:
+            return refusal(
+                "the frames of this source cannot be had again, so that none can be shown"
+            )
+        image = annotate(self._picture(mind.frame_index), mind)
+        if self.console.is_terminal and not words:
+            return text_picture(image, self.console.width)
+        path = Path(words[0] if words else f"frame-{mind.frame_index:05d}.png")
+        try:
+            path.write_bytes(png(image))
+        except OSError as fault:
+            raise OutputError(
+                f"the picture cannot be written ({fault.strerror})", where=str(path)
+            ) from fault
+        return Text(f"{path}: {image.shape[1]} x {image.shape[0]} pixels")
+
     # Where to stop
 
     def _break(self, words: Sequence[str]) -> Answer:
@@ -283,6 +311,7 @@ _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProx
         "back": Session._back,
         "go": Session._go,
         "mark": Session._mark,
+        "show": Session._show,
         "break": Session._break,
         "delete": partial(Session._breakpoint, what="delete"),
         "disable": partial(Session._breakpoint, what="disable"),
@@ -299,6 +328,9 @@ _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProx
     }
 )
 """Commands that move the session or change something, by their names."""
+
+_SHORT = {"s": "step"}
+"""Beginnings that stay what they have long been, though another command begins alike."""
 
 _NAMES = tuple(name for name in COMMANDS if name in _ACTIONS or name in VIEWS)
 

@@ -115,6 +115,12 @@ _COMMANDS = (
     Command("compare", "how the events of this branch differ"),
     Command("leave", "back to the timeline that this branch left"),
     Command("mind", "all that is believed, in short"),
+    Command(
+        "show [FILE]",
+        "the frame with what is believed drawn over it",
+        "On a terminal it is drawn in characters; with FILE, or from a pipe, it is\n"
+        "written as a picture.",
+    ),
     Command("percepts", "what was perceived in this step, by behaviour"),
     Command("regions", "what moved in the last frame"),
     Command("objects", "who is there, with their most likely identities"),

@@ -1,0 +1,26 @@
+"""`visup presets`: what each preset chooses, and why."""
+
+from __future__ import annotations
+
+
+def presets() -> None:
+    """List the presets of `visup watch --preset`: rules, memory and pace of each, and why."""
+    from visup.runs.inputs.presets import PRESETS
+    from visup.terminal.console import echo
+
+    for preset in PRESETS.values():
+        objects = preset.objects
+        pace = (
+            "all frames"
+            if preset.most_fps is None
+            else f"at most {preset.most_fps:g} frames a second"
+        )
+        without = f"all but {', '.join(sorted(preset.without))}" if preset.without else "all"
+        echo(f"{preset.name}: {preset.about}")
+        echo(f"  rules   {without}: {preset.rules_because}")
+        echo(
+            f"  memory  what has left {objects.forget_left_s:g} s, what is hidden "
+            f"{objects.forget_nameless_s:g} s (when it is known what it is {objects.forget_hidden_s:g} s): "
+            f"{preset.memory_because}"
+        )
+        echo(f"  pace    {pace}: {preset.pace_because}")

@@ -1,0 +1,113 @@
+"""Presets: which rules, how long things are remembered and how many frames a second suit a kind of scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.errors import SettingsError
+from visup.rules.presence import ObjectSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """What suits a kind of scene; each part has its reason, which `visup presets` tells.
+
+    Attributes:
+        name: As it is typed.
+        about: For which scenes it is.
+        without: Shipped rules that are not watched.
+        rules_because: Why.
+        objects: How long things are remembered.
+        memory_because: Why so long.
+        most_fps: Frames a second that are looked at at most, or None for all that there are.
+        pace_because: Why so many.
+    """
+
+    name: str
+    about: str
+    without: frozenset[str]
+    rules_because: str
+    objects: ObjectSettings
+    memory_because: str
+    most_fps: float | None
+    pace_because: str
+
+    def every(self, fps: float) -> int:
+        """Every how many frames of a source one is looked at.
+
+        >>> PRESETS["traffic"].every(30.0), PRESETS["traffic"].every(10.0), PRESETS["cell"].every(60.0)
+        (2, 1, 1)
+        """
+        return 1 if self.most_fps is None else max(1, int(fps / self.most_fps + 1e-6))
+
+
+_MEETING = frozenset({"collision_course", "doubtful_collision", "contact"})
+
+PRESETS: Mapping[str, Preset] = MappingProxyType(
+    {
+        p.name: p
+        for p in (
+            Preset(
+                "traffic",
+                "a road, a yard or a square, seen by a camera that stands",
+                _MEETING | {"excessive_spin", "doubtful_object"},
+                "outlines of those who pass each other meet all the time, and mean nothing; zones that are "
+                "to be kept free, and the camera, are watched",
+                ObjectSettings(forget_left_s=5.0, forget_hidden_s=60.0, forget_nameless_s=5.0),
+                "who is gone does not come back, and another one comes in its place",
+                15.0,
+                "who crosses the picture in two seconds is seen thirty times",
+            ),
+            Preset(
+                "cell",
+                "a robot at work on parts, people may come near",
+                frozenset({"doubtful_collision", "excessive_spin"}),
+                "what is known is watched for contact that no task wants; what is not known is left to tasks "
+                "and zones",
+                ObjectSettings(forget_nameless_s=60.0),
+                "a gripper hides a part for a minute, and it is the same part",
+                None,
+                "contact is told by single frames",
+            ),
+            Preset(
+                "orbit",
+                "spacecraft that approach, dock and are captured",
+                frozenset(),
+                "whatever comes near, turns or enters matters",
+                ObjectSettings(forget_nameless_s=120.0),
+                "what an arm or a panel hides comes out again minutes later",
+                10.0,
+                "bodies drift by a tenth of a pixel a frame: fewer frames show the motion as well",
+            ),
+            Preset(
+                "bench",
+                "hands and things on a table",
+                _MEETING | {"excessive_spin", "doubtful_object"},
+                "hands touch and turn everything: that is the work",
+                ObjectSettings(forget_nameless_s=30.0),
+                "a hand hides what it holds for half a minute",
+                15.0,
+                "hands at work are followed at fifteen frames a second",
+            ),
+        )
+    }
+)
+"""By name."""
+
+
+def preset_named(name: str) -> Preset:
+    """A preset.
+
+    Raises:
+        SettingsError: There is none of that name.
+    """
+    if name not in PRESETS:
+        raise SettingsError(
+            f"there is no preset '{name}'",
+            expected=f"one of: {', '.join(PRESETS)}",
+            hint=did_you_mean(name, PRESETS),
+        )
+    return PRESETS[name]
