@@ -56,6 +56,8 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
 
 LONGEST_FILE = 200_000
 """Characters of a rules file; that which ships has a twentieth of it."""
+LONG_NUMBER = re.compile(r"[\d_]{41}|\d[eE]\+?\d{3}")
+"""What would be read as infinity, or with other digits than it has."""
 LONGEST_RULE = 10_000
 MOST_RULES = 1_000
 MOST_FAULTS = 100
@@ -71,6 +73,10 @@ def check_length(text: str, file: str) -> None:
     if len(text) > LONGEST_FILE:
         what = f"the file has {len(text)} characters"
         raise RuleError(what, where=file, expected=f"at most {LONGEST_FILE}")
+    if LONG_NUMBER.search(text):
+        raise RuleError(
+            "a number has more digits than a number can", where=file, expected="at most 40 digits"
+        )
     starts = [m.start() for m in _HEAD.finditer(text)]
     if len(starts) > MOST_RULES:
         what = f"the file has {len(starts)} rules"

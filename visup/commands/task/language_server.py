@@ -155,22 +155,24 @@ def _publish(server: LanguageServer, uri: str) -> None:
     if holds_rules(document):
         faults = faults_of(document)
     else:
-        _, faults = diagnose(document.source, _file(document), read=_EditorFiles(server).read)
+        files = _EditorFiles(server, Path(_file(document)).parent)
+        _, faults = diagnose(document.source, _file(document), read=files.read)
     shown = [_diagnostic(document, f) for f in faults]
     server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, shown))
 
 
 class _EditorFiles:
-    """Reads included files as they stand in the editor, else from the disk."""
+    """Reads included files as they stand in the editor, else from the disk: from a folder, or below."""
 
-    def __init__(self, server: LanguageServer) -> None:
+    def __init__(self, server: LanguageServer, root: Path) -> None:
+        self._root = root
         self._open = {to_fs_path(u): d for u, d in server.workspace.text_documents.items()}
 
     def read(self, path: str, including: str) -> tuple[str, str]:
         beside = str((Path(including).parent / path).resolve())
         if beside in self._open:
             return beside, self._open[beside].source
-        return read_beside(path, including)
+        return read_beside(path, including, self._root)
 
 
 def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
@@ -201,7 +203,9 @@ def _word(
 def _location(server: LanguageServer, document: TextDocument, word: NameUse) -> lsp.Location | None:
     if word.kind == "include":
         try:
-            path, _ = _EditorFiles(server).read(word.name, _file(document))
+            path, _ = _EditorFiles(server, Path(_file(document)).parent).read(
+                word.name, _file(document)
+            )
         except VisupError:
             return None
         uri = from_fs_path(str(Path(path).resolve())) if Path(path).exists() else None
