@@ -12,6 +12,7 @@ from visup.agent import Frame, Severity, Verdict
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.atomic import sync
+from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
@@ -271,6 +272,7 @@ class _Run:
         verdict = final_verdict(mind) if mind.tasks else self._severity.verdict
         problem = "stopped by the user" if self._stopped else self.source.problem
         told = (
+            cache_note(),
             self._checkpoints.note if self._checkpoints else None,
             self._pace.note() if self._pace else None,
             *self._sinks.end(verdict, self._steps),

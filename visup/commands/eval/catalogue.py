@@ -213,6 +213,24 @@ EVALUATIONS = (
         failed=adapters.any_failures,
     ),
     EvaluationCommand(
+        "hardening",
+        """Damaged and hostile files of every kind, and races of writers: nothing gets in, nothing gets lost.
+
+        Exit code: 0 when all were read or refused within bounds, and nothing was lost, else 1.
+        """,
+        "tests.oracles.hardening.runner:evaluate_hardening",
+        "reading",
+        ("files", "read", "refused", "raised", "slow", "crashed", "memory", "ran"),
+        (
+            _count("count", 5000, "Damaged files of each kind."),
+            _SEED,
+            _count("races", 100, "How often two writers begin at once.", 0),
+            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
+        ),
+        closing=adapters.failures_closing("{text}"),
+        failed=adapters.any_failures,
+    ),
+    EvaluationCommand(
         "relations",
         "Relations of boxes: frames per second, changes of what rests, drift, oracles.",
         "tests.oracles.reasoning.relations:evaluate_relations",
