@@ -31,6 +31,12 @@ def evidence(
     who, alone = names(step.actors), len(step.actors) == 1
     have, them = ("has", "it") if alone else ("have", "them")
     match monitor.status:
+        case Status.FAILING | Status.FAILED if monitor.early:
+            was = "was" if alone else "were"
+            return (
+                f"{who} {was} {meaning.text} before stage `{step.stage}` began, and should become so "
+                "in it"
+            )
         case Status.FAILED if monitor.late:
             due = next(d for d in step.deadlines if now > d.at)
             return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"

@@ -138,7 +138,7 @@ EVALUATIONS = (
         """,
         "visup.evaluation.alarms.runner:evaluate_alarms",
         "watching",
-        ("alarms", "clips", "per_hour", "hours", "noted"),
+        ("alarms", "clips", "per_hour", "hours", "noted", "lines_per_min"),
         (_LIMIT,),
         folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
     ),
