@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test check oracles bench docs clean
+.PHONY: setup demo test check fuzz oracles bench docs clean
 
 setup: $(STAMP)
 
@@ -29,6 +29,12 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/bandit -q -c pyproject.toml -r agent percepts rules tasks visup
+	$(BIN)/python -m tests.supply_chain
+
+# Damaged and hostile files of every kind, for a minute; `make bench` takes longer.
+fuzz: setup
+	$(BIN)/visup eval hardening --count 150 --seed 0
 
 oracles: setup
 	$(BIN)/python -m tests.oracles

@@ -111,3 +111,13 @@ def test_files_that_the_sources_name_exist() -> None:
         for name in re.findall(r"`(?:\w+/)*(\w+\.py)`", path.read_text(encoding="utf-8"))
     }
     assert {(where, name) for where, name in named if name not in known} == set()
+
+
+def test_loops_are_compiled_in_one_place() -> None:
+    """Elsewhere numba's cache would be a must, and who may write nowhere could not import visup."""
+    direct = [
+        str(path.relative_to(ROOT))
+        for path in sources()
+        if "njit" in path.read_text() and path != ROOT / "visup" / "compiled.py"
+    ]
+    assert direct == []

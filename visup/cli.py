@@ -14,6 +14,7 @@ from visup.commands.check import check
 from visup.commands.debug import app as debug_app
 from visup.commands.doctor import doctor
 from visup.commands.eval.catalogue import eval_app
+from visup.commands.export import export
 from visup.commands.models import app as models_app
 from visup.commands.presets import presets
 from visup.commands.render import render
@@ -52,6 +53,7 @@ app.command("presets")(presets)
 app.command("teach", cls=OutlineCommand)(teach)
 app.command("step")(step)
 app.command("replay")(replay)
+app.command("export")(export)
 app.command("render")(render)
 app.command("doctor")(doctor)
 app.add_typer(task_app, name="task", help="Check, show and list task files.")

@@ -12,6 +12,19 @@ from typing import TypeVar, cast
 
 import numba
 
+_uncached: list[str] = []
+
+
+def cache_note() -> str | None:
+    """What the user should know where compiled loops cannot be kept, or None."""
+    if not _uncached:
+        return None
+    return (
+        "Hot loops are compiled anew in each run: nowhere may they be kept. "
+        "Set NUMBA_CACHE_DIR to a folder that can be written to."
+    )
+
+
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -29,4 +42,5 @@ def compiled(function: Function) -> Function:
         return cast(Function, numba.njit(cache=True, nogil=True)(function))
     except RuntimeError:
         # Neither beside the code nor in the user's folders may anything be written: each run compiles.
+        _uncached.append(function.__name__)
         return cast(Function, numba.njit(nogil=True)(function))

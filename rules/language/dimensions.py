@@ -13,7 +13,16 @@ from visup.rules.formula.terms import (
     Term,
     WindowFunction,
 )
-from visup.rules.formula.units import SHARE, TIME, Dimension, Number, Span, units_of
+from visup.rules.formula.units import (
+    SHARE,
+    TIME,
+    UNITS,
+    Dimension,
+    Number,
+    Span,
+    number_text,
+    units_of,
+)
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.vocabulary import Vocabulary
 
@@ -34,7 +43,7 @@ def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault
     if left and right and left != right:
         what = f"{_named(left)} is compared with {_named(right)}"
         wanted = right if _constant(node.left) else left
-        yield node.span, what, units_of(wanted), _no_unit(node, left, right)
+        yield node.span, what, units_of(wanted), _with_unit(node, wanted)
     if node.leave is not None:
         yield from _leave(node, left)
 
@@ -116,7 +125,8 @@ def _powered(
     if name == "sqrt":
         if any(power % 2 for power in base.powers):
             what = f"{_named(base)} has no square root that could be measured"
-            faults.append((span, what, "a share, or the square of something", None))
+            hint = f"write `{parts[0]}`"
+            faults.append((span, what, "a share, or the square of something", hint))
             return None
         return Dimension(*(power // 2 for power in base.powers))
     exponent = parts[-1]
@@ -159,6 +169,15 @@ def _named(dimension: Dimension) -> str:
     return f"{article} {'number' if dimension == SHARE else dimension}"
 
 
-def _no_unit(node: Comparison, left: Dimension, right: Dimension) -> str | None:
-    plain = any(isinstance(s, Number) and not s.unit for s in (node.left, node.right))
-    return "write the unit" if plain and SHARE in (left, right) else None
+def _with_unit(node: Comparison, wanted: Dimension) -> str | None:
+    """The comparison with a unit of what is measured, where a plain number is compared."""
+    unit = next((str(u) for u, (d, _) in UNITS.items() if d == wanted), None)
+    if unit is None:
+        return None
+    sides = [
+        f"{number_text(s.value)} {unit}".rstrip() if isinstance(s, Number) else str(s)
+        for s in (node.left, node.right)
+    ]
+    if sides == [str(node.left), str(node.right)]:
+        return None
+    return f"write `{sides[0]} {node.operator} {sides[1]}`"

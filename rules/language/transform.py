@@ -89,7 +89,7 @@ class CallResolver:
                 return self._edge(node)
             if node.name in (*POINTWISE, *OVER_WINDOW):
                 what = f"'{node.name}' is a quantity, neither true nor false"
-                self.fault((node.span, what, None, "compare it with a number"))
+                self.fault((node.span, what, "a comparison", "compare it with a number"))
             return Fact(node.name, self._words(node), node.span)
         if isinstance(node, Term):
             what = f"'{node}' is a quantity, neither true nor false"

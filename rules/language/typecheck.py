@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from visup.agent.model.did_you_mean import did_you_mean
 from visup.rules.formula.nodes import (
+    ZERO,
     Comparison,
     Formula,
     FutureOperator,
@@ -112,7 +114,7 @@ class TypeChecker:
         # A variable that is missing from a faulty call is no second fault.
         for name in sorted(set(rule.variables) - reader.used) if not found else ():
             what = f"the variable '{name}' of '{rule.name}' is not used"
-            hint = "leave it out, or the rule is true for every object"
+            hint = f"leave `{name}` out, or the rule is true for every object"
             found.append((rule.span, what, None, hint))
         # What a rule keeps can be counted only when all else is well.
         for fault in found or self._bounds(rule):
@@ -168,7 +170,8 @@ class _FormulaChecker:
                 word = node.kind if isinstance(node, FutureOperator) else "until"
                 if window is None:
                     what = f"'{word}' without a window would wait without end"
-                    yield span, what, f"such as {word}[5 s]", None
+                    bounded = replace(node, window=TimeWindow(ZERO, Number(5.0, Unit.S)))
+                    yield span, what, f"such as {word}[5 s]", f"write `{bounded}`"
                 else:
                     yield from _window(window, word)
             case Since(window=TimeWindow() as window):
@@ -210,13 +213,26 @@ class _FormulaChecker:
         takes = table[call.name].takes
         if len(takes) != len(call.words):
             what = f"'{call.name}' takes {len(takes)} argument(s), not {len(call.words)}"
-            yield call.span, what, f"{call.name}({', '.join(takes)})", None
+            hint = f"write `{call.name}({', '.join(self._filled(call, takes))})`"
+            yield call.span, what, f"{call.name}({', '.join(takes)})", hint
             return
         for wanted, word in zip(takes, call.words, strict=True):
             yield from self.argument(call, wanted, word)
         names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
         if len(set(names)) < len(names):
-            yield call.span, f"'{call.name}' is given the same object twice", None, None
+            hint = f"write `{call.name}({', '.join(_distinct(call.words, self.scope))})`"
+            what = f"'{call.name}' is given the same object twice"
+            yield call.span, what, "two different objects", hint
+
+    def _filled(self, call: Predicate | Measure, takes: tuple[str, ...]) -> Iterator[str]:
+        """Arguments as the call has them, the missing ones by what there is."""
+        spare = iter([v for v in self.scope if v not in call.words] or ["b"])
+        given = list(call.words)
+        for wanted in takes:
+            if given:
+                yield given.pop(0)
+            else:
+                yield next(spare, "b") if wanted == "object" else EXAMPLES.get(wanted, "name")
 
     def argument(self, call: Predicate | Measure, wanted: str, word: str) -> Iterator[Fault]:
         known: Iterable[str] = {
@@ -232,13 +248,24 @@ class _FormulaChecker:
             yield call.span, what, None, "rename the variable"
 
 
+EXAMPLES = {"relation": "converging", "kind": "region", "name": "satellite", "zone": "bay"}
+
+
+def _distinct(words: tuple[str, ...], scope: tuple[str, ...]) -> list[str]:
+    """The arguments with another object in the place of the second."""
+    other = next((v for v in scope if v not in words), "b" if "b" not in words else "a")
+    return [*words[:-1], other]
+
+
 def _time(number: Number | None, word: str) -> Iterator[Fault]:
     if number is None:
         return
     if number.dimension != TIME:
-        yield number.span, f"'{word}' needs a time", "such as 2 s", None
+        hint = f"write `{Number(abs(number.value) or 2.0, Unit.S)}`"
+        yield number.span, f"'{word}' needs a time", "such as 2 s", hint
     elif number.value <= 0:
-        yield number.span, f"'{word}' needs a time above 0", None, None
+        hint = f"write `{Number(abs(number.value) or 2.0, number.unit)}`"
+        yield number.span, f"'{word}' needs a time above 0", "such as 2 s", hint
 
 
 def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
@@ -247,20 +274,24 @@ def _window(window: TimeWindow, word: str) -> Iterator[Fault]:
         yield window.low.span, f"'{word}' needs a time", "such as 2 s", None
     elif window.high.dimension == TIME and 0 < window.high.base < window.low.base:
         what = f"a window from {window.low} to {window.high} is empty"
-        yield window.high.span, what, "the shorter time first", None
+        joint = " to " if word in ("for", "within") else " .. "
+        hint = f"write `{window.high}{joint}{window.low}`"
+        whole = window.low.span.to(window.high.span)
+        yield whole, what, "the shorter time first", hint
 
 
 def _often(node: MOfN) -> Iterator[Fault]:
     least, of = node.least, node.of
     if node.counts_samples:
         if not (least.unit is Unit.NONE and 1 <= least.value <= of.value):
-            yield least.span, f"'{least} of {of} samples' cannot be counted", "3 of 5 samples", None
+            what = f"'{least} of {of} samples' cannot be counted"
+            yield least.span, what, "3 of 5 samples", f"write `{of}`"
         elif least.value % 1 or of.value % 1:
             yield least.span, "samples are counted in whole numbers", "3 of 5 samples", None
         return
     yield from _time(of, "of")
     if least.dimension != SHARE or not 0 < least.base <= 1:
-        yield least.span, f"'{least}' is not a share of a time", "such as 60 %", None
+        yield least.span, f"'{least}' is not a share of a time", "such as 60 %", "write `60 %`"
 
 
 def _listed(words: Iterable[str]) -> str:

@@ -12,9 +12,10 @@ import numpy as np
 
 from visup.agent import HealthStatus, ObjectBelief, Presence
 from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
-from visup.rules.formula.units import ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
+from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
+from visup.rules.predicates import image_quantities as image
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
@@ -73,19 +74,22 @@ class QuantityDefinition:
         dimension: What it measures.
         look: Its intervals in the base unit, (2, ...), of all objects.
         meaning: One clause for people.
+        plain: Whether it is a number and no share.
     """
 
     takes: tuple[str, ...]
     dimension: Dimension
     look: Callable[..., Floats]
     meaning: str
+    plain: bool = False
 
     @property
     def unit(self) -> str:
-        """The unit in which it is told."""
-        return {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}[
-            self.dimension
-        ]
+        """The unit in which it is told; empty of a plain number."""
+        if self.plain:
+            return ""
+        units = {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}
+        return {**units, ANGLE: "deg"}[self.dimension]
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,6 +331,29 @@ QUANTITIES: MappingProxyType[str, QuantityDefinition] = MappingProxyType(
         "spin": QuantityDefinition(_ONE, ANGULAR_SPEED, spin, "about itself"),
         "out_of_sight": QuantityDefinition(_ONE, TIME, _since("last_seen"), "since last seen"),
         "in_view": QuantityDefinition(_ONE, TIME, _since("first_seen"), "since first seen"),
+        "position_x": QuantityDefinition(
+            _ONE, LENGTH, image.horizontal_position, "of the centre, from the left"
+        ),
+        "position_y": QuantityDefinition(
+            _ONE, LENGTH, image.vertical_position, "of the centre, from the top"
+        ),
+        "width": QuantityDefinition(_ONE, LENGTH, image.width, "of the box"),
+        "height": QuantityDefinition(_ONE, LENGTH, image.height, "of the box"),
+        "area": QuantityDefinition(_ONE, SHARE, image.area_share, "share of the image"),
+        "heading": QuantityDefinition(_ONE, ANGLE, image.heading, "0 to the right, 90 up"),
+        "confidence": QuantityDefinition(_ONE, SHARE, image.confidence, "of the identity"),
+        "centre_distance": QuantityDefinition(
+            _TWO, LENGTH, image.centre_distance, "between the centres"
+        ),
+        "overlap": QuantityDefinition(
+            _TWO, SHARE, image.box_overlap, "of the boxes: intersection over union"
+        ),
+        "objects": QuantityDefinition(
+            (), SHARE, image.number_of_objects, "how many are in sight", plain=True
+        ),
+        "objects_named": QuantityDefinition(
+            ("name",), SHARE, image.number_of_kind, "how many of a name are", plain=True
+        ),
     }
 )
 """Every quantity that a rule may compare."""

@@ -19,6 +19,7 @@ from visup.tasks.grammar.conditions import Fact
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
+    Already,
     AnyOrder,
     Choice,
     Clause,
@@ -70,6 +71,7 @@ class TaskStep:
         deadlines: Each `within` that has the action inside.
         conditions: By what it begins, ends, progresses or fails, where the course says so; one of a kind.
         inside: Every stage that has the action inside, the innermost with them.
+        already: Whether it is done also by what has been so since before its turn.
     """
 
     action: str
@@ -79,6 +81,7 @@ class TaskStep:
     deadlines: tuple[RunningDeadline, ...] = ()
     conditions: tuple[StageCondition, ...] = ()
     inside: frozenset[str] = frozenset()
+    already: bool = False
 
     def condition(self, kind: str) -> StageCondition | None:
         """What the course says of how it begins, ends, progresses or fails, or None."""
@@ -107,6 +110,7 @@ class Continuation:
     deadlines: tuple[RunningDeadline, ...] = ()
     conditions: tuple[StageCondition, ...] = ()
     inside: frozenset[str] = frozenset()
+    already: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,8 +269,10 @@ class _Entrance(Generic[W]):
                     yield from self.states(replace(todo, course=option))
             case Together(parts=parts):
                 yield from self._together(todo, parts)
-            case AnyOrder(items=items):
-                yield from self._any_order(todo, items)
+            case AnyOrder() as any_order:
+                yield from self._any_order(todo, any_order)
+            case Already(item=item):
+                yield from self.states(replace(todo, course=item, already=True))
             case Timed() | Conditioned() as clauses:
                 yield from self.states(_surrounded(self.task, todo, clauses, self.now))
             case Counted() as counted:
@@ -276,8 +282,8 @@ class _Entrance(Generic[W]):
 
     def _fact(self, todo: Continuation, fact: Fact) -> Iterator[State[W] | None]:
         key, actors = fact_key(self.task, fact)
-        around = (todo.stage, todo.hold_s, todo.deadlines, todo.conditions, todo.inside)
-        yield Leaf(TaskStep(key, actors, *around), self.payload)
+        said = todo.stage, todo.hold_s, todo.deadlines, todo.conditions
+        yield Leaf(TaskStep(key, actors, *said, todo.inside, todo.already), self.payload)
         if any(self.task.actor(a).optional for a in actors):
             yield None
 
@@ -311,12 +317,18 @@ class _Entrance(Generic[W]):
             else:
                 yield under_way[0] if len(under_way) == 1 else ParallelState(under_way)
 
-    def _any_order(
-        self, todo: Continuation, items: tuple[Course, ...]
-    ) -> Iterator[State[W] | None]:
+    def _any_order(self, todo: Continuation, course: AnyOrder) -> Iterator[State[W] | None]:
+        items = course.items
+        left = len(items) if course.count is None else course.count
         for i, item in enumerate(items):
             others = (*items[:i], *items[i + 1 :])
-            yield from self._then(todo, item, others[0] if len(others) == 1 else AnyOrder(others))
+            if left == 1:
+                yield from self.states(replace(todo, course=item))
+            elif len(others) == 1:
+                yield from self._then(todo, item, others[0])
+            else:
+                count = None if left - 1 == len(others) else left - 1
+                yield from self._then(todo, item, AnyOrder(others, count=count))
 
     def _counted(self, todo: Continuation, counted: Counted) -> Iterator[State[W] | None]:
         """Once, and after it as often as is left to do."""

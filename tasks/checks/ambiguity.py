@@ -14,6 +14,7 @@ from visup.tasks.grammar.graphs import dependencies_first
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
+    Already,
     AnyOrder,
     Choice,
     Conditioned,
@@ -138,10 +139,11 @@ class _Forms:
         if any(i is None for i in inner):
             return None
         if isinstance(course, Choice | Together | AnyOrder):
-            return self._number((type(course).__name__, frozenset(inner)))
+            count = course.count if isinstance(course, AnyOrder) else None
+            return self._number((type(course).__name__, count, frozenset(inner)))
         if isinstance(course, Sequence):
             return self._number(tuple(inner))
-        if isinstance(course, Conditioned | Timed | Counted | Repeated):
+        if isinstance(course, Conditioned | Timed | Counted | Repeated | Already):
             return self._number((replace(course, item=NOTHING), inner[0]))
         return None
 

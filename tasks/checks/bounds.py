@@ -9,6 +9,7 @@ from itertools import chain, islice
 from math import prod
 
 from visup.rules.language.diagnostics import Diagnostic, Source
+from visup.rules.language.parser import LONG_NUMBER
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.graphs import dependencies_first
 from visup.tasks.grammar.nodes import (
@@ -48,6 +49,9 @@ def text_fault(text: str, source: Source) -> Diagnostic | None:
         what = f"the file has {len(text)} characters"
         return Diagnostic("E137", what, source.place(1, 1), f"at most {LONGEST_FILE}")
     for number, line in enumerate(text.split("\n"), start=1):
+        if LONG_NUMBER.search(line):
+            what = "a number has more digits than a number can"
+            return Diagnostic("E137", what, source.place(number, 1), "at most 40 digits")
         if len(line) > LONGEST_LINE:
             what = f"the line has {len(line)} characters"
             hint = "a statement may go on in the next line"

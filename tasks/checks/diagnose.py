@@ -11,6 +11,7 @@ from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.bounds import MOST_FAULTS, text_fault
 from visup.tasks.checks.files import read_beside
+from visup.tasks.checks.repairs import with_tried_hints
 from visup.tasks.checks.semantics import check_semantics
 from visup.tasks.diagnostics.includes import Read, join_included
 from visup.tasks.diagnostics.normalise import normalise
@@ -40,6 +41,24 @@ def diagnose(
         What could be read, with what it includes, and the faults in the order of the text, those of
         included files last, the first hundred; the tree may be used only when there are none.
     """
+    task, faults = _ordered(text, file, actions, percepts, read)
+    if not faults:
+        return task, faults
+
+    def check(changed: str) -> list[Diagnostic]:
+        return _ordered(changed, file, actions, percepts, read)[1]
+
+    return task, list(with_tried_hints(text, faults, check))
+
+
+def _ordered(
+    text: str,
+    file: str,
+    actions: Mapping[str, ActionDefinition] | None,
+    percepts: AnySet[str],
+    read: Read | None,
+) -> tuple[Task, list[Diagnostic]]:
+    """The tree and its mistakes in their order, each with the hint of whoever found it."""
     source = Source(text, file)
     if (fault := text_fault(text, source)) is not None:
         return Task(()), [fault]

@@ -18,13 +18,14 @@ from visup.tasks.grammar.parser import collect, read, read_statements
 from visup.tasks.grammar.statement import RESERVED_WORDS, StatementText, blank_strings
 
 NAME = r"[^\W\d]\w*"
-HEAD = re.compile(rf"<[ ]*{NAME}[ ]*>\s*::=")
+ACTORS = r"(?:\([\w ,]*\)[ ]*)?"
+HEAD = re.compile(rf"<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
 OPENS = re.compile(  # a line that begins a statement, well written or not
     rf"[ ]*(?:<[^<>|()]*>?\s*(?:::=|:=|=|::|:|->|→|=>)|{NAME}[ ]*>?\s*(?:::=|:=|=)"
     r"|(?:actor|optional|never|always|include|import|task|zone|param|parameter|stage"
     r"|bystanders?|ground(?=[ ]+is\b))\b(?![ ]*\())"
 )
-MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*>\s*::=")
+MARKED_HEAD = re.compile(rf"(?:(?<!\S)task[ ]+)?<[ ]*{NAME}[ ]*{ACTORS}>\s*::=")
 DECLARES = re.compile(rf"\s*(?:task\s+|(?:zone|parameter|(?:optional\s+)?actor)\s+)?<?\s*({NAME})")
 UNFINISHED = re.compile(
     r"(?:::=|[|&(,]|\b(?:for|within|is|or|and|not|during|when|size|task|optional|between|than|from|the|of|another|at))\s*$"
@@ -202,6 +203,10 @@ SAID = {
     "_TIMES": "`times`",
     "AT": "`at least` or `at most`",
     "ANY": "`any order`",
+    "ANY_OF": "`any 2 of`",
+    "FOR_EACH": "`for each`",
+    "ALREADY": "`already`",
+    "ON_FAILURE": "`on failure of`",
     "OPTIONAL": "`optional actor`",
     "TASK": "`task`",
     "$END": "the end of the file",
@@ -210,7 +215,7 @@ KEYWORDS = (
     *RESERVED_WORDS, "task", "optional", "size", "any", "order", "at", "least", "most", "times", "begins",
     "ends", "progresses", "fails", "when", "and", "not", "another", "larger", "smaller", "than", "what",
     "bystander", "bystanders", "ignored", "ground", "between", "enters", "moves",
-    "first", "rests", "from", "part", "of", "the", "other",
+    "already", "each", "on", "failure", "first", "rests", "from", "part", "of", "the", "other",
 )  # fmt: skip
 
 

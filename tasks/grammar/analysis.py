@@ -14,6 +14,7 @@ from visup.tasks.grammar.graphs import cycles, dependencies_first, reachable
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
+    Already,
     AnyOrder,
     Choice,
     Comparison,
@@ -168,7 +169,7 @@ class Grammar:
                 return any(self._empty(o, stages) for o in options)
             case Sequence(items=parts) | Together(parts=parts) | AnyOrder(items=parts):
                 return all(self._empty(p, stages) for p in parts)
-            case Timed(item=item) | Conditioned(item=item):
+            case Timed(item=item) | Conditioned(item=item) | Already(item=item):
                 return self._empty(item, stages)
             case Repeated(item=item, mark=mark):
                 return mark != "+" or self._empty(item, stages)
@@ -186,7 +187,11 @@ class Grammar:
             case Choice(options=parts) | Together(parts=parts) | AnyOrder(items=parts):
                 return [n for p in parts for n in self._first(p)]
             case (
-                Timed(item=item) | Repeated(item=item) | Counted(item=item) | Conditioned(item=item)
+                Timed(item=item)
+                | Repeated(item=item)
+                | Counted(item=item)
+                | Conditioned(item=item)
+                | Already(item=item)
             ):
                 return self._first(item)
             case Sequence(items=items):
@@ -219,6 +224,8 @@ class Grammar:
                 return times.get(name, 0.0)
             case Choice(options=options):
                 return min(self._least(o, times) for o in options)
+            case AnyOrder(items=items, count=int(count)):
+                return sum(sorted(self._least(i, times) for i in items)[:count])
             case Sequence(items=items) | AnyOrder(items=items):
                 return sum(self._least(i, times) for i in items)
             case Together(parts=parts):
@@ -227,7 +234,7 @@ class Grammar:
                 return self._least(item, times) if mark == "+" else 0.0
             case Counted(item=item, least=least):
                 return least * self._least(item, times) if least else 0.0
-            case Conditioned(item=item):
+            case Conditioned(item=item) | Already(item=item):
                 return self._least(item, times)
             case Timed(item=item, clauses=clauses):
                 amounts = (self.task.amount(c.duration) for c in clauses if isinstance(c, Hold))

@@ -147,13 +147,30 @@ class Together:
 
 @dataclass(frozen=True, slots=True)
 class AnyOrder:
-    """`any order (a, b, c)`: each of them once, one after the other."""
+    """`any order (a, b, c)`, `any 2 of (a, b, c)`: once each, one after the other.
+
+    Attributes:
+        count: How many of them; None for all.
+    """
 
     items: tuple[Course, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
+    count: int | None = None
 
     def __str__(self) -> str:
-        return f"any order ({', '.join(map(str, self.items))})"
+        said = "any order" if self.count is None else f"any {self.count} of"
+        return f"{said} ({', '.join(map(str, self.items))})"
+
+
+@dataclass(frozen=True, slots=True)
+class Already:
+    """`already a`: done also by what has been so since before its turn."""
+
+    item: Course
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"already {_within(self.item, ATOM)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +200,7 @@ Course: TypeAlias = (
     | Sequence
     | Together
     | AnyOrder
+    | Already
     | Conditioned
     | Timed
     | Counted
@@ -213,6 +231,8 @@ def children(course: Course) -> tuple[Course, ...]:
         case Sequence(items=inner) | AnyOrder(items=inner):
             return inner
         case Timed(item=item) | Repeated(item=item) | Counted(item=item) | Conditioned(item=item):
+            return (item,)
+        case Already(item=item):
             return (item,)
     return ()
 

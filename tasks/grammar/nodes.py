@@ -14,6 +14,7 @@ from typing import Literal, TypeAlias
 from visup.rules.formula.nodes import Comparison
 from visup.rules.formula.units import NOWHERE, Number, Span, number_text
 from visup.tasks.grammar.ast_courses import (
+    Already,
     AnyOrder,
     Choice,
     Clause,
@@ -39,6 +40,7 @@ __all__ = [
     "Action",
     "Actor",
     "Actors",
+    "Already",
     "Amount",
     "AnyOrder",
     "Choice",

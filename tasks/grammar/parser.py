@@ -32,6 +32,7 @@ from visup.tasks.grammar.nodes import (
     Action,
     Actor,
     Actors,
+    Already,
     Amount,
     AnyOrder,
     Choice,
@@ -61,6 +62,7 @@ from visup.tasks.grammar.nodes import (
     ZoneDeclaration,
 )
 from visup.tasks.grammar.parts import with_parts
+from visup.tasks.grammar.templates import Recovery, bound, canonical, instantiated, recovered
 
 N = TypeVar("N")
 
@@ -116,7 +118,8 @@ def collect(statements: Several[object], file: str) -> Task:
     def of(kind: type[N]) -> tuple[N, ...]:
         return tuple(s for s in statements if isinstance(s, kind))
 
-    stages, invariants = of(Stage), of(Invariant)
+    invariants = of(Invariant)
+    stages = instantiated(recovered(of(Stage), of(Recovery)), invariants)
     return Task(
         stages=stages,
         actors=with_parts([a for a in of(Actor) if not a.bystander], stages, invariants),
@@ -263,6 +266,21 @@ class _TaskBuilder(Transformer[Token, Any]):
         first, *courses, last = items
         return AnyOrder(tuple(courses), _of(first).to(_of(last)))
 
+    def any_of(self, items: list[Any]) -> AnyOrder:
+        first, count, *courses, last = items
+        return AnyOrder(tuple(courses), _of(first).to(_of(last)), int(count))
+
+    def for_each(self, items: list[Any]) -> AnyOrder:
+        first, variable, *actors, course = items
+        made = (bound(course, {str(variable): str(a)}) for a in actors)
+        return AnyOrder(tuple(made), _of(first).to(course.span))
+
+    def already(self, items: list[Any]) -> Already:
+        return Already(items[1], _of(items[0]).to(items[1].span))
+
+    def recovery(self, items: list[Any]) -> Recovery:
+        return Recovery(items[1], items[2], _of(items[0]).to(items[2].span))
+
     def judged(self, items: list[Any]) -> Conditioned:
         return Conditioned(items[0], tuple(items[1:]), _all(items))
 
@@ -346,7 +364,7 @@ def _unquoted(token: Token) -> str:
 
 def _bare(token: Token) -> str:
     """The name between the angle brackets of a head or a reference."""
-    return str(token)[1 : str(token).index(">")].strip(" ")
+    return canonical(str(token)[1 : str(token).index(">")])
 
 
 def _of(token: Token) -> Span:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
-from visup.tasks.automaton.backpointers import extended
+from visup.tasks.automaton.backpointers import behind, extended
 from visup.tasks.automaton.derivatives import Leaf, TaskStep, leaves, with_leaves
 from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransition
@@ -18,6 +18,9 @@ from visup.tasks.verification.observe import ActionObservation
 from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, entered
 
 WORSE = {Status.DONE: 0, Status.UNKNOWN: 1, Status.FAILED: 2}  # the worst ending is told last
+
+BEFORE_S = 0.5
+"""What began so shortly before its turn began in it: relations are judged with delays of that order."""
 
 Observe = Callable[[TaskStep], ActionObservation]
 """What is seen now of a step."""
@@ -171,6 +174,16 @@ class Advance:
             self._begun(x, opened) if i in begun else x for i, x in enumerate(leaves(state))
         ]
         left = tuple(x.step for x in transition.left)
+        if self._early(hypothesis, transition):
+            under_way = [
+                replace(
+                    x,
+                    payload=replace(x.payload, early=True, held=False, held_s=0.0, fulfilled=False),
+                )
+                if i in begun
+                else x
+                for i, x in enumerate(under_way)
+            ]
         return TaskHypothesis(
             with_leaves(state, iter(under_way)),
             transition.transition.target,
@@ -178,6 +191,29 @@ class Advance:
             backpointer=extended(hypothesis.backpointer, left, self.now),
             gone_on=True,
         )
+
+    def _early(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
+        """Whether all that begins by a transition has been so since before what it leaves began.
+
+        What goes on until something else begins (`converging`) may have begun before its turn, and so
+        may what is measured; and what was asked for already between the same actors goes on.
+        """
+        if not transition.entered or any(s.already or s.conditions for s in transition.entered):
+            return False
+        begun = [x.payload.begun for x in transition.left]
+        if any(b is None for b in begun):
+            return False  # whether it came before what was never seen, nobody knows
+        turn = min(b for b in begun if b is not None) - BEFORE_S
+        asked = {frozenset(x.step.actors) for x in transition.left}
+        asked |= {frozenset(b.step.actors) for b in behind(hypothesis.backpointer)}
+        return all(self._before(s, turn, asked) for s in transition.entered)
+
+    def _before(self, step: TaskStep, turn: float, asked: set[frozenset[str]]) -> bool:
+        """Whether a step was done before a moment, and by nothing that the course had asked for."""
+        meaning, held_by = self.steps.actions[step.action], self.observe(step).held_by
+        if meaning.lasts or meaning.measures or held_by is None or held_by.since >= turn:
+            return False
+        return frozenset(step.actors) not in asked
 
     def _begun(self, leaf: Leaf[StepMonitor], opened: bool) -> Leaf[StepMonitor]:
         """A step that begins now, with what is seen of it at once."""

@@ -31,6 +31,12 @@ def evidence(
     who, alone = names(step.actors), len(step.actors) == 1
     have, them = ("has", "it") if alone else ("have", "them")
     match monitor.status:
+        case Status.FAILING | Status.FAILED if monitor.early:
+            was = "was" if alone else "were"
+            return (
+                f"{who} {was} {meaning.text} before stage `{step.stage}` began, and should become so "
+                "in it"
+            )
         case Status.FAILED if monitor.late:
             due = next(d for d in step.deadlines if now > d.at)
             return f"`{due.stage}` should be over within {due.seconds:g} s, and it is not"
@@ -125,7 +131,7 @@ def prospects_text(belief: TaskBelief) -> str:
     """What may come next and how likely the task still ends well, in one line."""
     said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
     end = 1.0 - sum(p.probability for p in belief.prospects)
-    said += [f"the end ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
+    said += [f"no further stage ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
     coming = f"next: {', '.join(said)}" if said else "next: unknown"
     if belief.success is None:
         return coming

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
+    Already,
     AnyOrder,
     Choice,
     Comparison,
@@ -154,6 +155,8 @@ class _Drawer:
                 return self.fork("at the same time", items, stage, said)
             case AnyOrder(items=items):
                 return self.fork("each, in any order", items, stage, said)
+            case Already(item=item):
+                return self.course(item, stage, ("already", *said))
             case Repeated(item=item, mark=mark):
                 part = self.course(item, stage, said)
                 if mark != "?":

@@ -18,6 +18,7 @@ from visup.tasks.checks.files import shipped_tasks
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.statement import NAME
+from visup.tasks.grammar.templates import called
 from visup.tasks.grammar.units import UNITS
 
 STATEMENTS = (
@@ -79,7 +80,7 @@ class Completion:
 
 
 PATTERN = re.compile(
-    rf'include\s*"(?P<include>[^"\n]*)"|"[^"\n]*"|<[ ]*(?P<stage>{NAME})[ ]*>'
+    rf'include\s*"(?P<include>[^"\n]*)"|"[^"\n]*"|<[ ]*(?P<stage>{NAME})[ ]*(?=[(>])'
     rf"|(?<!\w)(?P<action>{NAME})(?=\s*\()|(?<!\w)(?P<name>{NAME})"
 )
 
@@ -108,7 +109,7 @@ def hover(text: str, file: str, word: NameUse) -> str | None:
     task, _ = diagnose(text, file)
     action = known_actions().get(word.name)
     if word.kind == "stage":
-        stage = task.stage(word.name)
+        stage = next((s for s in task.stages if called(s.name)[0] == word.name), None)
         return f"```\n{stage}\n```" if stage else None
     if word.kind == "action" and action is not None:
         return described(action)
@@ -126,8 +127,11 @@ def definition(text: str, file: str, word: NameUse) -> Span | None:
     if word.kind == "include":
         return None
     if word.kind == "stage":
-        return next((s.span for s in task.stages if s.name == word.name), None)
-    return next((d.span for d in task.declared if d.name == word.name), None)
+        return next((s.span for s in task.stages if called(s.name)[0] == word.name), None)
+    declared = next((d.span for d in task.declared if d.name == word.name), None)
+    # An actor that is not declared is defined where it first acts.
+    first = next((w.span for w in _actors(text) if w.name == word.name), None)
+    return declared or first
 
 
 def references(text: str, word: NameUse) -> list[NameUse]:

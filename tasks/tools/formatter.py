@@ -30,6 +30,7 @@ STARTERS = frozenset(
         "GROUND",
         "BYSTANDER",
         "BYSTANDERS",
+        "ON_FAILURE",
     }
 )
 TIGHT_BEFORE = frozenset({"RPAR", "COMMA", "REPEAT"})

@@ -9,6 +9,7 @@ from typing import Literal
 from visup.tasks.grammar.nodes import (
     Action,
     Actors,
+    Already,
     AnyOrder,
     Choice,
     Comparison,
@@ -104,6 +105,8 @@ def _course(task: Task, course: Course, stage: str, drawn: set[str]) -> Iterator
             yield Branch(TITLES[type(course)], "way", stage, tuple(inside))
         case Timed(item=item, clauses=said) | Conditioned(item=item, conditions=said):
             yield under(" ".join(map(str, said)), "clause", item)
+        case Already(item=item):
+            yield under("already", "clause", item)
         case Repeated(item=item, mark=mark):
             yield under(REPEATS[mark], "way", item)
         case Counted(item=item):

@@ -26,6 +26,8 @@ class TaskSettings:
         gap_s: A break of a `for` shorter than this is forgiven.
         failed_s: A stage that has been failing for so long has failed; it must then make progress for
             as long to count as recovered.
+        early_s: What a stage asks for and was so before its turn may stay so for so long, before that
+            speaks against the course: who picks a part up from a tray may put it back on the tray.
         regret_s: A task that is done may be undone by contrary evidence for so long.
         unexplained_s: An object that no actor explains must be there so long to be named.
         scenery_s: What nobody knows and was in view so soon after the start belongs to the scene, as the
@@ -49,6 +51,7 @@ class TaskSettings:
     unseen_s: float = 2.0
     gap_s: float = 0.5
     failed_s: float = 8.0
+    early_s: float = 3.0
     regret_s: float = 10.0
     unexplained_s: float = 0.0
     scenery_s: float = 1.5

@@ -54,6 +54,9 @@ class StepMonitor:
         denied: Whether what the course says of its end was last seen not to hold.
         opened: Whether what the course says of its beginning was seen (see `StageCondition`).
         confidence: Of the last sighting, 0 to 1.
+        early: Whether it had been so since before its turn, and has not ceased to be since: what a
+            stage asks for must happen in it.
+        parted_s: How long it has been seen not to be so, since its turn.
     """
 
     entered: float
@@ -78,6 +81,8 @@ class StepMonitor:
     confidence: float = 1.0
     denied: bool = False
     opened: bool = False
+    early: bool = False
+    parted_s: float = 0.0
 
 
 def entered(now: float) -> StepMonitor:
@@ -111,6 +116,8 @@ def update(
         # Until it begins, nothing that is seen speaks for or against it.
         monitor = replace(monitor, opened=seen.entry is not None)
         seen = seen if monitor.opened else replace(UNOBSERVED, observed=seen.observed)
+    if monitor.early:
+        monitor, seen = _not_yet(monitor, seen, moment, settings)
     noted = _note_contrary(
         _note_progress(monitor, step, meaning, seen, moment, settings), seen, now
     )
@@ -132,6 +139,25 @@ def update(
         fulfilled=False,
         held_s=0.0,
     )
+
+
+def _not_yet(
+    monitor: StepMonitor, seen: ActionObservation, moment: Moment, settings: TaskSettings
+) -> tuple[StepMonitor, ActionObservation]:
+    """What was so before its turn counts for nothing until it has ceased; after a while it is a fault."""
+    if not seen.observed:
+        return monitor, seen
+    if seen.holds is not Truth.TRUE:
+        parted = monitor.parted_s + (moment.dt if seen.holds is Truth.FALSE else 0.0)
+        early = parted < settings.gap_s
+        return replace(monitor, parted_s=parted, early=early), replace(seen, helps=None)
+    held_by = seen.held_by
+    monitor = replace(monitor, parted_s=0.0)
+    seen = replace(seen, holds=Truth.FALSE, held_by=None, helps=None, entry=None)
+    if held_by is None or moment.now - monitor.entered < settings.early_s:
+        return monitor, seen
+    since = monitor.entered + settings.early_s
+    return monitor, replace(seen, contrary=replace(held_by, since=since))
 
 
 def over(monitor: StepMonitor, step: TaskStep, meaning: ActionDefinition) -> bool:

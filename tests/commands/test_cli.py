@@ -17,7 +17,8 @@ import pytest
 from tests.cli import Call, caller
 from tests.clips import moving_disc, write_clip
 from tests.paths import ROOT
-from visup.commands.doctor import EXTRAS, LIBRARIES
+from visup.commands.doctor import EXTRAS, LIBRARIES, speeds
+from visup.runs.inputs.presets import PRESETS
 
 MISTAKES = """\
 <dock> ::= <approach> <captured>
@@ -235,6 +236,13 @@ def test_the_doctor_finds_nothing_broken(visup: Call) -> None:
     result = visup("doctor")
     assert result.code == 0, result.out
     assert "broken" not in result.out
+
+
+def test_the_doctor_tells_what_this_machine_can_do() -> None:
+    head, *rows = speeds(frames=6)
+    assert "Frames a second" in head
+    assert len(rows) == 2 + len(PRESETS)
+    assert all(float(row.split(",")[0].split()[-1]) > 0 for row in rows)
 
 
 def test_the_doctor_knows_what_visup_depends_on() -> None:

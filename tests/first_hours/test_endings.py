@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -110,4 +111,23 @@ def test_a_reader_that_goes_away_does_not_end_the_run(clip: Path, tmp_path: Path
     process.stdout.close()  # before the first word
     assert process.wait(timeout=120) == ExitCode.GOOD, process.stderr.read()
     process.stderr.close()
+    assert (run / "report.html").is_file()
+
+
+def test_ctrl_c_ends_a_run_with_its_own_code_and_a_report(tmp_path: Path) -> None:
+    run, clip = tmp_path / "run", ROOT / "examples" / "data" / "bottles.mp4"
+    words = ["watch", str(clip), "--no-video", "--json", "--out", str(run)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "visup.cli", *words],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert process.stdout
+    process.stdout.readline()  # the first event: it is under way
+    process.send_signal(signal.SIGINT)
+    last = process.stdout.read().splitlines()[-1]
+    assert process.wait(timeout=60) == ExitCode.STOPPED
+    process.stdout.close()
+    assert '"problem": "stopped by the user"' in last
     assert (run / "report.html").is_file()

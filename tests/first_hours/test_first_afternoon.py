@@ -40,6 +40,7 @@ COMMANDS: list[tuple[str, int, str]] = [
     ("watch clip.avi --preset bench --no-video --out runs/bench", 0, "Seen: 1 object."),
     ("replay runs/clip", 0, "frames replayed"),
     ("replay runs/clip --diff", 0, "Nothing changes."),
+    ("export runs/clip mot", 0, "clip-mot.txt: "),
     # Slips.
     ("watch clop.avi", 2, "did you mean clip.avi?"),
     ("watch clip.avi --out runs/clip", 2, "the folder holds a run already"),

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 
+from tests.oracles.hardening.runner import evaluate_hardening
 from tests.oracles.reasoning.recognition import compare
 from tests.oracles.reasoning.relations import qtc_wrong, rcc8_wrong
 from tests.oracles.reasoning.rules import evaluate_rules
@@ -32,6 +33,9 @@ COMPARISONS: dict[str, Callable[[], bool]] = {
     "corrupted task files": lambda: fuzz(1_000, 0).failures > 0,
     "corrupted databases and odd masks": lambda: bool(
         evaluate_robustness(files=60, masks=60)["failures"]
+    ),
+    "damaged files of every kind, and races": lambda: bool(
+        evaluate_hardening(count=40, races=10)["failures"]
     ),
     "misbehaving behaviours": lambda: bool(evaluate_faults(count=31)["failures"]),
 }

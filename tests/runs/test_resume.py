@@ -30,6 +30,7 @@ from visup.runs.replay import recorded_transcript, replay, settings_for, transcr
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import Audience, fresh_folder, supervise
 from visup.runs.settings import RunOptions, WatchSettings
+from visup.version import __version__
 
 BARE = RunOptions(video=False, report=False, state_every_s=0.2)
 
@@ -87,6 +88,28 @@ def test_a_run_goes_on_to_the_same_end(clip: WatchSettings, tmp_path: Path, stat
     assert any("check sum" in n for n in result.notes) == (state == "damaged")
     with pytest.raises(OutputError, match="is over"):
         interrupted_run(parts)
+
+
+@pytest.mark.parametrize("part", ["agent", "kept", "behaviours"])
+def test_a_state_of_an_earlier_form_is_told_and_all_is_perceived_again(
+    clip: WatchSettings, tmp_path: Path, part: str
+) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    options = RunOptions(video=False, state_every_s=0.2)
+    supervise(clip, fresh_folder(whole, ""), options=options)
+    broken_run(clip, parts, 27, options)
+    past = interrupted_run(parts)
+    assert past.state is not None
+    earlier = {
+        "agent": replace(past.state, agent={"thoughts": 1}),
+        "kept": replace(past.state, kept={"pages": ()}),
+        "behaviours": replace(past.state, agent={**past.state.agent, "behaviours": {"eyes": {}}}),
+    }
+    past = replace(past, state=earlier[part])
+    result = supervise(past.settings, parts, options=options, past=past)
+    assert outcome(parts) == outcome(whole)
+    (note,) = (n for n in result.notes if "perceived again" in n)
+    assert f"another form than visup {__version__} has" in note
 
 
 def test_a_report_of_a_resumed_run_tells_the_whole(clip: WatchSettings, tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ class WatchOptions(TypedDict, total=False):
     fov_vertical_deg: float | None
     zones: str | os.PathLike[str] | None
     patience_s: float
+    detections: str | os.PathLike[str] | None
     preset: str | None
     attention: bool
 

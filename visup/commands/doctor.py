@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from visup.terminal.console import make_console
+from visup.terminal.console import echo, make_console
+
+if TYPE_CHECKING:
+    from visup.runs.settings import WatchSettings
 
 LIBRARIES = {
     "numpy": "arrays",
@@ -64,7 +68,11 @@ class CheckedPart:
     purpose: str = ""
 
 
-def doctor() -> None:
+def doctor(
+    speed: Annotated[
+        bool, typer.Option("--speed", help="Also measure frames a second on the shipped clip.")
+    ] = False,
+) -> None:
     """Show what is installed, what is missing, and versions. Exit code 2 when the core is broken."""
     from rich.table import Table
     from rich.text import Text
@@ -78,6 +86,8 @@ def doctor() -> None:
         state = Text(p.state, styles[p.state])
         table.add_row(Text(p.what), state, Text(p.detail), Text(p.purpose))
     make_console().print(table)
+    for line in speeds() if speed else ():
+        echo(line)
     if any(p.state == "broken" for p in parts):
         raise typer.Exit(2)
 
@@ -98,6 +108,54 @@ def examine() -> Iterator[CheckedPart]:
     yield _tried("behaviours", _behaviours)
     yield _tried("shipped tasks", _tasks)
     yield _tried("demo clip", _demo)
+
+
+SPEED_FRAMES = 60
+"""So many frames are looked at for each figure; the first ones, in which loops are compiled, do not count."""
+
+
+def speeds(frames: int = SPEED_FRAMES) -> Iterator[str]:
+    """Frames a second on the shipped clip: of a bare watch, with models and a task, by preset.
+
+    Args:
+        frames: How many are looked at.
+    """
+    from dataclasses import replace
+
+    from visup.runs.demo import demo_settings
+    from visup.runs.inputs.presets import PRESETS
+
+    demo = demo_settings(1)
+    bare = replace(demo, tasks=(), models=None, actors={})
+    tried = {"without a task": bare, "with models and a task": demo}
+    tried |= {f"--preset {name}": replace(bare, preset=name) for name in PRESETS}
+    yield "Frames a second on this machine, shipped clip (640 x 480, 25 a second):"
+    for name, settings in tried.items():
+        looked, kept = _speed(settings, frames)
+        yield f"  {name:24} {looked:5.1f}, " + (
+            "keeps up with a camera" if kept >= 1.0 else f"{kept:.0%} of what a camera gives"
+        )
+
+
+def _speed(settings: WatchSettings, frames: int) -> tuple[float, float]:
+    """Frames looked at in a second, and that as a share of those that are to be looked at."""
+    import time
+    from itertools import islice
+    from statistics import median
+
+    from visup.runs.wiring import build_agent, open_video
+
+    took = []
+    agent = build_agent(settings)
+    with open_video(settings) as video:
+        for frame in islice(video, frames):
+            begin = time.perf_counter()
+            agent.step(frame)
+            took.append(time.perf_counter() - begin)
+        wanted = video.fps / video.every
+    agent.close()
+    rate = 1.0 / median(took[len(took) // 3 :])
+    return rate, rate / wanted
 
 
 def _library(name: str, purpose: str) -> CheckedPart:

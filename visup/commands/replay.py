@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,8 +18,10 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from visup.agent.model.step import Step
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import Transcript, TranscriptDiff
+    from visup.runs.replay_report import ReplayReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,7 @@ def replay(
     from visup.agent.storage.journal_reader import Recording
     from visup.runs.replay import replay as reason_again
     from visup.runs.replay import settings_for
+    from visup.runs.replay_report import ReplayReport
     from visup.runs.runner import fresh_folder
     from visup.terminal.narrator import Narrator
 
@@ -65,18 +69,34 @@ def replay(
     folder = fresh_folder(out, settings.source) if out else None
     silent = comparison.quiet or other
     narrator = Narrator(console)
-    told = reason_again(
-        recording,
-        settings,
-        folder,
-        None if silent else narrator,
-    )
-    if not silent:
-        narrator.finish()
-    console.print(_speed(told), style="dim")
+    with ExitStack() as stack:
+        report = stack.enter_context(ReplayReport(recording, settings)) if folder else None
+
+        def tell(step: Step) -> None:
+            if not silent:
+                narrator(step)
+            if report:
+                report(step)
+
+        told = reason_again(recording, settings, folder, tell)
+        if not silent:
+            narrator.finish()
+        console.print(_speed(told), style="dim")
+        if report and folder:
+            _write_report(console, report, folder, told)
     if other is None:
         raise typer.Exit(_print_verdict(console, told, has_task=bool(settings.tasks)))
     raise typer.Exit(_print_changes(console, other, told, comparison.quiet))
+
+
+def _write_report(console: Console, report: ReplayReport, folder: Path, told: Transcript) -> None:
+    from visup.agent import Verdict
+
+    path = report.write(folder, Verdict(told.verdict) if told.verdict else None)
+    for note in report.notes:
+        console.print(note, soft_wrap=True, markup=False, style="yellow")
+    if path:
+        console.print(f"Report:  {path}", soft_wrap=True, markup=False)
 
 
 def _print_verdict(console: Console, told: Transcript, *, has_task: bool) -> int:

@@ -52,6 +52,7 @@ def main() -> int:
             "recognition",
             "faults",
             "resume",
+            "hardening",
             "pace",
             "soak",
             "stepping",

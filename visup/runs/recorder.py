@@ -105,6 +105,14 @@ class Recorder:
             self._write()
         self._derive(step, frame, list(self._derived))
 
+    def begin_anew(self) -> None:
+        """Forget what was gathered for the report: all of it comes again."""
+        from visup.report.collector import Collector
+
+        self.collector = Collector()
+        if "report" in self._derived:
+            self._derived["report"] = self.collector.add
+
     def catch_up(self, step: Step, frame: Frame) -> None:
         """Take note of a step that the journal holds already."""
         self._derive(step, frame, ["report"])

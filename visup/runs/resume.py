@@ -159,15 +159,21 @@ def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
 
 
 def catch_up(
-    agent: Agent, source: VideoSource, past: InterruptedRun, tell: Callable[[Step, Frame], None]
+    agent: Agent,
+    source: VideoSource,
+    past: InterruptedRun,
+    tell: Callable[[Step, Frame], None],
+    *,
+    whole: bool,
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     """Make an agent what it was after the last recorded step.
 
     Args:
-        agent: New, of the run's settings.
+        agent: Of the run's settings; new, or as the run's state left it.
         source: Just opened.
         past: The run.
         tell: Told of the recorded steps whose frames there are.
+        whole: Whether its behaviours are as the state left them, too.
 
     Returns:
         The frames with which the run goes on, and what the user should know.
@@ -176,7 +182,6 @@ def catch_up(
         SourceError: The source is not what was recorded.
     """
     after = past.state.frame_index if past.state else -1
-    whole = agent.load(past.state.agent) if past.state else False
     if source.live:
         return _live(agent, source, past, after), ("Nothing was seen in between.",)
     answers = past.recording.answers()

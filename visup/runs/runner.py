@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from visup.agent import Frame, Severity, Verdict
+from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.atomic import sync
+from visup.compiled import cache_note
 from visup.percepts.video.live_source import LiveSource
 from visup.percepts.video.realtime import RealTimeFrames, in_real_time
 from visup.runs.checkpoints import CheckpointWriter
@@ -24,6 +26,7 @@ from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.runs.wiring import build_agent, final_verdict, open_video
 from visup.sinks import Sinks
+from visup.version import __version__
 
 if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
@@ -203,13 +206,32 @@ class _Run:
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
         """Make the agent what it was, and give the frames that are left."""
-        recorder = self._recorder
-        if recorder and past.state:
-            recorder.collector.load(past.state.kept)
-        tell = recorder.catch_up if recorder else lambda step, frame: None
-        frames, notes = catch_up(self._agent, self.source, past, tell)
+        past, whole = self._take_up(past)
+        tell = self._recorder.catch_up if self._recorder else lambda step, frame: None
+        frames, notes = catch_up(self._agent, self.source, past, tell, whole=whole)
         self._notes = (*self._notes, *notes)
         return frames
+
+    def _take_up(self, past: InterruptedRun) -> tuple[InterruptedRun, bool]:
+        """The run with the state that was taken up, or without one that could not be.
+
+        What a state holds changes with visup, and with the behaviours that gave theirs: one that does not
+        fit is no reason not to go on, since the journal tells the same.
+        """
+        if past.state is None:
+            return past, False
+        try:
+            if self._recorder:
+                self._recorder.collector.load(past.state.kept)
+            return past, self._agent.load(past.state.agent)
+        except Exception as fault:
+            self._agent.close()
+            self._agent = build_agent(self._settings, also=(self._faults,), live=self.source.live)
+            self._stack.callback(self._agent.close)
+            if self._recorder:
+                self._recorder.begin_anew()
+            why = f"its checkpoint is of another form than visup {__version__} has: {error_line(fault)}"
+            return replace(past, state=None, why_none=why), False
 
     def connect(self, audience: Audience, past: InterruptedRun | None) -> None:
         """Let everyone follow the agent, and its surroundings report their faults."""
@@ -271,6 +293,7 @@ class _Run:
         verdict = final_verdict(mind) if mind.tasks else self._severity.verdict
         problem = "stopped by the user" if self._stopped else self.source.problem
         told = (
+            cache_note(),
             self._checkpoints.note if self._checkpoints else None,
             self._pace.note() if self._pace else None,
             *self._sinks.end(verdict, self._steps),

@@ -158,6 +158,12 @@ class WatchSettings:
     ] = None
     patience_s: float = 60.0
     """How long a camera or stream that drops is tried again, seconds."""
+    detections: Annotated[
+        Path | None,
+        Option(
+            "Boxes of a detector (MOT or COCO file), in place of visup's own eyes.", metavar="FILE"
+        ),
+    ] = None
     preset: Annotated[
         str | None,
         Option(

@@ -15,6 +15,7 @@ from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.placed import PlacedBehaviour
 from visup.percepts.colour import ColourBehaviour
 from visup.percepts.depth import DepthBehaviour
+from visup.percepts.detections import DetectionsBehaviour, read_detections
 from visup.percepts.health import HealthBehaviour
 from visup.percepts.motion.behaviour import MotionBehaviour
 from visup.percepts.shape.behaviour import ShapeBehaviour
@@ -94,9 +95,11 @@ def build_agent(
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     known, taught = _names(database)
+    boxes = _boxes(settings)
+    known = (*known, *(n for n in (boxes.names if boxes else ()) if n not in known))
     actors = with_taught_actors(tasks, settings.actors, known, taught)
     behaviours = [
-        *_behaviours(settings, database, declared_sizes(tasks, actors), _places(tasks)),
+        *_behaviours(settings, database, boxes, declared_sizes(tasks, actors), _places(tasks)),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
         *also,
     ]
@@ -111,6 +114,13 @@ def build_agent(
         models=known,
         limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
     )
+
+
+def _boxes(settings: WatchSettings) -> DetectionsBehaviour | None:
+    """What sees in place of visup's own eyes, where a detector has."""
+    if settings.detections is None:
+        return None
+    return DetectionsBehaviour(read_detections(settings.detections))
 
 
 def _names(database: ModelDatabase | None) -> tuple[tuple[str, ...], frozenset[str]]:
@@ -198,6 +208,7 @@ def _limits(settings: WatchSettings, live: bool) -> Limits:
 def _behaviours(
     settings: WatchSettings,
     database: ModelDatabase | None,
+    boxes: DetectionsBehaviour | None,
     sizes_m: Mapping[str, float],
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
@@ -205,6 +216,8 @@ def _behaviours(
     moving: Behaviour = AppearanceBehaviour(taught) if taught else MotionBehaviour()
     if places:
         moving = PlacedBehaviour(places, taught)
+    if boxes:
+        return [HealthBehaviour(), boxes, *user_behaviours(settings)]
     seeing: list[Behaviour] = [HealthBehaviour(), moving]
     if database is not None:
         seeing += [

@@ -8,9 +8,10 @@ surface gives, whatever the light (Basri and Jacobs, Lambertian Reflectance and 
 
 from __future__ import annotations
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
+
+from visup.compiled import compiled
 
 HARMONICS = 8
 """The constant is taken off as the mean."""
@@ -19,7 +20,7 @@ _RIDGE = 2e-3
 _FEWEST = 30
 
 
-@nb.njit(cache=True)
+@compiled
 def _project(
     vertices: NDArray[np.float32],
     turn: NDArray[np.float64],
@@ -39,7 +40,7 @@ def _project(
         out[i, 2] = z
 
 
-@nb.njit(cache=True)
+@compiled
 def _draw(
     points: NDArray[np.float64],
     faces: NDArray[np.int32],
@@ -78,7 +79,7 @@ def _draw(
                 of_b += b_right
 
 
-@nb.njit(cache=True)
+@compiled
 def _moments(cover: NDArray[np.float64]) -> tuple[float, float, float]:
     """Area and centroid of what is covered, pixels of the square."""
     area, across, down = 0.0, 0.0, 0.0
@@ -90,7 +91,7 @@ def _moments(cover: NDArray[np.float64]) -> tuple[float, float, float]:
     return area, across / max(area, 1e-9), down / max(area, 1e-9)
 
 
-@nb.njit(cache=True)
+@compiled
 def _drawn_moments(number: NDArray[np.int32]) -> tuple[float, float, float]:
     area, across, down = 0.0, 0.0, 0.0
     for y in range(number.shape[0]):
@@ -102,7 +103,7 @@ def _drawn_moments(number: NDArray[np.int32]) -> tuple[float, float, float]:
     return area, across / max(area, 1e-9), down / max(area, 1e-9)
 
 
-@nb.njit(cache=True)
+@compiled
 def _explained(total: float, products: NDArray[np.float64], along: NDArray[np.float64]) -> float:
     """Share of the variance that a ridge regression explains."""
     for i in range(HARMONICS):
@@ -112,7 +113,7 @@ def _explained(total: float, products: NDArray[np.float64], along: NDArray[np.fl
     return float((weights * along).sum() / total)
 
 
-@nb.njit(cache=True)
+@compiled
 def _shading(
     turn: NDArray[np.float64],
     normals: NDArray[np.float64],
@@ -159,7 +160,7 @@ def _shading(
     return _explained(total, products, along)
 
 
-@nb.njit(cache=True)
+@compiled
 def _overlap(cover: NDArray[np.float64], number: NDArray[np.int32]) -> float:
     """Intersection over union of what is covered and what is drawn."""
     both, either = 0.0, 0.0
@@ -171,14 +172,14 @@ def _overlap(cover: NDArray[np.float64], number: NDArray[np.int32]) -> float:
     return both / max(either, 1e-9)
 
 
-@nb.njit(cache=True)
+@compiled
 def start_place(cover: NDArray[np.float64]) -> NDArray[np.float64]:
     """Where a drawing begins to be fitted: x, y and pixels of the radius."""
     area, x, y = _moments(cover)
     return np.array([x, y, area**0.5])
 
 
-@nb.njit(cache=True)
+@compiled
 def fit_of(
     mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
     seen: tuple[NDArray[np.float64], NDArray[np.float64]],
@@ -209,7 +210,7 @@ def fit_of(
     return _overlap(cover, number), _shading(turn, normals, number, cover, tone)
 
 
-@nb.njit(cache=True)
+@compiled
 def _about(axis: int, angle: float) -> NDArray[np.float64]:
     """Rotation about one of the camera's axes."""
     turn = np.eye(3)
@@ -220,7 +221,7 @@ def _about(axis: int, angle: float) -> NDArray[np.float64]:
     return turn
 
 
-@nb.njit(cache=True)
+@compiled
 def climb(
     mesh: tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]],
     seen: tuple[NDArray[np.float64], NDArray[np.float64]],

@@ -164,3 +164,79 @@ def test_files_are_laid_out_and_names_changed_everywhere(editor: Editor, tmp_pat
     assert editor.at("rename", uri, 3, 20, newName="x") is None  # an action is not ours to rename
     editor.change(uri, "<t> ::= (")
     assert editor.ask("textDocument/formatting", asked) == []
+
+
+def asked(editor: Editor, kind: str, uri: str, **more: Any) -> Any:
+    return editor.ask(f"textDocument/{kind}", {"textDocument": {"uri": uri}, **more})
+
+
+WHOLE = {"start": {"line": 0, "character": 0}, "end": {"line": 99, "character": 0}}
+
+
+def test_hints_are_offered_as_changes_that_mend_the_file(editor: Editor, tmp_path: Path) -> None:
+    uri = editor.write(tmp_path / "fix.task", TEXT.replace("coupled(", "cupled("))
+    (action,) = asked(editor, "codeAction", uri, range=WHOLE, context={"diagnostics": []})
+    (edit,) = action["edit"]["changes"][uri]
+    assert edit["newText"] == "coupled"
+    assert edit["range"]["start"] == {"line": 4, "character": 15}
+    assert edit["range"]["end"] == {"line": 4, "character": 21}
+
+
+def test_the_outline_the_uses_and_what_folds(editor: Editor, tmp_path: Path) -> None:
+    text = "# one\n# two\n" + TEXT.replace("> <c", ">\n  <c")
+    uri = editor.write(tmp_path / "outline.task", text)
+    names = [s["name"] for s in asked(editor, "documentSymbol", uri)]
+    assert names == ["dock", "approach", "captured", "satellite"]
+    found = editor.at("references", uri, 6, 2, context={"includeDeclaration": True})
+    assert [u["range"]["start"]["line"] for u in found] == [4, 6]
+    folded = {(f["startLine"], f["endLine"]) for f in asked(editor, "foldingRange", uri)}
+    assert folded == {(0, 2), (4, 5)}
+
+
+def test_arguments_are_shown_while_one_writes_them_and_when_actions_are_over(
+    editor: Editor, tmp_path: Path
+) -> None:
+    uri = editor.write(tmp_path / "hints.task", TEXT)
+    told = editor.at("signatureHelp", uri, 3, 31)
+    assert told["signatures"][0]["label"] == "converging(object, object)"
+    assert told["activeParameter"] == 1
+    hints = asked(editor, "inlayHint", uri, range=WHOLE)
+    assert [h["label"] for h in hints] == ["until the next begins", "held 1 s"]
+    data = asked(editor, "semanticTokens/full", uri)["data"]
+    assert len(data) % 5 == 0
+    assert {data[k] for k in range(3, len(data), 5)} == {0, 1, 2}
+
+
+def test_renaming_is_refused_where_it_would_change_the_meaning(
+    editor: Editor, tmp_path: Path
+) -> None:
+    uri = editor.write(tmp_path / "names.task", TEXT)
+    assert editor.at("prepareRename", uri, 3, 16) is None  # an action
+    assert editor.at("prepareRename", uri, 3, 2) is not None
+    assert editor.at("rename", uri, 3, 2, newName="captured") is None
+    assert editor.at("rename", uri, 3, 2, newName="coupled") is None
+    assert editor.at("rename", uri, 3, 2, newName="reach") is not None
+
+
+def test_actors_that_nobody_declares_are_defined_where_they_first_act(
+    editor: Editor, tmp_path: Path
+) -> None:
+    uri = editor.write(tmp_path / "actors.task", TEXT)
+    assert editor.at("definition", uri, 4, 24)["range"]["start"]["line"] == 3
+    assert editor.at("definition", uri, 4, 29)["range"]["start"]["line"] == 1
+
+
+def test_rule_files_are_served_as_well(editor: Editor, tmp_path: Path) -> None:
+    text = 'rule near(a, b): info\n    when touchng(a, b)\n    say "{a} {b}"\n'
+    uri = editor.write(tmp_path / "own.rules", text)
+    (fault,) = editor.told[uri]
+    assert "no relation or fact 'touchng'" in fault["message"]
+    (action,) = asked(editor, "codeAction", uri, range=WHOLE, context={"diagnostics": []})
+    (edit,) = action["edit"]["changes"][uri]
+    assert edit["newText"] == "touching"
+    assert [s["name"] for s in asked(editor, "documentSymbol", uri)] == ["near"]
+    editor.change(uri, text.replace("touchng", "touching"))
+    assert editor.told[uri] == []
+    assert "touching(object, object)" in editor.at("hover", uri, 1, 12)["contents"]["value"]
+    labels = {i["label"] for i in editor.at("completion", uri, 1, 10)}
+    assert {"touching", "gap", "within"} <= labels

@@ -138,7 +138,7 @@ EVALUATIONS = (
         """,
         "visup.evaluation.alarms.runner:evaluate_alarms",
         "watching",
-        ("alarms", "clips", "per_hour", "hours", "noted"),
+        ("alarms", "clips", "per_hour", "hours", "noted", "lines_per_min"),
         (_LIMIT,),
         folder_argument("Folder with sound video, or recorded runs, anywhere below it."),
     ),
@@ -210,6 +210,24 @@ EVALUATIONS = (
         ("trials", "ended", "told", "unknown", "thought", "fine", "back", "over_ms"),
         (_count("count", 1000, "How many faults are injected."), _SEED),
         closing=adapters.failures_closing("number {number}, {fault} in '{kind}': {problem}"),
+        failed=adapters.any_failures,
+    ),
+    EvaluationCommand(
+        "hardening",
+        """Damaged and hostile files of every kind, and races of writers: nothing gets in, nothing gets lost.
+
+        Exit code: 0 when all were read or refused within bounds, and nothing was lost, else 1.
+        """,
+        "tests.oracles.hardening.runner:evaluate_hardening",
+        "reading",
+        ("files", "read", "refused", "raised", "slow", "crashed", "memory", "ran"),
+        (
+            _count("count", 5000, "Damaged files of each kind."),
+            _SEED,
+            _count("races", 100, "How often two writers begin at once.", 0),
+            Setting("kind", list[str] | None, None, Option("Which kinds; all if none.")),
+        ),
+        closing=adapters.failures_closing("{text}"),
         failed=adapters.any_failures,
     ),
     EvaluationCommand(

@@ -1,4 +1,4 @@
-"""The language server for task files: what `tasks/tools/editing.py` says, in the words of the protocol."""
+"""The language server of both languages: what `tasks/tools/editing.py` says, for editors."""
 
 from __future__ import annotations
 
@@ -12,9 +12,17 @@ from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
 
 from visup.agent.model.errors import SourceLocation, VisupError
+from visup.commands.task.editor_features import (
+    FEATURES,
+    faults_of,
+    holds_rules,
+    rename_refused,
+)
 from visup.commands.task.format import formatted_source
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic
+from visup.rules.language.typecheck import KEYWORDS as RULE_KEYWORDS
+from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.files import read_beside
 from visup.tasks.diagnostics.explain import explain
@@ -37,9 +45,9 @@ def serve() -> None:
 
 
 def make_server() -> LanguageServer:
-    """A language server with diagnostics, completion, hover, definition, format and rename."""
+    """A language server with all of `_FEATURES` and of `editor_features.FEATURES`."""
     server = LanguageServer("visup-task", __version__)
-    for feature, handler, options in _FEATURES:
+    for feature, handler, options in (*_FEATURES, *FEATURES):
         server.feature(feature, options)(handler)
     return server
 
@@ -59,14 +67,33 @@ def _closed(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
 
 def _complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
     document = ls.workspace.get_text_document(params.text_document.uri)
+    if holds_rules(document):
+        return _rule_words()
     line, column = _from(document, params.position)
     found = completions(document.source, _file(document), line, column)
     return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
 
 
+def _rule_words() -> list[lsp.CompletionItem]:
+    words = {n: f"{', '.join(w.takes)}: {w.meaning}" for n, w in PREDICATES.items()}
+    words |= {n: f"{', '.join(w.takes)}: {w.meaning}" for n, w in QUANTITIES.items()}
+    kinds = lsp.CompletionItemKind
+    found = [lsp.CompletionItem(n, kind=kinds.Function, detail=a) for n, a in words.items()]
+    return found + [lsp.CompletionItem(w, kind=kinds.Keyword) for w in sorted(RULE_KEYWORDS)]
+
+
+def _rule_meaning(document: TextDocument, word: NameUse) -> str | None:
+    known = PREDICATES.get(word.name) or QUANTITIES.get(word.name)
+    return f"`{word.name}({', '.join(known.takes)})`: {known.meaning}" if known else None
+
+
 def _show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
     document, word = _word(ls, params)
-    said = hover(document.source, _file(document), word) if word else None
+    said = None
+    if word is not None and holds_rules(document):
+        said = _rule_meaning(document, word)
+    elif word is not None:
+        said = hover(document.source, _file(document), word)
     if word is None or said is None:
         return None
     content = lsp.MarkupContent(lsp.MarkupKind.Markdown, said)
@@ -80,6 +107,8 @@ def _define(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | 
 
 def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
     document = ls.workspace.get_text_document(params.text_document.uri)
+    if holds_rules(document):
+        return []  # rules are laid out as their authors like
     try:
         new = formatted_source(document.source, _file(document))
     except VisupError:
@@ -93,7 +122,11 @@ def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[ls
 def _rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
     document, word = _word(ls, params)
     new = params.new_name.strip("<> ")
-    if word is None or not new.isidentifier():
+    if word is None or holds_rules(document):
+        return None
+    refused = rename_refused(document.source, word, new)
+    if refused is not None:
+        ls.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, refused))
         return None
     places = references(document.source, word)
     edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
@@ -119,22 +152,27 @@ _FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
 
 def _publish(server: LanguageServer, uri: str) -> None:
     document = server.workspace.get_text_document(uri)
-    _, faults = diagnose(document.source, _file(document), read=_EditorFiles(server).read)
+    if holds_rules(document):
+        faults = faults_of(document)
+    else:
+        files = _EditorFiles(server, Path(_file(document)).parent)
+        _, faults = diagnose(document.source, _file(document), read=files.read)
     shown = [_diagnostic(document, f) for f in faults]
     server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, shown))
 
 
 class _EditorFiles:
-    """Reads included files as they stand in the editor, else from the disk."""
+    """Reads included files as they stand in the editor, else from the disk: from a folder, or below."""
 
-    def __init__(self, server: LanguageServer) -> None:
+    def __init__(self, server: LanguageServer, root: Path) -> None:
+        self._root = root
         self._open = {to_fs_path(u): d for u, d in server.workspace.text_documents.items()}
 
     def read(self, path: str, including: str) -> tuple[str, str]:
         beside = str((Path(including).parent / path).resolve())
         if beside in self._open:
             return beside, self._open[beside].source
-        return read_beside(path, including)
+        return read_beside(path, including, self._root)
 
 
 def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
@@ -150,8 +188,8 @@ def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
         _range(document, span),
         "\n".join(said),
         severity=lsp.DiagnosticSeverity.Error,
-        code=fault.code,
-        source=f"visup: {explain(fault.code).title}",
+        code=fault.code or None,
+        source=f"visup: {explain(fault.code).title}" if fault.code else "visup",
     )
 
 
@@ -165,7 +203,9 @@ def _word(
 def _location(server: LanguageServer, document: TextDocument, word: NameUse) -> lsp.Location | None:
     if word.kind == "include":
         try:
-            path, _ = _EditorFiles(server).read(word.name, _file(document))
+            path, _ = _EditorFiles(server, Path(_file(document)).parent).read(
+                word.name, _file(document)
+            )
         except VisupError:
             return None
         uri = from_fs_path(str(Path(path).resolve())) if Path(path).exists() else None

@@ -1,4 +1,4 @@
-"""`visup task`: check, lay out, show, explain and walk through task files."""
+"""`visup task`: check, lay out, show, explain, walk through, learn and compare task files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from visup.commands.task import learning
 from visup.commands.task.format import format_files
 from visup.commands.task.simulate import simulate
 from visup.terminal.console import echo, echo_json, make_console
@@ -13,9 +14,13 @@ from visup.terminal.console import echo, echo_json, make_console
 if TYPE_CHECKING:
     from visup.agent.model.errors import VisupError
 
-app = typer.Typer(help="Check, show, lay out and try task files.", no_args_is_help=True)
+app = typer.Typer(
+    help="Check, show, lay out, try, learn and compare task files.", no_args_is_help=True
+)
 app.command("simulate")(simulate)
 app.command("format")(format_files)
+for command in (learning.learn, learning.fit, learning.coverage, learning.diff):
+    app.command(command.__name__)(command)
 
 Files = Annotated[list[str], typer.Argument(help="Task files, or names of shipped tasks.")]
 File = Annotated[str, typer.Argument(help="A task file or shipped task.")]

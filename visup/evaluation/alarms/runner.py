@@ -22,6 +22,7 @@ from visup.evaluation.missions.files import read_json
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent, open_video
+from visup.story import Narrative
 
 
 @dataclass(slots=True)
@@ -32,15 +33,19 @@ class AlarmCounts:
         grave: How many alerts of severity warning or above opened, by kind.
         noted: The same of those below.
         seconds: Length of the clip.
+        lines: What a person reads of it on a terminal.
     """
 
     grave: Counter[str] = field(default_factory=Counter)
     noted: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
+    lines: int = 0
+    _narrative: Narrative = field(default_factory=Narrative, repr=False)
 
     def __call__(self, step: Step, frame: object = None) -> None:
         """Take down one step; the agent calls it."""
         self.seconds = max(self.seconds, step.time)
+        self.lines += len(self._narrative.lines(step, None))
         for event in step.events:
             if event.kind == "alert":
                 kinds = self.grave if event.severity >= Severity.WARNING else self.noted
@@ -62,7 +67,8 @@ def evaluate_alarms(
 
     Returns:
         `items` by kind of alert with `alarms`, `clips` that raised it, and `per_hour`; `total` with the same
-        of all kinds, `hours`, and `noted` (alerts below a warning); `raised` lists the clips that did.
+        of all kinds, `hours`, `noted` (alerts below a warning) and `lines_per_min` (of the narrative);
+        `raised` lists the clips that did.
 
     Raises:
         SettingsError: There is neither video nor a recorded run below the folder.
@@ -88,6 +94,8 @@ def alarm_rates(found: Mapping[str, AlarmCounts]) -> dict[str, Any]:
     }
     total = _rate([sum(c.grave.values()) for c in found.values() if c.grave.total()], hours)
     total |= {"hours": hours, "noted": sum(c.noted.total() for c in found.values())}
+    lines = sum(c.lines for c in found.values())
+    total["lines_per_min"] = lines / (60 * hours) if hours else 0.0
     raised = {name: dict(c.grave) for name, c in found.items() if c.grave.total()}
     return {"total": total, "items": items, "raised": raised}
 

@@ -189,5 +189,8 @@ def _pair(given: object) -> tuple[float, float] | None:
         return None
     if any(isinstance(v, bool) or not isinstance(v, int | float) for v in given):
         return None
-    x, y = (float(v) for v in given)
+    try:
+        x, y = (float(v) for v in given)
+    except OverflowError:  # of a whole number with hundreds of digits
+        return None
     return (x, y) if math.isfinite(x) and math.isfinite(y) else None

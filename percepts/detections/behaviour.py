@@ -1,0 +1,93 @@
+"""Boxes of a file as regions, and their names as hypotheses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.percepts.detections.files import Detection, Frames
+
+PAST_S = 0.4
+"""Velocities are those over so long a time."""
+
+VELOCITY_SIGMA = 4.0
+"""Deviation of a velocity, pixels per second: detectors' boxes jitter by a pixel or two."""
+
+LEAST_SIDE = 2
+"""What shows of a box within the picture must be so wide and high, pixels."""
+
+
+class DetectionsBehaviour:
+    """Reports the boxes that a file has for each frame; see `read_detections`.
+
+    Args:
+        frames: Index of a frame -> its boxes.
+    """
+
+    contract = Contract("detections", gives=("region", "hypothesis"))
+
+    def __init__(self, frames: Frames) -> None:
+        self._frames = frames
+        self._past: dict[int, list[tuple[float, float, float]]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that things are said to be."""
+        found = {d.name for boxes in self._frames.values() for d in boxes if d.name}
+        return tuple(sorted(found))
+
+    def save(self) -> Mapping[str, Any]:
+        """Where things were a moment ago."""
+        return {"past": {track: list(map(tuple, rows)) for track, rows in self._past.items()}}
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take on what a behaviour of the same file remembered."""
+        self._past = {int(k): [tuple(r) for r in rows] for k, rows in state["past"].items()}
+
+    def perceive(
+        self, frame: Frame, observation: Observation, directives: Sequence[Directive]
+    ) -> Iterable[Percept]:
+        """One region for each box that shows in the picture, and what it is said to be."""
+        for detection in self._frames.get(frame.index, ()):
+            region = self._region(detection, frame)
+            if region is None:
+                continue
+            yield Percept("region", region, frame.time, "detections", region.confidence)
+            if detection.name:
+                named = Hypothesis(region.id, detection.name, 0, detection.score)
+                yield Percept("hypothesis", named, frame.time, "detections", detection.score)
+
+    def _region(self, detection: Detection, frame: Frame) -> Region | None:
+        x, y, w, h = detection.box
+        width, height = frame.size
+        left, top = max(0, round(x)), max(0, round(y))
+        right, bottom = min(width, round(x + w)), min(height, round(y + h))
+        if min(right - left, bottom - top) < LEAST_SIDE:
+            return None
+        corners = [(left, top), (right - 1, top), (right - 1, bottom - 1), (left, bottom - 1)]
+        return Region(
+            id=detection.track,
+            bbox=(left, top, right - left, bottom - top),
+            mask=np.ones((bottom - top, right - left), dtype=bool),
+            contour=np.array(corners, np.float32),
+            centroid=((left + right - 1) / 2, (top + bottom - 1) / 2),
+            area=float((right - left) * (bottom - top)),
+            velocity=self._velocity(detection, frame.time),
+            velocity_sigma=VELOCITY_SIGMA,
+            cut=left == 0 or top == 0 or right == width or bottom == height,
+            confidence=detection.score,
+        )
+
+    def _velocity(self, detection: Detection, now: float) -> tuple[float, float]:
+        """Of the middle of a box, pixels per second."""
+        x, y, w, h = detection.box
+        here = (now, x + w / 2, y + h / 2)
+        past = [p for p in self._past.get(detection.track, []) if now - p[0] <= PAST_S]
+        self._past[detection.track] = [*past, here]
+        if not past:
+            return (0.0, 0.0)
+        then = past[0]
+        return (here[1] - then[1]) / (now - then[0]), (here[2] - then[2]) / (now - then[0])

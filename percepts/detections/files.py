@@ -1,0 +1,96 @@
+"""Tracked boxes from files: MOT Challenge text, and COCO JSON with `track_id`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from visup.agent.model.errors import SettingsError
+
+EXPECTED = (
+    "MOT lines `frame,id,left,top,width,height,score,...` (frames from 1), or COCO JSON whose "
+    "annotations have `image_id`, `bbox` and `track_id`"
+)
+MOST_BYTES = 2**30
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One box in one frame.
+
+    Attributes:
+        track: Number of the thing, the same from frame to frame, from 1.
+        box: (x, y, width, height), pixels.
+        score: How sure the detector is, 0 to 1.
+        name: What it is said to be, or None.
+    """
+
+    track: int
+    box: tuple[float, float, float, float]
+    score: float = 1.0
+    name: str | None = None
+
+
+Frames = Mapping[int, tuple[Detection, ...]]
+"""Index of a frame, from 0 -> its boxes."""
+
+
+def read_detections(path: Path) -> Frames:
+    """The boxes of a file, by frame.
+
+    Raises:
+        SettingsError: It cannot be read, is of neither form, or its boxes are not tracked.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise SettingsError("the file of detections is too large", where=str(path))
+        text = path.read_text(encoding="utf-8")
+        rows = _coco(json.loads(text)) if text.lstrip().startswith("{") else _mot(text)
+        found: dict[int, list[Detection]] = {}
+        for frame, detection in rows:
+            _check(frame, detection)
+            found.setdefault(frame, []).append(detection)
+    except OSError as fault:
+        what = f"the detections cannot be read ({fault.strerror})"
+        raise SettingsError(what, where=str(path)) from fault
+    except (KeyError, TypeError, ValueError, IndexError) as fault:
+        said = f"no {fault}" if isinstance(fault, KeyError) else str(fault)
+        what = f"the detections cannot be used: {said}"
+        raise SettingsError(what, where=str(path), expected=EXPECTED) from fault
+    return {frame: tuple(boxes) for frame, boxes in found.items()}
+
+
+def _check(frame: int, detection: Detection) -> None:
+    if frame < 0:
+        raise ValueError(f"there is no frame {frame}")
+    if detection.track < 1:
+        raise ValueError("boxes without a track: let a tracker number them first")
+    if not min(detection.box[2:]) > 0:
+        raise ValueError(f"a box of {detection.box[2]:g} x {detection.box[3]:g} pixels")
+
+
+def _mot(text: str) -> Iterator[tuple[int, Detection]]:
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            continue
+        cells = line.split(",")
+        if len(cells) < 6:
+            raise ValueError(f"line {number} has {len(cells)} values")
+        x, y, w, h = (float(c) for c in cells[2:6])
+        score = float(cells[6]) if len(cells) > 6 else 1.0
+        sure = min(1.0, score) if score > 0 else 1.0
+        yield int(float(cells[0])) - 1, Detection(int(float(cells[1])), (x, y, w, h), sure)
+
+
+def _coco(told: Any) -> Iterator[tuple[int, Detection]]:
+    names = {c["id"]: str(c["name"]) for c in told.get("categories", ())}
+    # Images are frames in the order of their ids, whatever these are.
+    order = {n: k for k, n in enumerate(sorted(i["id"] for i in told["images"]))}
+    for row in told["annotations"]:
+        x, y, w, h = (float(v) for v in row["bbox"])
+        score = min(1.0, max(0.0, float(row.get("score", 1.0))))
+        name = names.get(row.get("category_id"))
+        yield order[row["image_id"]], Detection(int(row["track_id"]), (x, y, w, h), score, name)

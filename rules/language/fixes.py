@@ -1,0 +1,91 @@
+"""Hints that are changes: what an editor does when one takes up a hint, in either language."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from visup.agent.model.errors import SourceLocation
+
+
+@dataclass(frozen=True, slots=True)
+class TextFix:
+    """A change of a text on one line or over several.
+
+    Attributes:
+        line: Where it begins, from 1.
+        column: From 1.
+        length: How many characters are replaced, line ends counted as one.
+        new: What stands there instead.
+    """
+
+    line: int
+    column: int
+    length: int
+    new: str
+
+    def applied(self, text: str) -> str:
+        """The text with the change."""
+        lines = text.split("\n")
+        at = sum(len(x) + 1 for x in lines[: self.line - 1]) + self.column - 1
+        return text[:at] + self.new + text[at + self.length :]
+
+
+_IN_PLACE = re.compile(r"write `([^`]+)` in place of `([^`]+)`")
+_PUT = re.compile(r"put `([^`]+)` here")
+_OUT = re.compile(r"leave `([^`]+)` out")
+_WRITE = re.compile(r"write `([^`]+)`")
+_MEANT = re.compile(r"did you mean [`']([^`']+)[`']\?")
+_NAME = re.compile(r"[^\W\d]\w*")
+
+
+def fix_of(text: str, where: SourceLocation, hint: str | None) -> TextFix | None:
+    """The change that a hint speaks of, or None when it speaks of none.
+
+    Args:
+        text: The text in which the fault stands.
+        where: Where it stands.
+        hint: Of the message.
+    """
+    if hint is None:
+        return None
+    rest = "\n".join([where.text[where.column - 1 :], *text.split("\n")[where.line :]])
+    if m := _IN_PLACE.search(hint):
+        pattern = r"\s+".join(map(re.escape, m[2].split()))
+        if old := re.match(rf"\s*{pattern}", rest):
+            return _replacing(where, old, m[1])
+        return _on_line(where, pattern, m[1])
+    if m := _PUT.search(hint):
+        spaced = m[1] if m[1] in ",:)]" else f" {m[1]} "
+        return TextFix(where.line, where.column, 0, spaced)
+    if m := _OUT.search(hint):
+        word = rf"\b{re.escape(m[1])}\b" if m[1].isidentifier() else re.escape(m[1])
+        found = re.search(rf"{word}\s*,\s*|,\s*{word}|{word}", rest)
+        if found is None or found.start() > len(where.text) - where.column + 1:
+            return _on_line(where, word, "")
+        return _replacing(where, found, "")
+    if m := _MEANT.search(hint):
+        return _renamed(where, rest, m[1])
+    if m := _WRITE.search(hint):
+        return TextFix(where.line, where.column, where.length, m[1])
+    return None
+
+
+def _on_line(where: SourceLocation, pattern: str, new: str) -> TextFix | None:
+    """Something replaced that stands elsewhere on the line, nearest to the caret."""
+    found = list(re.finditer(pattern, where.text))
+    if not found:
+        return None
+    nearest = min(found, key=lambda m: abs(m.start() - where.column + 1))
+    return TextFix(where.line, nearest.start() + 1, nearest.end() - nearest.start(), new)
+
+
+def _replacing(where: SourceLocation, old: re.Match[str], new: str) -> TextFix:
+    return TextFix(where.line, where.column + old.start(), old.end() - old.start(), new)
+
+
+def _renamed(where: SourceLocation, rest: str, new: str) -> TextFix:
+    """The name at the caret replaced; of a call only its name."""
+    found = _NAME.match(rest) if _NAME.match(new) else None
+    length = len(found[0]) if found else where.length
+    return TextFix(where.line, where.column, length, new)

@@ -1,0 +1,260 @@
+"""Reading with repairs: one slip hides nothing of what else is wrong, and every hint has been tried."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+from lark import Lark, UnexpectedInput
+
+from visup.agent.model.did_you_mean import did_you_mean
+from visup.agent.model.errors import SourceLocation
+from visup.rules.language.diagnostics import Diagnostic, Source, either
+from visup.rules.language.repair import (
+    MOST_REPAIRS,
+    Repair,
+    end_before,
+    find_repair,
+    place_of,
+)
+from visup.rules.language.transform import read_tree
+from visup.rules.language.typecheck import TypeChecker
+from visup.rules.predicates.vocabulary import Vocabulary
+
+_WANTED = {
+    "LPAR": "'('",
+    "RPAR": "')'",
+    "COLON": "':'",
+    "COMMA": "','",
+    "SEVERITY": "info, warning or critical",
+    "NAME": "a name",
+    "NUMBER": "a number",
+    "UNIT": "a unit (ms, s, min, h, px, px/s, px/s2, %, deg, deg/s, /s)",
+    "STRING": "a sentence in double quotes on one line",
+    "OPERATOR": "<, <=, >, >=, == or !=",
+    "LSQB": "'['",
+    "RSQB": "']'",
+    "__ANON_0": "'..'",
+    "PLUS": "'+'",
+    "MINUS": "'-'",
+    "TIMES": "'*'",
+    "OVER": "'/'",
+    "PAST": "'once', 'always'",
+    "FUTURE": "'eventually', 'henceforth'",
+    "QUANTIFIER": "'exists', 'forall'",
+    "REPEAT": "'may repeat'",
+    "LITERAL": "'true' or 'false'",
+    "$END": "the end of the file",
+}
+
+
+CHARACTERS_TRIED = 200_000
+"""Of repairs of one file: who made more slips than that allows has them told without hints."""
+
+
+@dataclass
+class Patience:
+    """How much may still be tried to repair a file; counted, so that the same text gives the same messages.
+
+    Attributes:
+        left: Characters that may still be read.
+    """
+
+    left: int = CHARACTERS_TRIED
+
+    def spend(self, text: str, start: str) -> UnexpectedInput | None:
+        """The syntax error of a text; while nothing is left to spend every text has its first one."""
+        self.left -= len(text)
+        if self.left < 0:
+            return _syntax_fault("", "formula")
+        return _syntax_fault(text, start)
+
+
+@lru_cache(maxsize=1)
+def _parser() -> Lark:
+    grammar = files("visup.rules.language").joinpath("rules.lark").read_text(encoding="utf-8")
+    starts = ["start", "formula"]
+    return Lark(
+        grammar, start=starts, parser="lalr", propagate_positions=True, maybe_placeholders=True
+    )
+
+
+@dataclass
+class RepairedText:
+    """A rule or a formula as it was read, perhaps only after repairs.
+
+    Attributes:
+        tree: Rules, or a formula; nothing when it could not be read.
+        file: Its name.
+        text: The text after all repairs.
+        repairs: In the order in which they were made, each of the text that those before it left.
+        faults: What is wrong beside them, by places of the repaired text.
+        syntax: What stopped the reading at each repair, and at last.
+    """
+
+    tree: Any
+    file: str
+    text: str
+    repairs: list[Repair]
+    faults: list[Diagnostic]
+    syntax: list[Diagnostic]
+
+    def told(self, whole: str) -> list[Diagnostic]:
+        """All diagnostics by places of the text as it was written."""
+        source = Source(whole, self.file)
+        return [*self.syntax, *(self._placed(f, source) for f in self.faults)]
+
+    def _placed(self, fault: Diagnostic, source: Source) -> Diagnostic:
+        if not self.repairs:
+            return fault
+        lines = self.text.split("\n")
+        at = sum(len(x) + 1 for x in lines[: fault.place.line - 1]) + fault.place.column - 1
+        begin = _before_repairs(at, self.repairs)
+        end = _before_repairs(at + fault.place.length, self.repairs)
+        line, column = _line_of(self._original(), begin)
+        return replace(fault, place=source.place(line, column, max(1, end - begin)))
+
+    def _original(self) -> str:
+        text = self.text
+        for repair in reversed(self.repairs):
+            text = text[: repair.begin] + repair.old + text[repair.begin + len(repair.new) :]
+        return text
+
+
+def read_repaired(
+    block: str, start: str, file: str, vocabulary: Vocabulary, patience: Patience
+) -> RepairedText:
+    """Read a rule or a formula; what is a slip is told, mended, and read on.
+
+    Args:
+        block: The text.
+        start: What it is: 'start' of rules, or 'formula'.
+        file: Its name, for messages.
+        vocabulary: What it may name.
+        patience: How much may still be tried.
+    """
+    text, repairs, syntax = block, list[Repair](), list[Diagnostic]()
+    while True:
+        fault = _syntax_fault(text, start)
+        if fault is None:
+            break
+        repair = None
+        if len(repairs) < MOST_REPAIRS:
+            repair = find_repair(
+                text,
+                fault,
+                lambda t: patience.spend(t, start),
+                lambda t: not _semantic(t, start, file, vocabulary)[1],
+            )
+        syntax.append(_syntax_error(fault, _Place(block, text, tuple(repairs), file), repair))
+        if repair is None:
+            return RepairedText([], file, text, repairs, [], syntax)
+        repairs.append(repair)
+        text = repair.applied(text)
+    found, told = _semantic(text, start, file, vocabulary)
+    return RepairedText(found, file, text, repairs, told, syntax)
+
+
+def _semantic(
+    text: str, start: str, file: str, vocabulary: Vocabulary
+) -> tuple[Any, list[Diagnostic]]:
+    """The tree of a text without syntax errors, and what is wrong with its meaning."""
+    found, faults = read_tree(_parser().parse(text, start=start), file)
+    checker = TypeChecker(text, file, vocabulary)
+    told = [checker.fault(*f) for f in faults]
+    return found, told or list(_checked(checker, found))
+
+
+def _checked(checker: TypeChecker, found: Any) -> Iterator[Diagnostic]:
+    if isinstance(found, list):
+        for rule in found:
+            yield from checker.rule(rule)
+    else:
+        yield from checker.formula(found)
+
+
+def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
+    try:
+        _parser().parse(text, start=start)
+    except UnexpectedInput as fault:
+        return fault
+    return None
+
+
+def _before_repairs(at: int, repairs: Sequence[Repair]) -> int:
+    """Where a place of the repaired text stood before the repairs."""
+    for repair in reversed(repairs):
+        if at >= repair.begin + len(repair.new):
+            at -= len(repair.new) - len(repair.old)
+        elif at > repair.begin:
+            at = min(at, repair.begin + len(repair.old))
+    return at
+
+
+def _line_of(text: str, at: int) -> tuple[int, int]:
+    """Line and column of an offset, counted from 1."""
+    return text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a syntax error stands: the text as written, as repaired so far, the repairs, the file."""
+
+    written: str
+    text: str
+    repairs: tuple[Repair, ...]
+    file: str
+
+    def at(self, begin: int, length: int) -> SourceLocation:
+        """The place of some characters of the repaired text."""
+        line, column = _line_of(self.written, _before_repairs(begin, self.repairs))
+        return Source(self.written, self.file).place(line, column, max(1, length))
+
+
+def _syntax_error(fault: UnexpectedInput, where: _Place, repair: Repair | None) -> Diagnostic:
+    at, length = place_of(where.text, fault)
+    found = where.text[at : at + length]
+    wanted = getattr(fault, "accepts", None) or getattr(fault, "expected", None)
+    wanted = wanted or getattr(fault, "allowed", set()) or set()
+    what = f"'{found}' does not belong here" if found else "the rule ends too early"
+    if repair is None:
+        begin = at if found else end_before(where.text, len(where.text))
+        hint = _slip(found, wanted)
+        return Diagnostic("", what, where.at(begin, length), _expected(wanted), hint)
+    if repair.begin == repair.end and repair.begin < at:
+        # Something is missing: the caret stands where it goes, and not at the next word.
+        what = f"{_put(repair.new)} is missing" if repair.new.strip() else what
+    span = max(1, repair.end - repair.begin)
+    hint = repair.hint(where.text)
+    return Diagnostic("", what, where.at(repair.begin, span), _expected(wanted), hint)
+
+
+def _put(new: str) -> str:
+    return f"'{new.strip()}'"
+
+
+def _expected(wanted: set[str]) -> str:
+    words = sorted({_WANTED.get(w, f"'{w.lower()}'") for w in wanted})
+    if len(words) > MOST_EXPECTED:
+        words = [w for w in words if w not in _SELDOM][:MOST_EXPECTED]
+    return either(words)
+
+
+MOST_EXPECTED = 8
+"""More words than so many help nobody; the rarer ones are left out."""
+_SELDOM = frozenset(
+    f"'{w}'"
+    for w in (
+        *("iff", "xor", "release", "leave", "*", "/", "+", "-"),
+        *("implies", "since", "in", "cooldown", "previous"),
+    )
+)
+
+
+def _slip(found: str, wanted: set[str]) -> str | None:
+    known = [w.lower() for w in wanted if w not in _WANTED]
+    known += ["info", "warning", "critical"] if "SEVERITY" in wanted else []
+    return did_you_mean(found, known) if found else None

@@ -1,0 +1,226 @@
+"""What a text with a slip was meant to be: the smallest change after which it can be read on.
+
+Each repair is tried on the text before it is offered, so that a hint is always legal, and what else
+is wrong in the same rule is told as well.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from lark import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
+
+from visup.agent.model.did_you_mean import closest
+
+MOST_REPAIRS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """A change of a text.
+
+    Attributes:
+        begin: Offset of what is replaced.
+        end: Offset of its end; the same where something is put in.
+        new: What stands there instead.
+        old: What stood there.
+    """
+
+    begin: int
+    end: int
+    new: str
+    old: str = ""
+
+    def applied(self, text: str) -> str:
+        """The text with the change."""
+        return text[: self.begin] + self.new + text[self.end :]
+
+    def hint(self, text: str) -> str:
+        """What to do, in words."""
+        old, new = " ".join(text[self.begin : self.end].split()), " ".join(self.new.split())
+        if not old:
+            return f"put `{new}` here"
+        return f"write `{new}` in place of `{old}`" if new else f"leave `{old}` out"
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A frequent slip.
+
+    Attributes:
+        pattern: What it looks like.
+        new: What is meant; a template as of `re.Match.expand`, or a function of the match.
+    """
+
+    pattern: re.Pattern[str]
+    new: str | Callable[[re.Match[str]], str]
+
+
+def _slip(pattern: str, new: str | Callable[[re.Match[str]], str]) -> Slip:
+    return Slip(re.compile(pattern), new)
+
+
+_CALL = r"\w+\([^()]*\)"
+_AMOUNT = r"-?[\d.]+ ?(?:px/s2|px/s|px|%|ms|min|s|h|deg/s|deg|/s)?"
+_WORD = re.compile(r"[A-Za-z_]\w*")
+SLIPS = (
+    _slip(r"<->|<=>|↔|⇔", "iff"),
+    _slip(r"->|=>|→|⇒", "implies"),
+    _slip(r"&&|&|∧", "and"),
+    _slip(r"\|\||\||∨", "or"),
+    _slip(r"!(?!=)\s*|¬", "not "),
+    _slip(r"===", "=="),
+    _slip(r"≤|=<", "<="),
+    _slip(r"≥", ">="),
+    _slip(r"≠|<>|!==", "!="),
+    _slip(r"(?<![=<>!])=(?![=>])", "=="),
+    _slip(r"\b(?:seconds?|secs?|sec)\b", "s"),
+    _slip(r"\b(?:milliseconds?|msecs?)\b", "ms"),
+    _slip(r"\b(?:minutes?|mins|m)\b", "min"),
+    _slip(r"\b(?:hours?|hrs?)\b", "h"),
+    _slip(r"\b(?:pixels?|pix)\b", "px"),
+    _slip(r"\b(?:degrees?|°)\b", "deg"),
+    _slip(r"\bpercent\b", "%"),
+    _slip(rf"({_CALL})\s+between\s+({_AMOUNT})\s+and\s+({_AMOUNT})", r"\1 >= \2 and \1 <= \3"),
+    _slip(rf"({_AMOUNT})\s*([<>]=?)\s*({_CALL})\s*([<>]=?)\s*({_AMOUNT})", r"\1 \2 \3 and \3 \4 \5"),
+    _slip(r"\b(?:for|within)\s+(\d[\d.]*\s*(?:ms|s|min|h))\s+ago\b", r"within \1 to \1 ago"),
+    _slip(r"\b(?:for|within)\s+-\s*(\d)", r"for \1"),
+    _slip(r"\b(in\s+\d+\s+of\s+\d+)\b(?! *\w)", r"\1 samples"),
+    _slip(r"\b(?:historically|globally)\b", "always"),
+    _slip(r"\b(?:previously|prev|last)\b(?!\s*\()", "previous"),
+    _slip(r"\bnext\b", "eventually[0.1 s .. 0.1 s]"),
+    _slip(r"\b(?:finally|F|future)(?=\s*\[)", "eventually"),
+    _slip(r"\b(?:G|always|globally|henceforth)(?=\s*\[)", "henceforth"),
+    _slip(r"\b(?:O|P|once)(?=\s*\[)", "once"),
+    _slip(r"\b(?:H|historically)(?=\s*\[)", "always"),
+    _slip(r"\b(?:exist|some|any)\b(?=\s+\w+\s*:)", "exists"),
+    _slip(r"\b(?:all|each|every|for all)\b(?=\s+\w+\s*:)", "forall"),
+    _slip(
+        r"\b(exists|forall)\s+(\w+\((?:[^()]*,\s*)?(\w+)\))", lambda m: f"{m[1]} {m[3]}: {m[2]}"
+    ),
+    _slip(r"\b(exists|forall)\s+(\w+)\s+(?!may|:)", r"\1 \2: "),
+    _slip(r"\bbefore\b", "and previous"),
+    _slip(r"\bduring\b|\bwhile\b", "and"),
+    _slip(r"\bbut\b|\bthen\b", "and"),
+    _slip(r"//", "#"),
+    _slip(r"\b(?:if|whenever|condition)\b", "when"),
+    _slip(r"\b(?:except|exclude)\b", "unless"),
+    _slip(r"\b(?:tell|print|message)\b", "say"),
+    _slip(r"\b(?:error|fatal|alarm|emergency)\b", "critical"),
+    _slip(r"\b(?:warn)\b", "warning"),
+    _slip(r"\b(?:note|notice|debug)\b", "info"),
+    _slip(r"'([^'\"\n]*)'", r'"\1"'),
+    _slip(r"\bsay\s+([^\"\s][^\"\n]*)", lambda m: f'say "{m[1].strip()}"'),
+    _slip(r"(say\s+\"[^\"\n]*\")(\s+)((?:hold|cooldown)\s+[\d.]+\s*\w+)", r"\3\2\1"),
+    _slip(r"(say\s+\"[^\"\n]*\")(\s+)(when\s[^\n]*)", r"\3\2\1"),
+    _slip(
+        r"\brule\s+(\w+)\s+(\w+(?:[\s,]+\w+)*)\s*:",
+        lambda m: f"rule {m[1]}({', '.join(_WORD.findall(m[2]))}):",
+    ),
+    _slip(r"\brule\s*\(", "rule name("),
+    _slip(r"\brule\s+([A-Za-z]\w*)-(\w+)", r"rule \1_\2"),
+    _slip(r"\bunless\b", "or"),
+    _slip(r"\b(\w+)\s+(\w)\s*,?\s+(\w)\b(?!\s*[:(])", r"\1(\2, \3)"),
+)  # fmt: skip
+"""In the order in which they are tried; each only where it meets the place of the error."""
+
+WORDS = (
+    "rule", "when", "unless", "hold", "cooldown", "say", "and", "or", "not", "for", "within", "since",
+    "until", "once", "always", "eventually", "henceforth", "exists", "forall", "in", "of", "samples",
+    "leave", "to", "ago", "may repeat", "true", "false", "implies", "iff", "xor", "release", "previous",
+    "info", "warning", "critical",
+)  # fmt: skip
+PUT_IN = (")", " s", " px", ":", " samples", ": info", "(", ",", " and", "]", ' say "{a}"', "[5 s]")
+Parses = Callable[[str], UnexpectedInput | None]
+"""The syntax error of a text, or None."""
+
+
+def find_repair(
+    text: str, error: UnexpectedInput, error_of: Parses, is_sound: Callable[[str], bool]
+) -> Repair | None:
+    """The first change after which a text can be read further than before.
+
+    Args:
+        text: It cannot be read.
+        error: Where it cannot.
+        error_of: Reads a text.
+        is_sound: Whether a text without syntax errors makes sense, too.
+
+    Returns:
+        A change after which all makes sense, else there is no syntax error left, else only later ones.
+    """
+    at, length = place_of(text, error)
+    further: Repair | None = None
+    readable: Repair | None = None
+    for repair in _candidates(text, at, length):
+        repair = replace(repair, old=text[repair.begin : repair.end])
+        if repair.old == repair.new:
+            continue
+        left = error_of(repair.applied(text))
+        if left is None:
+            if is_sound(repair.applied(text)):
+                return repair
+            readable = readable or repair
+            continue
+        moved = place_of(repair.applied(text), left)[0] - len(repair.new)
+        if further is None and moved > repair.end + 1 and moved > at + length:
+            further = repair
+    return readable or further
+
+
+def place_of(text: str, error: UnexpectedInput) -> tuple[int, int]:
+    """Offset and length of what cannot be read; at the end of the text the length is 0."""
+    if isinstance(error, UnexpectedToken) and error.token.type != "$END":
+        return error.token.start_pos or 0, len(error.token)
+    if isinstance(error, UnexpectedCharacters):
+        return int(error.pos_in_stream or 0), 1
+    return len(text.rstrip()), 0
+
+
+def end_before(text: str, at: int) -> int:
+    """Where what stands before an offset ends, blanks and comments left out."""
+    lines = text[:at].split("\n")
+    while lines and not lines[-1].split("#")[0].strip():
+        lines.pop()
+    if not lines:
+        return 0
+    return len("\n".join([*lines[:-1], lines[-1].split("#")[0].rstrip()]))
+
+
+def _candidates(text: str, at: int, length: int) -> Iterator[Repair]:
+    low, high = text.rfind("\n", 0, max(0, at - 120)) + 1, text.find("\n", at + 160)
+    high = len(text) if high < 0 else high
+    for slip in SLIPS:
+        for match in slip.pattern.finditer(text, low, high):
+            # It holds the place of the error, or ends or begins next to it.
+            if match.start() - 1 <= at + length and at - 1 <= match.end():
+                new = match.expand(slip.new) if isinstance(slip.new, str) else slip.new(match)
+                yield Repair(match.start(), match.end(), new)
+    found, before = text[at : at + length], end_before(text, at)
+    for word in (found, _word_before(text, before)):
+        start = at if word == found else before - len(word)
+        meant = word.lower() if word.lower() in WORDS else closest(word, WORDS)
+        if word and meant and meant != word:
+            yield Repair(start, start + len(word), meant)
+    if found == ",":
+        yield Repair(at, at + 1, " and")
+    if found[:1].isdigit():
+        yield Repair(before, before, " <")
+    for match in re.finditer(r"\)", text[max(low, text.rfind("\n", 0, before)) : before]):
+        # A bracket may be missing further back in the line.
+        place = max(low, text.rfind("\n", 0, before)) + match.end()
+        yield Repair(place, place, ")")
+    for new in PUT_IN:
+        yield Repair(before, before, new)
+    if length:
+        yield Repair(at, at + length, "")
+    previous = _word_before(text, before)
+    if previous:
+        yield Repair(before - len(previous), before, "")
+
+
+def _word_before(text: str, end: int) -> str:
+    found = re.search(r"\w+$|\S$", text[:end])
+    return found[0] if found else ""

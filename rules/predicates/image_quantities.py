@@ -1,0 +1,105 @@
+"""Quantities read off the image and the belief about objects: place, size, direction, number."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from visup.agent import Presence
+from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates.snapshot import Floats, Snapshot, exact
+from visup.rules.relations.kinematics import RelationSettings
+from visup.rules.wording.sentences import believed_name
+
+STILL_SPEED = RelationSettings().still_speed
+
+
+def _seen(facts: Snapshot, values: list[float]) -> Floats:
+    """(2, n) intervals of what is measured of each object; unknown of those out of sight."""
+    shown = [b.presence is Presence.SEEN for b in facts.beliefs]
+    return exact(np.array([v if s else np.nan for v, s in zip(values, shown, strict=True)]))
+
+
+def horizontal_position(facts: Snapshot) -> Floats:
+    """The centre of each object from the left of the image, pixels."""
+    return _seen(facts, [b.region.centroid[0] for b in facts.beliefs])
+
+
+def vertical_position(facts: Snapshot) -> Floats:
+    """The centre of each object from the top of the image, pixels."""
+    return _seen(facts, [b.region.centroid[1] for b in facts.beliefs])
+
+
+def width(facts: Snapshot) -> Floats:
+    """The width of each object's box, pixels."""
+    return _seen(facts, [float(b.region.bbox[2]) for b in facts.beliefs])
+
+
+def height(facts: Snapshot) -> Floats:
+    """The height of each object's box, pixels."""
+    return _seen(facts, [float(b.region.bbox[3]) for b in facts.beliefs])
+
+
+def area_share(facts: Snapshot) -> Floats:
+    """The share of the image that each object covers."""
+    whole = float(np.prod(facts.mind.frame_size)) or 1.0
+    return _seen(facts, [b.region.area / whole for b in facts.beliefs])
+
+
+def confidence(facts: Snapshot) -> Floats:
+    """How sure the identity of each object is, 0 to 1; also of those out of sight."""
+    return exact(np.array([b.confidence for b in facts.beliefs], dtype=float))
+
+
+def heading(facts: Snapshot) -> Floats:
+    """Where each object moves in the image, degrees: 0 to the right, 90 up; unknown at rest."""
+    slow = STILL_SPEED * image_diagonal(facts.mind.frame_size)
+    found = []
+    for belief in facts.beliefs:
+        x, y = belief.region.velocity
+        moves = np.hypot(x, y) > slow
+        found.append(float(np.degrees(np.arctan2(-y, x)) % 360.0) if moves else np.nan)
+    return _seen(facts, found)
+
+
+def centre_distance(facts: Snapshot) -> Floats:
+    """Between the centres of all pairs, pixels; unknown with one that is out of sight."""
+    x, y = horizontal_position(facts), vertical_position(facts)
+    known = np.isfinite(x[0])
+    apart = np.hypot(
+        np.where(known, x[0], 0.0)[:, None] - np.where(known, x[0], 0.0)[None],
+        np.where(known, y[0], 0.0)[:, None] - np.where(known, y[0], 0.0)[None],
+    )
+    return _of_known_pairs(apart, known)
+
+
+def box_overlap(facts: Snapshot) -> Floats:
+    """Intersection over union of the boxes of all pairs, 0 to 1; unknown with one out of sight."""
+    boxes = np.array([b.region.bbox for b in facts.beliefs], dtype=float).reshape(-1, 4)
+    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+    sides = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
+    shared = np.maximum(sides, 0.0).prod(axis=2)
+    area = boxes[:, 2:].prod(axis=1)
+    union = np.maximum(area[:, None] + area[None] - shared, 1e-9)
+    known = np.array([b.presence is Presence.SEEN for b in facts.beliefs], dtype=bool)
+    return _of_known_pairs(shared / union, known)
+
+
+def _of_known_pairs(
+    values: Floats, known: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+) -> Floats:
+    both = known[:, None] & known[None]
+    return np.array((np.where(both, values, -np.inf), np.where(both, values, np.inf)))
+
+
+def number_of_objects(facts: Snapshot) -> Floats:
+    """How many objects are in sight."""
+    count = float(sum(b.presence is Presence.SEEN for b in facts.beliefs))
+    return np.array((count, count))
+
+
+def number_of_kind(facts: Snapshot, name: str) -> Floats:
+    """How many objects in sight are believed to be of a name; those not identified may be."""
+    seen = [b for b in facts.beliefs if b.presence is Presence.SEEN]
+    surely = float(sum(name in (b.name, believed_name(facts.mind, b.id)) for b in seen))
+    possibly = surely + sum(not b.candidates for b in seen)
+    return np.array((surely, float(possibly)))

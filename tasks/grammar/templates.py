@@ -1,0 +1,172 @@
+"""What is said once and meant several times: stages with actors as parameters, ways out of a failure.
+
+`<mount(leg)> ::= ...` is a pattern. Each `<mount(leg_1)>` that is asked for is a stage of its own, made
+from it; the pattern itself is none. `on failure of <grasp>: <back_off> <grasp>` puts that way beside
+`<grasp>` wherever it is asked for.
+
+Read before: `nodes.py`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+from visup.rules.formula.units import NOWHERE, Span
+from visup.tasks.grammar.ast_courses import Choice, Course, Reference
+from visup.tasks.grammar.conditions import Name
+from visup.tasks.grammar.nodes import Invariant, Stage
+
+WAYS_OUT = 3
+"""How often in a row a failure may be recovered from."""
+_CALL = re.compile(r"(\w+)\s*\(([^()]*)\)")
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """`on failure of <grasp>: <back_off> <grasp>`: another way to do a stage once it went wrong.
+
+    Attributes:
+        stage: Which stage.
+        course: What is done instead, from where it failed.
+    """
+
+    stage: Reference
+    course: Course
+    span: Span = field(default=NOWHERE, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"on failure of {self.stage}: {self.course}"
+
+
+def called(name: str) -> tuple[str, tuple[str, ...]]:
+    """The name of a stage without its actors, and these.
+
+    >>> called("mount(leg_1, top)")
+    ('mount', ('leg_1', 'top'))
+    """
+    found = _CALL.fullmatch(name)
+    if found is None:
+        return name, ()
+    return found[1], tuple(w.strip() for w in found[2].split(","))
+
+
+def canonical(name: str) -> str:
+    """The name of a stage as it is told, whatever blanks are in it."""
+    plain, words = called(name.strip())
+    return f"{plain}({', '.join(words)})" if words else plain
+
+
+def recovered(stages: Iterable[Stage], recoveries: Iterable[Recovery]) -> tuple[Stage, ...]:
+    """The stages with every way out of a failure beside what it is for."""
+    found = tuple(stages)
+    for recovery in recoveries:
+        way = _way_out(recovery, WAYS_OUT)
+        found = tuple(
+            s
+            if s.name == recovery.stage.stage
+            else replace(s, body=_replaced(s.body, recovery.stage, way))
+            for s in found
+        )
+    return found
+
+
+def _way_out(recovery: Recovery, times: int) -> Course:
+    if times == 0:
+        return recovery.stage
+    again = _replaced(recovery.course, recovery.stage, _way_out(recovery, times - 1))
+    return Choice((recovery.stage, cast("Course", again)), recovery.span)
+
+
+def _replaced(node: Any, old: Reference, new: Course) -> Any:
+    return _mapped(node, lambda n: new if isinstance(n, Reference) and n == old else None)
+
+
+def instantiated(
+    stages: Iterable[Stage], invariants: Iterable[Invariant] = ()
+) -> tuple[Stage, ...]:
+    """The stages with one for each way in which a pattern is asked for, in the place of the pattern.
+
+    A stage that is asked for by the very name that it has is no pattern, whatever its name; a pattern
+    that nobody asks for stays, so that it is told as any stage that is never reached.
+    """
+    known = {s.name: s for s in reversed(tuple(stages))}
+    patterns = {_shape(s.name): s for s in reversed(tuple(stages)) if called(s.name)[1]}
+    if not patterns:
+        return tuple(stages)
+    todo = [n for s in stages if not called(s.name)[1] for n in _asked(s)]
+    todo += [n for i in invariants for n in _asked(i)]
+    made: dict[str, Stage] = {}
+    plain: set[str] = set()
+    while todo:
+        name = todo.pop(0)
+        if name in made or name in plain:
+            continue
+        if name in known:
+            plain.add(name)
+            todo += _asked(known[name])
+        elif _shape(name) in patterns:
+            made[name] = _bound(patterns[_shape(name)], called(name)[1])
+            todo += _asked(made[name])
+    found: list[Stage] = []
+    for stage in stages:
+        of = [m for m in made.values() if m.span == stage.span and m.span != NOWHERE]
+        found += of if of and stage.name not in plain else [*of, stage]
+    return tuple(found)
+
+
+def _shape(name: str) -> tuple[str, int]:
+    """By what a pattern is found: the plain name, and how many actors it takes."""
+    plain, words = called(name)
+    return plain, len(words)
+
+
+def bound(node: Any, names: Mapping[str, str]) -> Any:
+    """The same tree with other actors in the place of some."""
+
+    def changed(n: Any) -> Any:
+        if isinstance(n, Name) and n in names:
+            return Name(names[n], n.span)
+        if isinstance(n, Reference):
+            plain, words = called(n.stage)
+            new = tuple(names.get(w, w) for w in words)
+            return replace(n, stage=canonical(f"{plain}({', '.join(new)})")) if words else None
+        return None
+
+    return _mapped(node, changed)
+
+
+def _bound(pattern: Stage, words: tuple[str, ...]) -> Stage:
+    plain, parameters = called(pattern.name)
+    names = dict(zip(parameters, words, strict=True))
+    body = bound(pattern.body, names)
+    return replace(pattern, name=canonical(f"{plain}({', '.join(words)})"), body=body)
+
+
+def _asked(node: Any) -> list[str]:
+    """The stages that a node refers to."""
+    found: list[str] = []
+
+    def note(n: Any) -> None:
+        if isinstance(n, Reference):
+            found.append(n.stage)
+
+    _mapped(node, note)
+    return found
+
+
+def _mapped(node: Any, change: Callable[[Any], Any]) -> Any:
+    """A tree with some of its nodes changed; None from `change` leaves one and looks into it."""
+    new = change(node)
+    if new is not None:
+        return new
+    if isinstance(node, str | Span):
+        return node
+    if isinstance(node, tuple):
+        return tuple(_mapped(n, change) for n in node)
+    fields = getattr(node, "__dataclass_fields__", None)
+    if fields is None:
+        return node
+    return replace(node, **{f: _mapped(getattr(node, f), change) for f in fields})

@@ -1,0 +1,84 @@
+"""Durations of an existing task fitted to runs: each `within` and `for` of a stage, in place in its text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import floor
+
+from visup.rules.formula.units import Number, Span
+from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
+from visup.tasks.grammar.units import value
+from visup.tasks.learning.induction import deadline
+from visup.tasks.learning.judging import JudgedRun
+
+SHORTEST_SHARE = 0.8
+"""A `for` asks for so much of the least time for which a good run kept it."""
+
+
+@dataclass(frozen=True, slots=True)
+class FittedAmount:
+    """One amount that was fitted.
+
+    Attributes:
+        stage: The stage that says it.
+        clause: As it was written, such as `within 60 s`.
+        new: The clause with the new amount.
+        seen: What was seen, for people.
+        span: Where the amount stands.
+    """
+
+    stage: str
+    clause: str
+    new: str
+    seen: str
+    span: Span
+
+
+def fitted_amounts(task: Task, runs: Sequence[JudgedRun]) -> list[FittedAmount]:
+    """New amounts for all clauses of stages that runs went through.
+
+    Args:
+        task: The task.
+        runs: How it went in good runs.
+    """
+    return [f for clause in _clauses(task) if (f := _fitted(clause, runs)) is not None]
+
+
+def with_amounts(text: str, fitted: Sequence[FittedAmount]) -> str:
+    """The text of a task file with new amounts in their places; all else stays as it is."""
+    lines = text.split("\n")
+    for change in sorted(fitted, key=lambda f: (f.span.line, f.span.column), reverse=True):
+        line = lines[change.span.line - 1]
+        amount = change.new.split(" ", 1)[1]
+        begin, end = change.span.column - 1, change.span.end_column - 1
+        lines[change.span.line - 1] = line[:begin] + amount + line[end:]
+    return "\n".join(lines)
+
+
+def _clauses(task: Task) -> Iterator[tuple[str, str, Number]]:
+    """Stage, word and amount of each clause that has a number of its own."""
+    for stage in task.stages:
+        if isinstance(stage.body, Actors):
+            continue
+        for course in walk(stage.body):
+            for clause in course.clauses if isinstance(course, Timed) else ():
+                if isinstance(clause.duration, Number) and not clause.duration.span.file:
+                    word = "within" if isinstance(clause, Deadline) else "for"
+                    yield stage.name, word, clause.duration
+
+
+def _fitted(clause: tuple[str, str, Number], runs: Sequence[JudgedRun]) -> FittedAmount | None:
+    stage, word, amount = clause
+    took = [end - begin for r in runs for begin, end in [r.spans().get(stage, (0.0, 0.0))] if end]
+    if not took:
+        return None
+    new = (
+        deadline(took)
+        if word == "within"
+        else max(0.5, floor(20 * SHORTEST_SHARE * min(took)) / 20)
+    )
+    if abs(value(amount) - new) < 1e-9:
+        return None
+    seen = f"{len(took)} of {len(runs)} runs, {min(took):.1f} to {max(took):.1f} s"
+    return FittedAmount(stage, f"{word} {amount}", f"{word} {new:g} s", seen, amount.span)

@@ -1,0 +1,287 @@
+"""From good runs to a task file that accepts them, each line with its evidence.
+
+What is in nearly all runs is the course; what is in some only is told and left out. The file is tried on
+every run that it was learned from: a stage by which one would be refused is taken out again. Bad
+runs add what never happened in a good one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import ceil, inf
+
+from visup.agent import Status, Verdict
+from visup.agent.model.errors import TaskError
+from visup.tasks.checks.load import parse_task
+from visup.tasks.grammar.nodes import Actor
+from visup.tasks.learning.judging import JudgedRun, judged
+from visup.tasks.learning.order import (
+    Free,
+    Item,
+    Loop,
+    Occurrence,
+    Plan,
+    Series,
+    Times,
+    leaves_of,
+    plan_of,
+    relevant,
+    shared,
+    with_loops,
+    without,
+)
+from visup.tasks.learning.traces import RunTrace, Symbol
+
+STAGE_NAMES = {
+    "converging": "approach",
+    "coupled": "couple",
+    "touching": "contact",
+    "decoupled": "release",
+    "diverging": "retreat",
+}
+MARGIN = 2.0
+"""A stage may take so many times as long as it ever took in a good run."""
+LEAST_DEADLINE_S = 5.0
+SHARE = 0.8
+"""What is in so many of the good runs is part of the course."""
+FORBIDDEN = ("touching", "coupled")
+"""Of what happened in bad runs alone, what is forbidden."""
+
+
+@dataclass(frozen=True)
+class LearnedTask:
+    """What was learned.
+
+    Attributes:
+        text: The task file.
+        good: Verdict of each good run by it.
+        bad: Verdict of each bad run.
+        dropped: What was in the runs and is not in the file, with the reason.
+    """
+
+    text: str
+    good: Mapping[str, Verdict]
+    bad: Mapping[str, Verdict]
+    dropped: tuple[str, ...]
+
+
+@dataclass
+class _Draft:
+    """A task on its way.
+
+    Attributes:
+        name: Of the task.
+        plan: Its course.
+        times: Of each loop.
+        runs: Good runs.
+        declared: Actors as the runs' own tasks declare them.
+        forbidden: Symbols that must never be.
+    """
+
+    name: str
+    plan: Plan
+    times: Times
+    runs: Sequence[RunTrace]
+    declared: Mapping[str, Actor]
+    forbidden: list[Symbol] = field(default_factory=list)
+
+    def text(self) -> str:
+        """The task file."""
+        names = stage_names(self.plan)
+        lines = [f"# {self.name}: learned from {_runs(len(self.runs))}"]
+        lines.append(f"<{self.name}> ::= {_course(self.plan, names)}")
+        lines += [self._stage(o, name) for o, name in names.items()]
+        lines += [str(self.declared[a]) for a in self._actors() if a in self.declared]
+        lines += [f"never {_action(s)}  # in no good run, and in a bad one" for s in self.forbidden]
+        return "\n".join(lines) + "\n"
+
+    def _actors(self) -> list[str]:
+        symbols = [s for o in leaves_of(self.plan) for s in _symbols(o[0])]
+        return sorted({a for _, actors in (*symbols, *self.forbidden) for a in actors})
+
+    def _stage(self, occurrence: Occurrence, name: str) -> str:
+        item = occurrence[0]
+        if isinstance(item, Loop):
+            least, most = self.times[item]
+            body = " ".join(_action(s) for i in item.body for s in _symbols(i))
+            said = f"{least} to {most} times in a row"
+            return f"<{name}> ::= ({body}) at least {least} times at most {most} times  # {said}"
+        spans = self._spans(occurrence)
+        seen = f"in {len(spans)} of {_runs(len(self.runs))}"
+        if not spans or self._last(occurrence):
+            return f"<{name}> ::= {_action(item)}  # {seen}"
+        took = f"{min(spans):.1f} to {max(spans):.1f} s"
+        return f"<{name}> ::= {_action(item)} within {deadline(spans)} s  # {seen}, {took}"
+
+    def _last(self, occurrence: Occurrence) -> bool:
+        plan = self.plan
+        while isinstance(plan, Series):
+            plan = plan.parts[-1]
+        return occurrence in leaves_of(plan)
+
+    def _spans(self, occurrence: Occurrence) -> list[float]:
+        """How long a stage took at most in each run: from what came before it to what came after.
+
+        What is over by itself (a contact) lets the next stage begin at once, so that its time counts
+        from there.
+        """
+        course = leaves_of(self.plan)
+        found = []
+        for run in self.runs:
+            begins = {o: t for o in course if (t := begin_of(run, o)) is not None}
+            mine = begins.pop(occurrence, None)
+            if mine is None:
+                continue
+            earlier = [t for t in begins.values() if t < mine]
+            later = [t for t in begins.values() if t > mine]
+            found.append(min(later, default=mine) - max(earlier, default=run.begin))
+        return found
+
+
+def learn_task(
+    name: str,
+    good: Sequence[RunTrace],
+    bad: Sequence[RunTrace] = (),
+    declared: Mapping[str, Actor] | None = None,
+) -> LearnedTask:
+    """Propose a task file.
+
+    Args:
+        name: Of the task.
+        good: Runs in which it went well.
+        bad: Runs in which it did not.
+        declared: Actors as the runs' own tasks declare them, by name.
+
+    Returns:
+        The file and how it judges the runs.
+
+    Raises:
+        TaskError: Nothing happens in the good runs that they have in common.
+    """
+    words = [tuple(h.symbol for h in row) for row in relevant(good)]
+    folded, times = with_loops(words)
+    core = shared(folded, SHARE)
+    if not core:
+        raise TaskError(
+            "the runs have nothing in common that a task could ask for",
+            expected="runs in which named objects approach, touch or couple",
+            hint="name objects by --models, --teach or a task with actors, and record again",
+        )
+    seen = {o for w in folded for o in shared([w], 1.0)}
+    dropped = [f"{_said(o)}: in some runs only" for o in sorted(seen - set(core), key=repr)]
+    draft = _Draft(name, plan_of(folded, core), times, good, declared or {})
+    results = _tried(draft, dropped)
+    told = {r.name: _judge(draft, r) for r in bad}
+    for run in bad:
+        if told[run.name] is Verdict.SUCCEEDED:
+            _forbid(draft, run)
+    if draft.forbidden:
+        told = {r.name: _judge(draft, r) for r in bad}
+        results = {r.name: _judge(draft, r) for r in good}
+    return LearnedTask(draft.text(), results, told, tuple(dropped))
+
+
+def _tried(draft: _Draft, dropped: list[str]) -> dict[str, Verdict]:
+    """The verdicts of the good runs, after all by which one is refused has been taken out."""
+    while True:
+        task = parse_task(draft.text())
+        found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
+        refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
+        blamed = _blamed(draft, refused[0]) if refused else None
+        if blamed is None:
+            return {name: j.verdict for name, j in found.items()}
+        plan = without(draft.plan, blamed)
+        if plan is None:
+            return {name: j.verdict for name, j in found.items()}
+        dropped.append(f"{_said(blamed)}: a good run would be refused by it")
+        draft.plan = plan
+
+
+def _blamed(draft: _Draft, run: JudgedRun) -> Occurrence | None:
+    """The stage by which a run is refused: the first one that is not done."""
+    for occurrence, name in stage_names(draft.plan).items():
+        if run.statuses.get(name) is not Status.DONE:
+            return occurrence
+    return None
+
+
+def _judge(draft: _Draft, run: RunTrace) -> Verdict:
+    return judged(parse_task(draft.text()), run.minds).verdict
+
+
+def _forbid(draft: _Draft, run: RunTrace) -> None:
+    """What happened in a bad run and in no good one must never be."""
+    fine = {h.symbol for r in draft.runs for h in r.happenings}
+    actors = {a for r in draft.runs for h in r.happenings for a in h.symbol[1]}
+    for happening in run.happenings:
+        action, who = happening.symbol
+        new = happening.symbol not in fine and happening.symbol not in draft.forbidden
+        if new and action in FORBIDDEN and actors.intersection(who):
+            draft.forbidden.append(happening.symbol)
+
+
+def stage_names(plan: Plan) -> dict[Occurrence, str]:
+    """A name for each stage: by what happens, then by who takes part, then by number."""
+    occurrences = leaves_of(plan)
+    plain = [_plain(o[0]) for o in occurrences]
+    found: dict[Occurrence, str] = {}
+    for occurrence, word in zip(occurrences, plain, strict=True):
+        name = word if plain.count(word) == 1 else f"{word}_{_who(occurrence[0])}"
+        number = 2
+        tried = name
+        while tried in found.values():
+            tried, number = f"{name}_{number}", number + 1
+        found[occurrence] = tried
+    return found
+
+
+def begin_of(run: RunTrace, occurrence: Occurrence) -> float | None:
+    """When something happened in a run for the n-th time, or None."""
+    item, number = occurrence
+    first = item
+    while isinstance(first, Loop):
+        first = first.body[0]
+    begins = [h.begin for h in run.happenings if h.symbol == first]
+    return begins[number] if number < len(begins) else None
+
+
+def deadline(spans: Sequence[float]) -> int:
+    """A time with a margin, in whole seconds: of larger ones multiples of 5."""
+    raw = max(LEAST_DEADLINE_S, MARGIN * max(spans, default=inf))
+    return ceil(raw) if raw < 20 else 5 * ceil(raw / 5)
+
+
+def _course(plan: Plan, names: Mapping[Occurrence, str]) -> str:
+    if isinstance(plan, Series):
+        return " ".join(_course(p, names) for p in plan.parts)
+    if isinstance(plan, Free):
+        return f"any order ({', '.join(_course(p, names) for p in plan.parts)})"
+    return f"<{names[plan]}>"
+
+
+def _symbols(item: Item) -> list[Symbol]:
+    return [s for i in item.body for s in _symbols(i)] if isinstance(item, Loop) else [item]
+
+
+def _action(symbol: Item) -> str:
+    if isinstance(symbol, Loop):
+        return " ".join(map(_action, symbol.body))
+    action, actors = symbol
+    return f"{action}({', '.join(actors)})"
+
+
+def _plain(item: Item) -> str:
+    return "repeat" if isinstance(item, Loop) else STAGE_NAMES.get(item[0], item[0])
+
+
+def _who(item: Item) -> str:
+    return "_".join(dict.fromkeys(a for _, actors in _symbols(item) for a in actors))
+
+
+def _said(occurrence: Occurrence) -> str:
+    return _action(occurrence[0])
+
+
+def _runs(count: int) -> str:
+    return f"{count} {'run' if count == 1 else 'runs'}"

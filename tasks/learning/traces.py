@@ -1,0 +1,130 @@
+"""A run as happenings: which actions held between whom, from when to when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import combinations
+
+from visup.agent import Mind, Presence, Truth
+from visup.rules.wording.sentences import believed_name
+from visup.tasks.verification.observe import RelationLookup
+
+Symbol = tuple[str, tuple[str, ...]]
+"""An action and its actors, the actors of a pair in the order of the alphabet."""
+
+OF_PAIRS = ("converging", "diverging", "touching", "coupled")
+BREAK_S = 1.0
+"""What ceases for less long goes on: relations flicker."""
+LEAST_S = {"converging": 0.6, "diverging": 0.6, "touching": 0.2, "coupled": 0.4, "decoupled": 0.2}
+"""What lasts less long is noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """Something that held for a while.
+
+    Attributes:
+        symbol: What.
+        begin: Seconds.
+        end: Seconds.
+    """
+
+    symbol: Symbol
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class RunTrace:
+    """A run, as it is learned from.
+
+    Attributes:
+        name: Of the run, for messages.
+        happenings: In the order of their begins.
+        begin: Seconds of its first moment.
+        end: Seconds of its last.
+        minds: What was believed, moment by moment.
+        always: Actors that were in the scene from their first sight to the end.
+    """
+
+    name: str
+    happenings: tuple[Happening, ...]
+    begin: float
+    end: float
+    minds: tuple[Mind, ...] = field(repr=False, default=())
+    always: frozenset[str] = frozenset()
+
+
+def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
+    """The happenings of a run.
+
+    Args:
+        name: Of the run.
+        minds: What was believed, in the order of time.
+    """
+    kept = tuple(minds)
+    spells: dict[Symbol, list[list[float]]] = {}
+    gone: set[str] = set()
+    named: set[str] = set()
+    for mind in kept:
+        names = names_of(mind)
+        named |= set(names.values())
+        gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
+        for symbol, truth in _held(mind, names):
+            _note(spells.setdefault(symbol, []), truth, mind.time)
+    begin, end = (kept[0].time, kept[-1].time) if kept else (0.0, 0.0)
+    found = [h for s, rows in spells.items() for h in _happenings(s, rows, end)]
+    found += [p for h in found if (p := _parted(h, end)) is not None]
+    return RunTrace(
+        name,
+        tuple(sorted(found, key=lambda h: (h.begin, h.symbol))),
+        begin,
+        end,
+        kept,
+        frozenset(named - gone),
+    )
+
+
+def names_of(mind: Mind) -> dict[int, str]:
+    """Objects by the actor that each plays or the model that it is believed to be, one for a name."""
+    found: dict[str, int] = {}
+    for number in sorted(mind.objects):
+        name = believed_name(mind, number)
+        if name is not None and mind.objects[number].confirmed:
+            found.setdefault(name, number)
+    return {i: n for n, i in found.items()}
+
+
+def _held(mind: Mind, names: dict[int, str]) -> Iterator[tuple[Symbol, Truth]]:
+    relations = RelationLookup(mind)
+    ordered = sorted(names, key=names.__getitem__)
+    for a, b in combinations(ordered, 2):
+        for action in OF_PAIRS:
+            yield (action, (names[a], names[b])), relations.find(action, (a, b)).truth
+
+
+def _note(rows: list[list[float]], truth: Truth, now: float) -> None:
+    """Rows of begin and end; one that goes on has no end yet."""
+    going = bool(rows) and len(rows[-1]) == 1
+    if truth is Truth.TRUE and not going:
+        if rows and now - rows[-1][1] < BREAK_S:
+            rows[-1].pop()
+        else:
+            rows.append([now])
+    elif truth is Truth.FALSE and going:
+        rows[-1].append(now)
+
+
+def _happenings(symbol: Symbol, rows: list[list[float]], end: float) -> Iterator[Happening]:
+    for row in rows:
+        begin, until = row[0], row[1] if len(row) > 1 else end
+        if until - begin >= LEAST_S[symbol[0]]:
+            yield Happening(symbol, begin, until)
+
+
+def _parted(coupling: Happening, end: float) -> Happening | None:
+    """That a coupling came to its end."""
+    if coupling.symbol[0] != "coupled" or end - coupling.end < LEAST_S["decoupled"]:
+        return None
+    return Happening(("decoupled", coupling.symbol[1]), coupling.end, end)

@@ -1,0 +1,73 @@
+"""The evaluation of damaged files finds what is wrong, and nothing is."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.oracles.hardening.fuzzing import fuzz
+from tests.oracles.hardening.mutations import mutated
+from tests.oracles.hardening.runner import evaluate_hardening
+from tests.oracles.hardening.subjects import Subject
+from visup.agent.model.errors import SettingsError, SourceError
+
+SMALL = ["tasks", "rules", "zones", "settings", "answers", "databases", "states", "pictures"]
+
+
+def test_damaged_files_are_read_or_refused_within_bounds() -> None:
+    figures = evaluate_hardening(count=15, seed=11, races=4, kind=SMALL)
+    assert figures["failures"] == []
+    assert figures["total"]["files"] == 15 * len(SMALL)
+    assert figures["total"]["refused"] > 30
+    assert figures["total"]["lost"] == 0
+
+
+def test_journals_whose_content_is_odd_are_read_or_refused() -> None:
+    kinds = ["journals", "journals of other content", "resumed journals"]
+    figures = evaluate_hardening(count=8, seed=12, races=0, kind=kinds)
+    assert figures["failures"] == []
+
+
+def test_an_unknown_kind_is_refused() -> None:
+    with pytest.raises(SettingsError, match="one of: tasks"):
+        evaluate_hardening(count=1, kind=["spoons"])
+
+
+def read_of(number: int) -> None:
+    match number:
+        case 1:
+            raise SourceError("refused")
+        case 2:
+            raise ValueError("a traceback")
+        case 3:
+            os.abort()
+        case 4:
+            bytearray(2**32)
+        case 5:
+            os.system("true")  # noqa: S605
+
+
+def test_whatever_goes_wrong_is_found(tmp_path: Path) -> None:
+    """Without this the tests above could not fail."""
+
+    def make(folder: Path, rng: random.Random) -> None:
+        (folder / "n").write_text(str(len(list(tmp_path.glob("*.n")))))
+        (tmp_path / f"{time.monotonic_ns()}.n").touch()
+
+    subject = Subject(make, lambda folder: read_of(int((folder / "n").read_text())))
+    found = fuzz(subject, 7, 0, tmp_path)
+    assert found.outcomes == {
+        "read": 2, "refused": 1, "raised": 1, "crashed": 1, "memory": 1, "ran": 1
+    }  # fmt: skip
+    assert len(found.failures) == 4
+
+
+def test_the_same_seed_damages_in_the_same_way() -> None:
+    seeds = [b"gap(a, b) < 20 px", b"0123456789" * 9]
+    once, twice = ([mutated(seeds, random.Random(n)) for n in range(200)] for _ in range(2))
+    assert once == twice
+    assert len(set(once)) > 150

@@ -1,0 +1,126 @@
+"""Deliberate mistakes: each is told with its place, what was expected, and a change that makes it legal."""
+
+import pytest
+
+from visup.agent.model.errors import ErrorGroup, RuleError, SourceLocation, VisupError
+from visup.rules.language.fixes import fix_of
+from visup.rules.language.parser import parse_rules
+
+CONDITIONS = [
+    "not touching(a, b), seen(a)",
+    "touching(a, b), not coupled(a, b)",
+    "rising(gap(a, b) > 3 px) and",
+    "sqrt(gap(a, b)) > 3 px",
+    "gap(a, b) = 3 px",
+    "gap(a, b) === 3 px",
+    "touching(a, b) -> coupled(a, b)",
+    "touching(a, b) => coupled(a, b)",
+    "touching(a, b) && seen(a)",
+    "touching(a, b) || seen(a)",
+    "!touching(a, b)",
+    "historically touching(a, b)",
+    "touching(a, b) within 5",
+    "touching(a, b) for 2",
+    "touching(a, b) for 2 seconds",
+    "touching(a, b) FOR 2 s",
+    "gap(a, b) between 3 px and 5 px",
+    "globally touching(a, b)",
+    "F[5 s] touching(a, b)",
+    "touching(a, b) until seen(a)",
+    "exists touching(a, c) and seen(b)",
+    "forall c touching(a, c) and seen(b)",
+    "exist c: touching(a, c) and seen(b)",
+    "gap(a, b) < 3",
+    "gap(a, b) < 3 s",
+    "gap(a, b) < 3 pixels",
+    "gap(a b) < 3 px",
+    "touching(a, b",
+    "touching a b",
+    "touchng(a, b)",
+    "touching(a)",
+    "touching(a, a) and seen(b)",
+    "gap(a, b) > 3px and",
+    "gap(a, b) 3 px",
+    "3 px < gap(a, b) < 5 px",
+    "touching(a, b) in 3 of 5",
+    "touching(a, b) in 60% of 5",
+    "touching(a, b) for 5 s ago",
+    "previously touching(a, b)",
+    "next touching(a, b)",
+    "touching(a, b) unless seen(a) unless seen(b)",
+    "hidden(a) and and seen(b)",
+    "named(a) and seen(b)",
+    "inside(a, bay, x) and seen(b)",
+    "time_to_contact(a, b) < 5 sec",
+    "abs(gap(a, b) < 3 px",
+    "touching(a, b) for -2 s",
+    "touching(a, b) before seen(a)",
+]
+RULES = [
+    'rule r(a, b) info\n when touching(a, b)\n say "x"',
+    'rule r(a, b): error\n when touching(a, b)\n say "{a}{b}"',
+    'rule r(a, b): info\n if touching(a, b)\n say "{a}{b}"',
+    "rule r(a, b): info\n when touching(a, b)\n say '{a}'",
+    'rule r(a, b): info\n when touching(a, b)\n hold 3\n say "{a}"',
+    'rule (a, b): info\n when touching(a, b)\n say "{a}"',
+    'Rule r(a, b): info\n when touching(a, b)\n say "{a}"',
+    "rule r(a, b): info\n when touching(a, b)",
+    'rule r(a, b): info\n say "{a}"\n when touching(a, b)',
+    'rule r(a, b): info\n when touching(a, b)\n say "{a}"\n hold 3 s',
+    '// comment\nrule r(a, b): info\n when touching(a, b)\n say "{a}"',
+    'rule r a b: info\n when touching(a, b)\n say "{a}"',
+    'rule r(a, b): INFO\n when touching(a, b)\n say "{a}"',
+    'rule r(a, b): info\n when touching(a, b);\n say "{a}"',
+    'rule r-1(a, b): info\n when touching(a, b)\n say "{a}"',
+]
+
+
+def errors_of(text: str) -> list[VisupError]:
+    try:
+        parse_rules(text, "my.rules")
+    except ErrorGroup as group:
+        return list(group.errors)
+    except RuleError as error:
+        return [error]
+    return []
+
+
+def rule(condition: str) -> str:
+    return f'rule r(a, b): info\n    when {condition}\n    say "{{a}} {{b}}"\n'
+
+
+@pytest.mark.parametrize("text", [*map(rule, CONDITIONS), *RULES])
+def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
+    errors = errors_of(text)
+    assert errors
+    for error in errors:
+        assert isinstance(error.where, SourceLocation)
+        assert "^" in str(error)
+    for _ in range(5):
+        if not errors:
+            break
+        fixes = (
+            fix_of(text, e.where, e.hint) for e in errors if isinstance(e.where, SourceLocation)
+        )
+        fix = next((f for f in fixes if f is not None), None)
+        assert fix is not None, [str(e) for e in errors]
+        text = fix.applied(text)
+        errors = errors_of(text)
+    assert errors == [], text
+
+
+def test_a_slip_hides_nothing_of_what_else_is_wrong_with_the_rule() -> None:
+    found = errors_of(rule("touchng(a, b), gap(a, b) < 3 && sen(a)"))
+    whats = [e.what for e in found]
+    assert len(found) == 5
+    assert "there is no relation or fact 'touchng'" in whats
+    assert "there is no relation or fact 'sen'" in whats
+    assert "a length is compared with a number" in whats
+    columns = [e.where.column for e in found if isinstance(e.where, SourceLocation)]
+    assert columns == sorted(columns)
+    assert {10, 23, 25, 39, 42} == set(columns)
+
+
+def test_what_is_no_rule_at_all_is_told_in_time() -> None:
+    noise = "rule " + "( ) when or and [ for 2 " * 300
+    assert errors_of(noise)

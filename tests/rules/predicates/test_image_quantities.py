@@ -1,0 +1,68 @@
+"""Place, size, direction and number of objects as rules may ask for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+
+import pytest
+
+from tests.rules.predicates.test_certainty import mind_of
+from visup.agent import Candidate, Mind, Presence
+from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.predicates.vocabulary import QUANTITIES
+
+
+def asked(mind: Mind, name: str, *words: str) -> list[float]:
+    """The lower bounds of a quantity of all objects."""
+    table = QUANTITIES[name].look(Snapshot(mind), *words)
+    return [float(v) for v in table[0].ravel()]
+
+
+def test_place_and_size_are_those_of_the_boxes() -> None:
+    mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
+    assert asked(mind, "width") == [150, 40]
+    assert asked(mind, "height") == [120, 60]
+    assert asked(mind, "position_x") == pytest.approx([274.5, 519.5], abs=1.0)
+    assert asked(mind, "position_y") == pytest.approx([359.5, 129.5], abs=1.0)
+    width, height = mind.frame_size
+    assert asked(mind, "area") == pytest.approx(
+        [150 * 120 / width / height, 40 * 60 / width / height], rel=0.05
+    )
+    apart = asked(mind, "centre_distance")
+    assert apart[1] == pytest.approx(((519.5 - 274.5) ** 2 + 230**2) ** 0.5, abs=2.0)
+    assert apart == [0.0, apart[1], apart[1], 0.0]
+
+
+def test_overlap_is_intersection_over_union() -> None:
+    mind = mind_of((100, 100, 100, 100), (150, 100, 100, 100))
+    assert asked(mind, "overlap") == pytest.approx([1.0, 1 / 3, 1 / 3, 1.0])
+
+
+def test_what_is_out_of_sight_or_at_rest_is_unknown() -> None:
+    mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
+    assert asked(mind, "heading") == [-inf, -inf]
+    hidden = replace(mind.objects[2], presence=Presence.HIDDEN)
+    mind = mind.with_objects(hidden)
+    assert asked(mind, "width") == [150, -inf]
+    assert asked(mind, "overlap")[1] == -inf
+
+
+@pytest.mark.parametrize(
+    ("velocity", "degrees"), [((50, 0), 0), ((0, -50), 90), ((-50, 0), 180), ((0, 50), 270)]
+)
+def test_heading_is_where_it_moves_in_the_image(
+    velocity: tuple[float, float], degrees: float
+) -> None:
+    mind = mind_of((200, 300, 150, 120))
+    region = replace(mind.objects[1].region, velocity=velocity)
+    moving = mind.with_objects(replace(mind.objects[1], region=region))
+    assert asked(moving, "heading") == pytest.approx([degrees])
+
+
+def test_objects_are_counted_those_of_a_name_within_bounds() -> None:
+    mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
+    assert asked(mind, "objects") == [2.0]
+    named = replace(mind.objects[1], candidates=(Candidate("mug", 5.0, 0.9),))
+    table = QUANTITIES["objects_named"].look(Snapshot(mind.with_objects(named)), "mug")
+    assert table.tolist() == [1.0, 2.0]

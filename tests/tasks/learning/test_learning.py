@@ -1,0 +1,225 @@
+"""Tasks learned from runs: what all runs share, in their order; what a bad run alone does is forbidden."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.tasks.scripted import Script, Spell, play
+from visup.agent import Mind, Outcome, Verdict
+from visup.agent.model.errors import TaskError
+from visup.tasks import parse_task
+from visup.tasks.learning.coverage import coverage_of, share_covered
+from visup.tasks.learning.fitting import fitted_amounts, with_amounts
+from visup.tasks.learning.induction import learn_task
+from visup.tasks.learning.judging import judged
+from visup.tasks.learning.languages import difference
+from visup.tasks.learning.order import (
+    Free,
+    Loop,
+    Series,
+    leaves_of,
+    plan_of,
+    shared,
+    with_loops,
+)
+from visup.tasks.learning.traces import RunTrace, trace_of
+
+ARM, PART, TRAY, CRATE = 1, 2, 3, 4
+NAMES = {
+    ARM: {"arm": 0.9},
+    PART: {"part": 0.9},
+    TRAY: {"tray": 0.9},
+    CRATE: {"crate": 0.9},
+}
+
+
+def run_of(name: str, spells: Sequence[Spell], until: float = 40.0) -> RunTrace:
+    script = Script(tuple(spells), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+    minds: list[Mind] = []
+
+    def keep(mind: Mind, observation: object) -> Outcome:
+        minds.append(mind)
+        return Outcome(mind)
+
+    play(keep, script, until, fps=5.0)
+    return trace_of(name, minds)
+
+
+def picked(name: str, seed: int, spoilt: str = "") -> RunTrace:
+    """The arm comes to the part, couples, brings it to the tray, lets go."""
+    rng = Random(seed)
+    t1, t2, t3, t4 = (sum(rng.uniform(2.5, 5.0) for _ in range(k)) for k in (1, 2, 3, 4))
+    spells = [
+        Spell("converging", 0.6, t1 + 0.4, (ARM, PART)),
+        Spell("touching", t1, t4, (ARM, PART)),
+        Spell("coupled", t1 + 0.8, t4, (ARM, PART)),
+        Spell("converging", t2, t3, (PART, TRAY)),
+        Spell("touching", t3, 1e9, (PART, TRAY)),
+        Spell("diverging", t4, t4 + 6.0, (ARM, PART)),
+    ]
+    if rng.random() < 0.5:  # something that some runs have, by the way
+        spells.append(Spell("converging", 1.0, 3.0, (CRATE, TRAY)))
+    if spoilt == "never":
+        spells = spells[:1]
+    elif spoilt == "drop":
+        spells[2] = Spell("coupled", t1 + 0.8, t2, (ARM, PART))
+        spells[1] = Spell("touching", t1, t2, (ARM, PART))
+        spells[3:] = [Spell("diverging", t2, t2 + 8.0, (ARM, PART))]
+    elif spoilt == "bump":
+        spells.append(Spell("touching", t2, t2 + 2.0, (ARM, CRATE)))
+    return run_of(name, spells)
+
+
+GOOD = [picked(f"good{k}", k) for k in range(3)]
+BAD = [picked("drop", 50, "drop"), picked("bump", 51, "bump")]
+
+
+def test_a_task_learned_from_three_runs_accepts_others_and_refuses_bad_ones() -> None:
+    learned = learn_task("bring", GOOD, BAD)
+    task = parse_task(learned.text)
+    assert set(learned.good.values()) == {Verdict.SUCCEEDED}
+    others = [judged(task, picked("x", k).minds).verdict for k in range(10, 16)]
+    assert others.count(Verdict.SUCCEEDED) == 6
+    kinds = ("never", "drop", "bump")
+    bad = [judged(task, picked("x", 30 + k, kinds[k % 3]).minds).verdict for k in range(6)]
+    assert Verdict.SUCCEEDED not in bad
+    assert all(v is not Verdict.SUCCEEDED for v in learned.bad.values())
+    assert "never touching(arm, crate)" in learned.text
+    assert "in 3 of 3 runs" in learned.text
+    assert "crate, tray" not in learned.text  # some runs had it only
+
+
+def test_what_was_learned_differs_little_from_what_one_writes() -> None:
+    learned = parse_task(learn_task("bring", GOOD).text)
+    written = parse_task(
+        "<bring> ::= <approach> <grasp> <carry> <place> <release>\n"
+        "<approach> ::= converging(arm, part)\n<grasp> ::= coupled(arm, part)\n"
+        "<carry> ::= converging(part, tray)\n<place> ::= touching(part, tray)\n"
+        "<release> ::= decoupled(arm, part)"
+    )
+    found = difference(learned, written)
+    courses = [c for c in (found.only_first, found.only_second) if c is not None]
+    assert len(courses) <= 2
+    assert all(len(c) >= 4 for c in courses)
+
+
+def test_runs_with_nothing_in_common_teach_nothing() -> None:
+    with pytest.raises(TaskError, match="nothing in common"):
+        learn_task("t", [run_of("idle", ())])
+
+
+A, B, C, D = (("touching", (n, "top")) for n in "abcd")
+
+
+def test_what_comes_in_either_order_is_free_and_the_rest_is_not() -> None:
+    words = [(A, B, C, D), (A, C, B, D)]
+    plan = plan_of(words, shared(words, 1.0))
+    assert plan == Series(((A, 0), Free(((B, 0), (C, 0))), (D, 0)))
+
+
+def test_what_repeats_is_a_loop_when_that_is_shorter() -> None:
+    words, times = with_loops([(A, B, C, B, C, B, C, D), (A, B, C, B, C, D)])
+    loop = Loop((B, C))
+    assert words == [(A, loop, D), (A, loop, D)]
+    assert times == {loop: (2, 3)}
+    once, none = with_loops([(A, B, A, C)])
+    assert (once, none) == ([(A, B, A, C)], {})
+
+
+@given(st.lists(st.permutations([A, B, C, D]), min_size=1, max_size=5))
+def test_a_plan_holds_each_thing_once_and_keeps_every_order_that_all_share(
+    orders: list[list[object]],
+) -> None:
+    words = [tuple(o) for o in orders]
+    plan = plan_of(words, shared(words, 1.0))  # type: ignore[arg-type]
+    found = [o[0] for o in leaves_of(plan)]
+    assert set(found) == {A, B, C, D}
+    assert len(found) == 4
+    for x in words[0]:
+        for y in words[0]:
+            if x != y and all(w.index(x) < w.index(y) for w in words):
+                assert found.index(x) < found.index(y)  # type: ignore[arg-type]
+
+
+TEXT = """# how a part is brought
+<bring> ::= <reach> <grasp> <let_go>   # three stages
+<reach> ::= converging(arm, part) within 90 s
+<grasp> ::= coupled(arm, part) for 1 s
+<let_go> ::= decoupled(arm, part)
+"""
+
+
+def test_durations_are_fitted_in_their_places_and_all_else_stays() -> None:
+    task = parse_task(TEXT)
+    runs = [judged(task, run.minds) for run in GOOD]
+    fitted = fitted_amounts(task, runs)
+    assert next(f.clause for f in fitted) == "within 90 s"
+    text = with_amounts(TEXT, fitted)
+    assert parse_task(text)
+    assert text.splitlines()[:2] == TEXT.splitlines()[:2]
+    assert "90 s" not in text
+    assert all(judged(parse_task(text), r.minds).verdict is Verdict.SUCCEEDED for r in GOOD)
+
+
+def test_coverage_names_what_no_run_went_through() -> None:
+    task = parse_task(
+        "<t> ::= <reach> (<grasp> | <miss>)\n<reach> ::= converging(arm, part)\n"
+        "<grasp> ::= coupled(arm, part) decoupled(arm, part)\n<miss> ::= diverging(arm, part) for 30 s"
+    )
+    stages = coverage_of(task, [judged(task, run.minds) for run in GOOD])
+    said = [str(s) for s in stages]
+    assert said == [
+        "<reach>: done in 3 of 3, never failed",
+        "<grasp>: done in 3 of 3, never failed",
+        "<miss>: never begun",
+    ]
+    assert share_covered(stages) == pytest.approx(2 / 3)
+
+
+SAME = [
+    ("<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)",
+     "<other> ::= touching(y, x) <rest>\n<rest> ::= coupled(x, y)"),
+    ("<t> ::= any order (touching(a, b), touching(c, d))",
+     "<t> ::= touching(a, b) touching(c, d) | touching(c, d) touching(a, b)"),
+    ("<t> ::= touching(a, b)+", "<t> ::= touching(a, b) touching(a, b)*"),
+]  # fmt: skip
+UNLIKE = [
+    ("<t> ::= touching(a, b) coupled(a, b)", "<t> ::= coupled(a, b) touching(a, b)",
+     "touching(a, b), then coupled(a, b)", "coupled(a, b), then touching(a, b)"),
+    ("<t> ::= touching(a, b) coupled(a, b)?", "<t> ::= touching(a, b) coupled(a, b)",
+     "touching(a, b)", None),
+    ("<t> ::= touching(a, b) & present(a)", "<t> ::= touching(a, b)",
+     "present(a) & touching(a, b)", "touching(a, b)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("one", "two"), SAME)
+def test_tasks_of_one_language_do_not_differ_however_they_are_written(one: str, two: str) -> None:
+    found = difference(parse_task(one), parse_task(two))
+    assert (found.only_first, found.only_second, found.whole) == (None, None, True)
+
+
+@pytest.mark.parametrize(("one", "two", "first", "second"), UNLIKE)
+def test_the_shortest_course_that_one_alone_allows_is_told(
+    one: str, two: str, first: str, second: str | None
+) -> None:
+    found = difference(parse_task(one), parse_task(two))
+    lines = list(found.lines("A", "B"))
+    assert f"only A allows: {first}; B does not" in lines
+    assert (second is None) == (found.only_second is None)
+    if second is not None:
+        assert f"only B allows: {second}; A does not" in lines
+
+
+def test_times_and_invariants_that_differ_are_told() -> None:
+    one = parse_task("<t> ::= touching(a, b) within 5 s\nnever touching(a, c)\nactor c is red")
+    two = parse_task("<t> ::= touching(a, b) within 9 s")
+    said = "\n".join(difference(one, two).lines("A", "B"))
+    assert "both allow the same courses" in said
+    assert "only the first has never touching(a, c) (invariants)" in said
+    assert "within 9 s" in said

@@ -1,0 +1,110 @@
+"""Order that is meant: a stage is done by what happens in it, unless it says `already`."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import pytest
+
+from tests.tasks.scripted import Played, Script, Spell, play, task_of
+from visup.agent import Status, Verdict
+from visup.tasks import parse_task
+from visup.tasks.supervision.supervise import finish, task_reasoner
+
+TOP, LEGS = 1, (2, 3, 4)
+NAMES = {TOP: {"top": 0.9}, **{k: {f"leg_{n}": 0.9} for n, k in enumerate(LEGS, 1)}}
+HERE = dict.fromkeys(NAMES, (0.0, 1e9))
+TWO = "<t> ::= <a> <b>\n<a> ::= touching(leg_1, top)\n<b> ::= {}touching(leg_2, top)"
+
+
+def scene(*meetings: tuple[int, float]) -> Script:
+    """Legs that meet the top, each from a time on; `(3, 5.0)`: the second leg from 5 s."""
+    spells = tuple(Spell("touching", since, 1e9, (TOP, leg)) for leg, since in meetings)
+    return Script(spells, objects=HERE, identities=NAMES)
+
+
+def watched(text: str, script: Script, until: float = 30.0) -> Played:
+    return play(task_reasoner([parse_task(text)]), script, until)
+
+
+def verdict(text: str, script: Script, until: float = 30.0) -> Verdict:
+    return finish(task_of(watched(text, script, until)))
+
+
+def test_what_is_assembled_in_its_order_succeeds() -> None:
+    assert verdict(TWO.format(""), scene((2, 3.0), (3, 8.0))) is Verdict.SUCCEEDED
+
+
+@pytest.mark.parametrize("since", [0.0, 2.0, 6.0])
+def test_what_was_so_before_its_turn_is_not_done_in_it(since: float) -> None:
+    played = watched(TWO.format(""), scene((2, 10.0), (3, since)))
+    assert finish(task_of(played)) is Verdict.FAILED
+    (told,) = (s for s in task_of(played).stages if s.stage == "b")
+    assert told.status in (Status.FAILING, Status.FAILED)
+    assert any("before stage `b` began" in e.text for e in played.events)
+
+
+@pytest.mark.parametrize("since", [0.0, 2.0, 6.0])
+def test_already_takes_what_was_so_before(since: float) -> None:
+    assert verdict(TWO.format("already "), scene((2, 10.0), (3, since))) is Verdict.SUCCEEDED
+
+
+def test_what_ceases_and_becomes_so_again_is_done_in_its_turn() -> None:
+    spells = (
+        Spell("touching", 10.0, 1e9, (TOP, 2)),
+        Spell("touching", 2.0, 12.0, (TOP, 3)),
+        Spell("touching", 18.0, 1e9, (TOP, 3)),
+    )
+    assert (
+        verdict(TWO.format(""), Script(spells, objects=HERE, identities=NAMES)) is Verdict.SUCCEEDED
+    )
+
+
+@pytest.mark.parametrize("order", list(permutations(LEGS)))
+def test_any_order_of_three_is_any_order(order: tuple[int, ...]) -> None:
+    text = "<t> ::= any order (<a>, <b>, <c>)\n" + "\n".join(
+        f"<{n}> ::= touching(leg_{k}, top)" for k, n in enumerate("abc", 1)
+    )
+    meetings = [(leg, 4.0 + 5.0 * k) for k, leg in enumerate(order)]
+    played = watched(text, scene(*meetings))
+    assert finish(task_of(played)) is Verdict.SUCCEEDED
+    # What is finished is told as soon as the next begins, whichever that is.
+    done = {s.stage for s in task_of(played, 13.5).stages if s.status is Status.DONE}
+    assert len(done) >= 2
+
+
+@pytest.mark.parametrize(
+    ("legs", "expected"),
+    [((2, 3), Verdict.SUCCEEDED), ((4, 2), Verdict.SUCCEEDED), ((3,), Verdict.IN_PROGRESS)],
+)
+def test_any_two_of_three(legs: tuple[int, ...], expected: Verdict) -> None:
+    text = "<t> ::= any 2 of (touching(leg_1, top), touching(leg_2, top), touching(leg_3, top))"
+    assert verdict(text, scene(*((leg, 4.0 + 5.0 * k) for k, leg in enumerate(legs)))) is expected
+
+
+def test_a_stage_with_an_actor_as_parameter_is_one_stage_for_each() -> None:
+    text = (
+        "<t> ::= for each leg of (leg_1, leg_2, leg_3) <mount(leg)>\n"
+        "<mount(leg)> ::= touching(leg, top)"
+    )
+    played = watched(text, scene((3, 4.0), (2, 9.0), (4, 14.0)))
+    assert finish(task_of(played)) is Verdict.SUCCEEDED
+    names = {s.stage for s in task_of(played).stages}
+    assert names == {"mount(leg_1)", "mount(leg_2)", "mount(leg_3)"}
+
+
+def test_a_failure_may_be_recovered_from_where_a_way_out_is_said() -> None:
+    text = (
+        "<t> ::= <reach> <grasp>\n<reach> ::= converging(leg_1, top)\n"
+        "<grasp> ::= touching(leg_1, top)\n"
+        "on failure of <grasp>: diverging(leg_1, top) converging(leg_1, top) <grasp>"
+    )
+    pair = (TOP, 2)
+    spells = (
+        Spell("converging", 1.0, 5.0, pair),
+        Spell("diverging", 5.0, 10.0, pair),
+        Spell("converging", 10.0, 14.0, pair),
+        Spell("touching", 14.0, 1e9, pair),
+    )
+    script = Script(spells, objects=HERE, identities=NAMES)
+    assert verdict(text, script) is Verdict.SUCCEEDED

@@ -1,0 +1,126 @@
+"""Recorded objects in the forms of other tools: MOT, COCO, CSV."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from io import StringIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from visup.agent.model.errors import OutputError, SettingsError
+from visup.agent.storage.atomic import write_whole
+from visup.api.recorded import RecordedObject, RecordedRun, open_run
+
+COLUMNS = (
+    "frame_index",
+    "time",
+    "id",
+    "name",
+    "share",
+    "presence",
+    "x",
+    "y",
+    "width",
+    "height",
+    "area",
+)
+
+
+def export(
+    run: RecordedRun | str | os.PathLike[str], form: str, target: str | os.PathLike[str]
+) -> int:
+    """Write the objects of a run for other tools.
+
+    Args:
+        run: A run, or its folder.
+        form: `mot` (MOT Challenge: a line a box, frames from 1), `coco` (COCO JSON with `track_id`) or `csv`
+            (all that is believed, also of hidden objects).
+        target: The file.
+
+    Returns:
+        How many boxes were written.
+
+    Raises:
+        SettingsError: There is no such form.
+        OutputError: The run cannot be read, or the file cannot be written.
+    """
+    if form not in FORMS:
+        raise SettingsError(f"there is no form '{form}'", expected=f"one of: {', '.join(FORMS)}")
+    recorded = run if isinstance(run, RecordedRun) else open_run(run)
+    text, count = FORMS[form](recorded)
+    try:
+        write_whole(Path(target), text.encode("utf-8"))
+    except OSError as fault:
+        what = f"the file cannot be written ({fault.strerror})"
+        raise OutputError(what, where=str(target)) from fault
+    return count
+
+
+def _seen(run: RecordedRun) -> Iterator[RecordedObject]:
+    """Objects in view that are more than a passing impression."""
+    return (o for o in run.objects if o.confirmed and o.presence == "seen")
+
+
+def _mot(run: RecordedRun) -> tuple[str, int]:
+    lines = [
+        f"{o.frame_index + 1},{o.id},{','.join(map(str, o.bbox))},{o.share or 1.0:.3f},-1,-1,-1"
+        for o in _seen(run)
+    ]
+    return "".join(f"{line}\n" for line in lines), len(lines)
+
+
+def _coco(run: RecordedRun) -> tuple[str, int]:
+    width, height = run.facts.get("size") or (0, 0)
+    source = str(run.facts.get("source", ""))
+    seen = list(_seen(run))
+    names = {name: n for n, name in enumerate(sorted({o.name for o in seen}), start=1)}
+    images = [
+        {
+            "id": s.frame_index,
+            "file_name": f"{source}#{s.frame_index}",
+            "width": width,
+            "height": height,
+        }
+        for s in run.steps
+    ]
+    annotations = [
+        {
+            "id": number,
+            "image_id": o.frame_index,
+            "category_id": names[o.name],
+            "bbox": list(o.bbox),
+            "area": o.area,
+            "iscrowd": 0,
+            "track_id": o.id,
+            "score": o.share or 1.0,
+        }
+        for number, o in enumerate(seen, start=1)
+    ]
+    made: dict[str, Any] = {
+        "info": {"description": f"visup run of {source}"},
+        "images": images,
+        "categories": [{"id": n, "name": name} for name, n in names.items()],
+        "annotations": annotations,
+    }
+    return json.dumps(made) + "\n", len(annotations)
+
+
+def _csv(run: RecordedRun) -> tuple[str, int]:
+    out = StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    count = 0
+    for o in run.objects:
+        writer.writerow((o.frame_index, o.time, o.id, o.name, o.share, o.presence, *o.bbox, o.area))
+        count += 1
+    return out.getvalue(), count
+
+
+FORMS: Mapping[str, Callable[[RecordedRun], tuple[str, int]]] = MappingProxyType(
+    {"mot": _mot, "coco": _coco, "csv": _csv}
+)
+"""Form -> what makes its text, and counts its boxes."""

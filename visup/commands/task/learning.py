@@ -1,0 +1,151 @@
+"""`visup task learn`, `fit`, `coverage` and `diff`: tasks from runs, and tasks against each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from visup.terminal.console import echo, echo_json
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from visup.tasks.grammar.nodes import Task
+    from visup.tasks.learning.judging import JudgedRun
+
+Runs = Annotated[list[Path], typer.Argument(help="Run folders of `visup watch`, or journals.")]
+OneTask = Annotated[str, typer.Argument(help="A task file, `file.task:NAME`, or a shipped task.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
+
+
+def learn(
+    runs: Runs,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Write the task here.")],
+    bad: Annotated[
+        list[Path] | None,
+        typer.Option("--bad", metavar="RUN", help="A run that went wrong; repeatable."),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the task; that of the file if left out.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Propose a task file from good runs: stages in the order that all share, with their evidence.
+
+    Exit code: 1 when a good run is not accepted by it or a bad one is.
+    """
+    from visup.agent import Verdict
+    from visup.runs.learning_runs import declared_actors, run_trace
+    from visup.tasks.learning.induction import learn_task
+
+    _writable(out)
+    declared = {n: a for run in runs for n, a in declared_actors(run).items()}
+    word = name or "".join(c if c.isalnum() else "_" for c in out.stem)
+    good = [run_trace(run) for run in runs]
+    learned = learn_task(word, good, [run_trace(run) for run in bad or ()], declared)
+    out.write_text(learned.text, encoding="utf-8")
+    wrong = [n for n, v in learned.good.items() if v is not Verdict.SUCCEEDED]
+    wrong += [n for n, v in learned.bad.items() if v is Verdict.SUCCEEDED]
+    if as_json:
+        told = {n: v.value for n, v in (*learned.good.items(), *learned.bad.items())}
+        echo_json({"file": str(out), "verdicts": told, "left_out": learned.dropped}, indent=2)
+    else:
+        echo(learned.text, nl=False)
+        for what in learned.dropped:
+            echo(f"left out: {what}")
+        for run, verdict in (*learned.good.items(), *learned.bad.items()):
+            echo(f"{run}: {verdict.value.replace('_', ' ')}")
+    raise typer.Exit(1 if wrong else 0)
+
+
+def fit(
+    file: Annotated[Path, typer.Argument(help="A task file; it is changed in place.")],
+    runs: Runs,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would change.")] = False,
+) -> None:
+    """Fit `within` and `for` of a task file to good runs; all else in the file stays."""
+    from visup.tasks.checks.files import read_text
+    from visup.tasks.checks.load import load_task
+    from visup.tasks.learning.fitting import fitted_amounts, with_amounts
+
+    task = load_task(str(file))
+    fitted = fitted_amounts(task, _judged(task, runs))
+    for change in fitted:
+        echo(f"<{change.stage}>: {change.clause} -> {change.new} ({change.seen})")
+    if not fitted:
+        echo("Nothing changes.")
+    elif not dry_run:
+        _writable(file)
+        file.write_text(with_amounts(read_text(str(file)), fitted), encoding="utf-8")
+
+
+def coverage(file: OneTask, runs: Runs, as_json: AsJson = False) -> None:
+    """Show which stages of a task runs have gone through, and which never.
+
+    Exit code: 1 when a stage was never seen through.
+    """
+    from visup.tasks.checks.load import load_task
+    from visup.tasks.learning.coverage import coverage_of, share_covered
+
+    task = load_task(file)
+    stages = coverage_of(task, _judged(task, runs))
+    share = share_covered(stages)
+    if as_json:
+        rows: dict[str, Any] = {
+            s.stage: {
+                "runs": s.runs,
+                "begun": s.begun,
+                **{status.value: n for status, n in s.statuses.items()},
+            }
+            for s in stages
+        }
+        echo_json({"covered": share, "stages": rows}, indent=2)
+    else:
+        for stage in stages:
+            echo(str(stage))
+        echo(f"{share:.0%} of {len(stages)} stages were seen through")
+    raise typer.Exit(0 if share == 1.0 else 1)
+
+
+def diff(
+    first: OneTask,
+    second: OneTask,
+    as_json: AsJson = False,
+) -> None:
+    """Say how two tasks differ: by the courses that they allow, not by how they are written.
+
+    Exit code: 0 when they do not differ, 1 when they do.
+    """
+    from visup.tasks.checks.load import load_task
+    from visup.tasks.learning.languages import difference
+
+    found = difference(load_task(first), load_task(second))
+    lines = list(found.lines(f"`{first}`", f"`{second}`"))
+    if as_json:
+        echo_json({"same": not found, "differences": lines if found else []}, indent=2)
+    else:
+        for line in lines:
+            echo(line)
+    raise typer.Exit(1 if found else 0)
+
+
+def _judged(task: Task, runs: Sequence[Path]) -> list[JudgedRun]:
+    from visup.runs.learning_runs import run_judged
+
+    return [run_judged(task, run) for run in runs]
+
+
+def _writable(path: Path) -> None:
+    """Fail before the work and not after it.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    from visup.agent.model.errors import OutputError
+
+    if not path.parent.is_dir():
+        raise OutputError(
+            "there is no such folder", where=str(path.parent), hint="make it, or write elsewhere"
+        )

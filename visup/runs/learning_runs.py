@@ -1,0 +1,45 @@
+"""Recorded runs as what tasks are learned from: the minds of a run, reasoned anew from its journal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from visup.agent import Mind
+from visup.agent.storage.journal_reader import Recording
+from visup.runs.replay import replay, settings_for
+from visup.tasks import load_tasks
+from visup.tasks.grammar.nodes import Actor, Task
+from visup.tasks.learning.judging import JudgedRun, judged
+from visup.tasks.learning.traces import RunTrace, trace_of
+
+
+def run_minds(run: Path) -> tuple[Mind, ...]:
+    """What was believed in a recorded run, moment by moment.
+
+    Args:
+        run: A run folder of `visup watch`, or its journal.
+
+    Raises:
+        VisupError: There is no run, or it cannot be read.
+    """
+    recording = Recording.open(run)
+    minds: list[Mind] = []
+    replay(recording, settings_for(recording), None, lambda step: minds.append(step.mind))
+    return tuple(minds)
+
+
+def run_trace(run: Path) -> RunTrace:
+    """The happenings of a recorded run; raises as of `run_minds`."""
+    return trace_of(run.name if run.is_dir() else run.parent.name, run_minds(run))
+
+
+def run_judged(task: Task, run: Path) -> JudgedRun:
+    """A task on a recorded run; raises as of `run_minds`."""
+    return judged(task, run_minds(run))
+
+
+def declared_actors(run: Path) -> dict[str, Actor]:
+    """Actors as the tasks of a run declare them, by name; none of a run without a task."""
+    settings = settings_for(Recording.open(run))
+    tasks = [t for name in settings.tasks for t in load_tasks(name)]
+    return {a.name: a for t in tasks for a in t.actors}

@@ -1,0 +1,109 @@
+"""The report of a replay: with the video's frames where it is still there, else with outlines alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from visup.agent import Frame, Verdict
+from visup.agent.model.errors import ExtraMissingError, VisupError
+from visup.agent.model.step import Step
+from visup.agent.storage.journal_reader import Recording
+from visup.agent.storage.jsonable import to_jsonable
+from visup.report.collector import Collector
+from visup.runs.settings import WatchSettings
+from visup.runs.wiring import open_video
+from visup.tasks import load_tasks
+from visup.tasks.tools.outline import outline
+from visup.version import __version__
+
+GREY = 96
+"""Where the video is gone, outlines are drawn on such a ground, 0 to 255."""
+
+
+class ReplayReport:
+    """Gathers what the report of a replay needs; give it each step, and `write` at the end.
+
+    Args:
+        recording: What is replayed.
+        settings: What is reasoned with.
+    """
+
+    def __init__(self, recording: Recording, settings: WatchSettings) -> None:
+        kept = {
+            k: v for k, v in recording.facts().items() if k in ("source", "fps", "size", "live")
+        }
+        told = {"visup": __version__, "settings": to_jsonable(settings)}
+        self._facts = {**kept, **told, "replayed": str(recording.path)}
+        self._settings = settings
+        self._collector = Collector()
+        self._stack = ExitStack()
+        self._frames: Iterator[Frame] = iter(())
+        self._waiting: Frame | None = None
+        self.notes: tuple[str, ...] = ()
+
+    def __enter__(self) -> Self:
+        path = Path(self._settings.source)
+        if path.exists() and not path.is_char_device():
+            try:
+                self._frames = iter(self._stack.enter_context(open_video(self._settings)))
+                self._waiting = next(self._frames, None)
+            except VisupError:
+                self._waiting = None
+        if self._waiting is None:
+            self.notes = ("The video is not there any more: pictures show outlines alone.",)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.close()
+
+    def __call__(self, step: Step) -> None:
+        """Take note of one step."""
+        self._collector.add(step, self._frame(step))
+
+    def write(self, folder: Path, verdict: Verdict | None) -> Path | None:
+        """Write `report.html`.
+
+        Args:
+            folder: Of the new run.
+            verdict: How it ended.
+
+        Returns:
+            The file; None where the extra for reports is missing.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        from visup.report.page.html import write_report
+
+        courses = [outline(t) for name in self._settings.tasks for t in load_tasks(name)]
+        collected = self._collector.finish(
+            verdict, self._facts, problem=None, notes=self.notes, courses=courses
+        )
+        try:
+            write_report(collected, folder / "report.html")
+        except ExtraMissingError as missing:
+            self.notes = (*self.notes, str(missing))
+            return None
+        return folder / "report.html"
+
+    def _frame(self, step: Step) -> Frame:
+        """The frame of a step, or a grey one."""
+        while self._waiting is not None and self._waiting.index < step.frame_index:
+            self._waiting = next(self._frames, None)
+        width, height = step.mind.frame_size
+        found = self._waiting
+        if found is not None and found.index == step.frame_index and found.size == (width, height):
+            return Frame(step.frame_index, step.time, found.image)
+        image = np.full((height, width, 3), GREY, np.uint8)
+        return Frame(step.frame_index, step.time, image)
