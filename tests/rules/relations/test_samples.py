@@ -1,8 +1,11 @@
 """Samples of many minds in one memory: no history is changed by what comes after it."""
 
+from typing import Any
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.rules.geometry.regions import FAN
