@@ -131,7 +131,7 @@ def prospects_text(belief: TaskBelief) -> str:
     """What may come next and how likely the task still ends well, in one line."""
     said = [f"`{p.stage}` ({p.probability:.0%})" for p in belief.prospects]
     end = 1.0 - sum(p.probability for p in belief.prospects)
-    said += [f"the end ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
+    said += [f"no further stage ({end:.0%})"] if belief.success is not None and end >= 0.01 else []
     coming = f"next: {', '.join(said)}" if said else "next: unknown"
     if belief.success is None:
         return coming
