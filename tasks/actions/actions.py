@@ -134,7 +134,6 @@ _TABLE = (
         "held_by",
         holds=("coupled",),
         entry=("coupled", "in_contact"),
-        while_not=("converging",),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),

@@ -22,7 +22,8 @@ LIMITS = (1.5, 1.25, 0.5, 3.0, 4.0, 6.0)
 
 
 def windows(times: Floats, longest: float) -> NDArray[np.int64]:
-    return np.searchsorted(times, times[-1] - longest * np.array([0.25, 0.5, 1.0]) - 1e-6)
+    begins = times[-1] - longest * np.array([0.25, 0.5, 1.0]) - 1e-6
+    return np.asarray(np.searchsorted(times, begins), dtype=np.int64)
 
 
 def trend(times: Floats, values: Floats, noise: float = 0.7) -> tuple[float, float]:
