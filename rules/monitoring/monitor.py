@@ -88,13 +88,25 @@ def _run(step: Operation, slot: int) -> Run:
         return _remembering(_update(step.operator), slot, one, other)
     if step.node is not None:
         name = step.node.name
-        return lambda v, before, after, now, signals: known_interval(signals.get(name))
+        return _looking(name)
     if step.kind == "number":
         return lambda v, before, after, now, signals: (first, first)
     function = _FUNCTIONS[step.kind]
     if len(step.reads) == 2:
         return lambda v, before, after, now, signals: function(v[one], v[other], first)
     return lambda v, before, after, now, signals: function(v[one], first, second)
+
+
+def _looking(name: str) -> Run:
+    """A run that looks a signal up; floats, which most signals are, need no call."""
+
+    def look(v: Any, before: Any, after: Any, now: int, signals: Signals) -> Interval:
+        value = signals.get(name)
+        if type(value) is float and value == value:  # NaN is not equal to itself
+            return (value, value)
+        return known_interval(value)
+
+    return look
 
 
 def _remembering(update: Update, slot: int, one: int, other: int) -> Run:

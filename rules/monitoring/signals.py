@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf, isfinite
+from math import inf
 from typing import SupportsFloat
 
 from visup.agent.model.errors import SettingsError
-from visup.rules.formula.units import TICKS, ticks
+from visup.rules.formula.units import TICKS
 from visup.rules.monitoring.intervals import UNKNOWN, Interval
 
 SignalValue = SupportsFloat | Interval | None
@@ -17,11 +17,12 @@ Signals = Mapping[str, SignalValue]
 
 def later(time: float, before: int | None) -> int:
     """The moment of a sample in microseconds, which must come after the one before."""
-    if not isfinite(time):
+    try:
+        now = round(time * TICKS)
+    except (OverflowError, ValueError):  # infinite, or no number
         raise SettingsError(
             f"a sample has the time {time}", expected="seconds, a finite number", hint=_LEAVE_OUT
-        )
-    now = ticks(time)
+        ) from None
     if before is not None and now <= before:
         what = f"a sample at {time:.6g} s comes after one at {before / TICKS:.6g} s"
         raise SettingsError(what, expected="times that increase", hint="sort samples by their time")

@@ -42,9 +42,10 @@ def _usual(codes: str, pattern: str, new: New) -> UsualMeaning:
 
 
 SYNONYMS = {
-    "on": "touching", "near": "converging", "approach": "converging", "approaching": "converging",
-    "attached": "coupled", "grasp": "coupled", "grasped": "coupled", "holding": "coupled",
-    "hold": "coupled", "connected": "coupled", "released": "decoupled", "release": "decoupled",
+    "near": "converging", "approach": "converging", "approaching": "converging",
+    "attached": "coupled", "grasp": "coupled", "grasped": "held_by", "holding": "coupled",
+    "hold": "coupled", "above": "on", "upon": "on", "atop": "on", "connected": "coupled",
+    "released": "decoupled", "release": "decoupled",
     "leaving": "diverging", "retreating": "diverging", "contact": "touching", "visible": "present",
     "left": "gone", "away": "gone", "in": "inside", "separate": "apart", "moving_apart": "diverging",
 }  # fmt: skip

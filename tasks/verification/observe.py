@@ -81,7 +81,7 @@ class RelationLookup:
     def find(self, name: str, objects: tuple[int, ...]) -> Relation:
         """The relation of that name between these objects; one of unknown truth when there is none.
 
-        `decoupled`, `apart`, `present` and `gone` follow from what else is believed unless some
+        `decoupled`, `apart`, `on`, `present` and `gone` follow from what else is believed unless some
         rule gives them itself.
         """
         if name in self._looks:
@@ -239,6 +239,18 @@ def _apart(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relat
     return _opposite("apart", relations.find("touching", ids))
 
 
+def _on(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
+    """The first one touches the second, and its middle stands above it: up is up in the image."""
+    touching = relations.find("touching", ids)
+    first, second = mind.objects.get(ids[0]), mind.objects.get(ids[1])
+    if touching.truth is Truth.UNKNOWN or first is None or second is None:
+        return None
+    (x, y), (left, _, width, _) = first.region.centroid, second.region.bbox
+    above = y < second.region.centroid[1] and left <= x <= left + width
+    truth = Truth.TRUE if touching.truth is Truth.TRUE and above else Truth.FALSE
+    return Relation("on", ids, truth, touching.since, touching.confidence)
+
+
 def _present(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     belief = mind.objects.get(ids[0])
     if belief is None:
@@ -264,6 +276,7 @@ DERIVED: Mapping[str, Derive] = {
     "in_contact": _in_contact,
     "decoupled": _decoupled,
     "apart": _apart,
+    "on": _on,
     "present": _present,
     "gone": _gone,
 }

@@ -63,8 +63,8 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         "tasks": ("a.task", sorted((ROOT / "tasks" / "shipped").glob("*.task")), _tasks),
         "rules": ("a.rules", [ROOT / "rules" / "safety" / "safety.rules"], _rules),
     }
-    picture = place / "a.png"
-    cv2.imwrite(str(picture), moving_disc(1)[0])
+    # Told apart by what is in them, whatever they are called.
+    pictures = [cv2.imencode(kind, moving_disc(1)[0])[1].tobytes() for kind in (".png", ".jpg")]
     kinds = {
         kind: Subject(_damaging(name, [f.read_bytes() for f in files]), read)
         for kind, (name, files, read) in texts.items()
@@ -81,7 +81,7 @@ def subjects(place: Path) -> Mapping[str, Subject]:
         "resumed journals": Subject(_resumable(journal, state), _resumed),
         "states": Subject(_damaging(CHECKPOINT, [state]), _state),
         "videos": Subject(_damaging("a.avi", [clip.read_bytes()]), lambda f: _video(f / "a.avi")),
-        "pictures": Subject(_damaging("0.png", [picture.read_bytes()]), _video),
+        "pictures": Subject(_damaging("0.png", pictures), _video),
     }
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import pytest
 
+from tests.rules.predicates.test_certainty import mind_of
 from tests.tasks.scripted import Played, Script, Spell, play, task_of
-from visup.agent import Status, Verdict
+from visup.agent import Relation, Status, Truth, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
+from visup.tasks.verification.observe import RelationLookup
 
 TOP, LEGS = 1, (2, 3, 4)
 NAMES = {TOP: {"top": 0.9}, **{k: {f"leg_{n}": 0.9} for n, k in enumerate(LEGS, 1)}}
@@ -108,3 +111,16 @@ def test_a_failure_may_be_recovered_from_where_a_way_out_is_said() -> None:
     )
     script = Script(spells, objects=HERE, identities=NAMES)
     assert verdict(text, script) is Verdict.SUCCEEDED
+
+
+@pytest.mark.parametrize(
+    ("shift", "stands"), [((0, -60), True), ((0, 60), False), ((300, -60), False)]
+)
+def test_what_touches_and_stands_above_is_on_the_other(
+    shift: tuple[int, int], stands: bool
+) -> None:
+    mind = mind_of((200, 300, 120, 60), (230 + shift[0], 300 + shift[1], 60, 60))
+    touching = Relation("touching", (1, 2), Truth.TRUE, 0.0)
+    mind = replace(mind, relations=(touching,))
+    truth = RelationLookup(mind).find("on", (2, 1)).truth
+    assert truth is (Truth.TRUE if stands else Truth.FALSE)
