@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import threading
 from pathlib import Path
 
@@ -64,6 +65,15 @@ def test_code_that_a_run_folder_names_does_not_run(
         interrupted_run(tmp_path / "run")
     assert not mark.exists()
     assert all(name in (refused.value.hint or "") for names in named.values() for name in names)
+
+
+def test_what_is_to_be_typed_again_is_quoted(clip: WatchSettings, tmp_path: Path) -> None:
+    broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
+    written(tmp_path / "run" / JOURNAL, behaviours=["a.py; touch owned"], plugins=["$(id)"])
+    with pytest.raises(SettingsError) as refused:
+        interrupted_run(tmp_path / "run")
+    words = shlex.split((refused.value.hint or "").partition("again: ")[2])
+    assert words[-4:] == ["--behaviour", "a.py; touch owned", "--plugin", "$(id)"]
 
 
 def test_it_runs_once_it_is_named_again_wherever_it_is_now(

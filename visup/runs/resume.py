@@ -7,6 +7,7 @@ one they look again at all frames. A camera's frames are gone: there behaviours 
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -113,20 +114,17 @@ def _with_named_code(
     """The settings of a run with the code that the user named, which must be that of the run."""
     had = sorted(map(_code_name, recorded.behaviours)), sorted(recorded.plugins)
     if had != (sorted(map(_code_name, behaviours)), sorted(plugins)):
-        wanted = (
-            *(f"--behaviour {where}" for where in recorded.behaviours),
-            *(f"--plugin {name}" for name in recorded.plugins),
-        )
+        behaviour = [w for where in recorded.behaviours for w in ("--behaviour", str(where))]
+        wanted = [*behaviour, *(w for name in recorded.plugins for w in ("--plugin", name))]
+        # Quoted: a folder's words must not become commands where the hint is pasted.
+        again = shlex.join(["visup", "watch", "--resume", str(run), *wanted])
         raise SettingsError(
             "this run had behaviours of its own, which are code: a run folder cannot have code run"
             if wanted
             else "this run had no behaviours of its own",
             where=str(run),
-            expected=" ".join(wanted) or "neither --behaviour nor --plugin",
-            hint="if you trust them, name them again: "
-            + " ".join(("visup watch --resume", str(run), *wanted))
-            if wanted
-            else None,
+            expected=shlex.join(wanted) or "neither --behaviour nor --plugin",
+            hint=f"if you trust them, name them again: {again}" if wanted else None,
         )
     return replace(recorded, behaviours=tuple(behaviours), plugins=tuple(plugins))
 
