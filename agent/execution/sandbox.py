@@ -22,6 +22,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import IO
 
+from visup.agent.model.errors import BehaviourError
+
+CAN_ISOLATE = os.name == "posix"
 LARGEST_OUTPUT_BYTES = 16 * 2**20
 """What it may write to its standard output and error together; the process is ended beyond."""
 KEPT_OUTPUT_BYTES = 2000
@@ -42,6 +45,11 @@ class Sandbox:
     """
 
     def __init__(self) -> None:
+        if not CAN_ISOLATE:
+            raise BehaviourError(
+                "behaviours cannot run in processes of their own on this system",
+                expected="Linux, macOS or another POSIX system",
+            )
         self.end, theirs = socket.socketpair()
         self.frames = _memory_file()
         lifeline, keep = os.pipe()

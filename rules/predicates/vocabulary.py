@@ -17,6 +17,7 @@ from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
+from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
     SIGMAS,
@@ -258,6 +259,10 @@ _ONE, _TWO = ("object",), ("object", "object")
 PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
     {
         **{name: _relation(name) for name in RELATION_NAMES},
+        **{
+            name: PredicateDefinition(_TWO, look, meaning)
+            for name, (look, meaning) in COARSE_RELATIONS.items()
+        },
         "expected": PredicateDefinition(
             ("relation", "object", "object"), expected, "an active task expects the relation"
         ),

@@ -8,6 +8,9 @@ from functools import lru_cache
 from visup.agent.model.mind import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 
+TOLD = 0.7
+"""Likelihood from which on an object is told to be something; see `VoteSettings.settle`."""
+
 SURE, LIKELY = 0.95, 0.5
 """Confidence from which on something 'is' so, and from which on it 'appears to be'; below it 'may be'."""
 
@@ -59,10 +62,26 @@ def describe(mind: Mind, object_id: int) -> str:
         object_id: Any object id.
 
     Returns:
-        Such as 'object 2, believed to be the satellite', or 'object 3' when nobody knows what it is.
+        Such as 'object 2, believed to be the satellite', 'object 2, in the part of the gripper' when a task
+        takes it for that though it does not look so, or 'object 3' when nobody knows what it is.
     """
     name = believed_name(mind, object_id)
-    return f"object {object_id}" + (f", believed to be the {spaced(name)}" if name else "")
+    if name is None:
+        return f"object {object_id}"
+    how = "believed to be" if _looks_like(mind, object_id, name) else "in the part of"
+    return f"object {object_id}, {how} the {spaced(name)}"
+
+
+def _looks_like(mind: Mind, object_id: int, name: str) -> bool:
+    """Whether an object may be what it is called; a task may cast one that clearly is something else."""
+    belief = mind.objects.get(object_id)
+    if belief is None or belief.name == UNKNOWN_OBJECT:
+        return False
+    bindings = (b for task in mind.tasks for b in task.bindings if b.object_id == object_id)
+    first = next(bindings, None)
+    models = first.models if first else ()
+    same = belief.name in models or called(mind, belief.name) == name
+    return same or belief.confidence < TOLD
 
 
 def short(mind: Mind, object_id: int) -> str:
@@ -155,4 +174,4 @@ def _mention(mind: Mind, object_id: int, mentioned: list[int]) -> str:
         return "it" if len(mentioned) == 1 else short(mind, object_id)
     mentioned.append(object_id)
     words = describe(mind, object_id)
-    return f"{words}," if "believed" in words else words
+    return f"{words}," if "," in words else words

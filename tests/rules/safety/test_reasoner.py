@@ -199,7 +199,7 @@ def test_unknown_raises_no_concern_and_suspends_none() -> None:
 def believed(id_: int, name: str | None) -> ObjectBelief:
     region = box_region(id_, (50 * id_, 50, 30, 30))
     assert region is not None
-    named = (Candidate(name, 3.0, 0.9),) if name else ()
+    named = (Candidate(name, 3.0, 0.9, 0.9),) if name else ()
     return ObjectBelief(id_, region, Presence.SEEN, 0.0, 1.0, True, named)
 
 
@@ -241,3 +241,12 @@ def test_an_object_is_called_by_its_actor_then_by_its_model() -> None:
     assert describe(MIND, 2) == "object 2, believed to be the rms arm"
     assert describe(bound, 2) == "object 2, believed to be the gripper"
     assert describe(MIND, 3) == "object 3"
+
+
+@pytest.mark.parametrize("object_id", [1, 2, 3])
+def test_who_is_cast_by_a_task_and_looks_otherwise_is_not_believed_to_be_that(
+    object_id: int,
+) -> None:
+    cast = TaskBelief("t", Verdict.IN_PROGRESS, bindings=(Binding("lid", ("lid",), object_id),))
+    told = sentence(replace(MIND, tasks=(cast,)), "{0} {is} near {1}.", object_id, 9)
+    assert told.startswith(f"Object {object_id}, in the part of the lid, ")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from visup.agent import Behaviour, Contract
 from visup.agent.execution.contracts import read_contracts
+from visup.agent.execution.sandbox import CAN_ISOLATE
 from visup.agent.model.errors import SettingsError
 from visup.agent.plugins.factory import load_behaviours
 from visup.agent.plugins.isolated import IsolatedBehaviour
@@ -23,7 +24,7 @@ OWN = "visup."
 
 @dataclass(frozen=True, slots=True)
 class _Offer:
-    """A file or module, and the contracts of what it offers; None where it is visup's own."""
+    """A file or module, and the contracts of what it offers; None where it is imported here anyway."""
 
     where: str
     contracts: tuple[Contract, ...] | None
@@ -41,7 +42,7 @@ def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
     values = settings.plugin_settings
     offers = []
     for where in (*named, *map(str, settings.behaviours)):
-        own = where.startswith(OWN)
+        own = where.startswith(OWN) or not CAN_ISOLATE
         offers.append(_Offer(where, None if own else tuple(read_contracts(where, values))))
     made = [b for offer in offers for b in _made(offer, settings)]
     _check_known(settings, [b.contract.name for b in made])

@@ -1,0 +1,47 @@
+"""The coarser connection calculi RCC-5 and RCC-2 of boxes, joined from the eight relations of RCC-8.
+
+Truths are codes, of which the greatest is "or" and the negative "not", also of what is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from visup.rules.predicates.snapshot import Codes, Snapshot
+
+Look = Callable[[Snapshot], Codes]
+
+
+def _one_of(*names: str) -> Look:
+    return lambda facts: np.max([facts.related(n) for n in names], axis=0)
+
+
+def _none_of(*names: str) -> Look:
+    return lambda facts: -np.max([facts.related(n) for n in names], axis=0)
+
+
+COARSE_RELATIONS: Mapping[str, tuple[Look, str]] = MappingProxyType(
+    {
+        "connected": (_none_of("disconnected"), "the boxes share a point"),
+        "discrete": (
+            _one_of("disconnected", "externally_connected"),
+            "the boxes share no more than an edge",
+        ),
+        "overlapping": (
+            _none_of("disconnected", "externally_connected"),
+            "the boxes share an area",
+        ),
+        "proper_part": (
+            _one_of("tangential_proper_part", "non_tangential_proper_part"),
+            "the first box lies in the second",
+        ),
+        "proper_part_inverse": (
+            _one_of("tangential_proper_part_inverse", "non_tangential_proper_part_inverse"),
+            "the second box lies in the first",
+        ),
+    }
+)
+"""Word -> what it looks at, and one clause for people."""
