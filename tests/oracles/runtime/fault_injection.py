@@ -50,7 +50,7 @@ class FaultyBehaviour:
         self.contract = contract
         self.truth = dict(truth)
         self.fault = fault
-        self.span = range(at, at + lasts)
+        self.span = tuple(range(at, at + lasts))
         self.pause_s = pause_s
         self.kept: list[Any] = []
 
