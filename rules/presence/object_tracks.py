@@ -125,7 +125,13 @@ def new_track(region: Region, now: float) -> ObjectTrack:
 
 
 def update_track(
-    track: ObjectTrack, region: Region, now: float, crowded: bool, allowed_gap_s: float
+    track: ObjectTrack,
+    region: Region,
+    now: float,
+    crowded: bool,
+    allowed_gap_s: float,
+    *,
+    recognised: bool = False,
 ) -> ObjectTrack:
     """The track after another sighting.
 
@@ -135,6 +141,7 @@ def update_track(
         now: Seconds.
         crowded: Whether another region touches it, so that a part of it may be hidden.
         allowed_gap_s: A longer time without sight breaks coherence.
+        recognised: Whether it was found by its looks: how it moves is then known, whatever touches it.
 
     Returns:
         The track after it. The reference area follows an object in the clear, is forgotten slowly
@@ -144,7 +151,7 @@ def update_track(
     smooth = dt <= allowed_gap_s and _coherent(track.region, region)
     reference = _reference_area(track, region, dt, crowded)
     visible = min(1.0, region.area / max(reference, 1.0))
-    clear = not crowded and visible > 0.7
+    clear = (recognised or not crowded) and visible > 0.7
     centroids = (
         _recent_centroids(track.centroids, (now, *region.centroid)) if clear else track.centroids
     )

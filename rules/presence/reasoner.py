@@ -140,7 +140,12 @@ def _update_tracks(context: StepContext) -> None:
             if other.id != belief.id and not context.may_be_part(other, belief)
         )
         context.of[belief.id] = update_track(
-            track, belief.region, context.now, crowded, context.settings.allowed_gap_s
+            track,
+            belief.region,
+            context.now,
+            crowded,
+            context.settings.allowed_gap_s,
+            recognised=belief.id in context.recognised,
         )
 
 
