@@ -53,6 +53,17 @@ class Channel:
         self._end.settimeout(seconds)
         self._end.sendall(_LENGTH.pack(len(body)) + body)
 
+    def has_news(self) -> bool:
+        """Whether something came, or the other end was closed."""
+        self._end.settimeout(0.0)
+        try:
+            self._end.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True  # it broke: whoever receives is told how
+        return True
+
     def receive(self, seconds: float | None = None) -> Any:
         """Wait for a message, the whole of it, for so many seconds.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import os
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -57,10 +58,16 @@ class ProcessRunner:
         self._sent = -1
 
     def maintain(self) -> bool:
-        """Start a new process in place of one that was killed, while the behaviour is suspended."""
+        """Start a new process in place of one that was killed, while the behaviour is suspended.
+
+        Returns:
+            Whether it is still starting, where a step has no time to wait for that.
+        """
         if self._child is not None and self._child.killed:
             self._child = self._start(self._child)
-        return False
+        if self._child is None or not self._replaces or not self._limits.budgets:
+            return False
+        return self._child.is_starting(self._limits.start_s)
 
     def run(
         self,
@@ -147,6 +154,7 @@ class ChildProcess:
     def __init__(self, first: Message) -> None:
         self._sandbox = Sandbox()
         self._channel = Channel(self._sandbox.end)
+        self._begun = time.monotonic()
         self._started = False
         self.killed = False
         self.close = self._sandbox.close
@@ -156,6 +164,12 @@ class ChildProcess:
         """Stop it at once; it is cleared away later."""
         self._sandbox.kill()
         self.killed = True
+
+    def is_starting(self, patience_s: float) -> bool:
+        """Whether nothing has been heard of it yet, and less than that has passed."""
+        if self._started or time.monotonic() - self._begun > patience_s:
+            return False
+        return not self._channel.has_news()
 
     def await_start(self, seconds: float | None) -> None:
         """Wait until the behaviour has started.
