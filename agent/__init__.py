@@ -34,6 +34,7 @@ from visup.agent.model.object_beliefs import (
     Spin,
 )
 from visup.agent.model.records import (
+    CameraMotion,
     Depth,
     Frame,
     Health,
@@ -79,6 +80,7 @@ __all__ = [
     "AlertCondition",
     "Behaviour",
     "Binding",
+    "CameraMotion",
     "Candidate",
     "Column",
     "Contract",

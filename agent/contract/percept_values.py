@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import BehaviourError
-from visup.agent.model.records import Depth, Health, HealthStatus, Hypothesis, Region
+from visup.agent.model.records import CameraMotion, Depth, Health, HealthStatus, Hypothesis, Region
 
 DEEPEST = 8
 """Values of plug-ins' own kinds may nest this deep."""
@@ -101,6 +101,14 @@ def _depth(d: Depth, size: tuple[int, int]) -> None:
     expect(_least(d.sigma, 0.0), f"{who} has sigma {brief(d.sigma)}", "a number, at least 0")
 
 
+def _camera(c: CameraMotion, size: tuple[int, int]) -> None:
+    _array(c.motion, "camera: motion", (2, 3))
+    turn = float(np.linalg.det(c.motion[:, :2]))
+    expect(
+        turn > 0.0, f"camera: motion with determinant {turn:.3g}", "one above 0: it can be undone"
+    )
+
+
 def _health(h: Health, size: tuple[int, int]) -> None:
     fine = isinstance(h.status, HealthStatus) and isinstance(h.detail, str)
     expect(fine, f"health has status {brief(h.status)}", "a HealthStatus and a sentence")
@@ -110,6 +118,7 @@ VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] 
     "region": (Region, _region),
     "hypothesis": (Hypothesis, _hypothesis),
     "depth": (Depth, _depth),
+    "camera": (CameraMotion, _camera),
     "health": (Health, _health),
 }
 """Kinds with a fixed type of value, and what judges one of them."""

@@ -166,6 +166,24 @@ class Depth:
     sigma: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraMotion:
+    """How the picture of the resting scene moved because the camera did.
+
+    Attributes:
+        motion: (2, 3) float, affine motion of the picture between the last frame and this one, pixels
+            to pixels; the identity for a camera that rests.
+    """
+
+    motion: NDArray[np.float64]
+
+    def displacement(self, at: tuple[float, float]) -> tuple[float, float]:
+        """(dx, dy) by which what rests at a place (x, y) of this frame was moved in the picture, pixels."""
+        (a, b, c), (d, e, f) = self.motion.tolist()
+        x, y, turn = at[0] - c, at[1] - f, a * e - b * d
+        return at[0] - (e * x - b * y) / turn, at[1] - (a * y - d * x) / turn
+
+
 @dataclass(frozen=True, slots=True)
 class Health:
     """State of the camera image.
@@ -184,8 +202,8 @@ class Percept:
     """Whatever a behaviour reports about a frame.
 
     Attributes:
-        kind: What it is: 'region', 'hypothesis', 'depth', 'health', or a plug-in's own word.
-        value: `Region`, `Hypothesis`, `Depth`, `Health`, or a plug-in's own value.
+        kind: What it is: 'region', 'hypothesis', 'depth', 'camera', 'health', or a plug-in's own word.
+        value: `Region`, `Hypothesis`, `Depth`, `CameraMotion`, `Health`, or a plug-in's own value.
         time: Seconds, the frame's time.
         source: Name of the behaviour.
         confidence: 0 to 1.

@@ -38,12 +38,14 @@ class Binding:
         models: Model names that the actor may be.
         object_id: The object believed to play it, or None when none does.
         strength: Strength of that belief, 0 to 1.
+        guessed: Whether nothing but that nobody else is left speaks for the object.
     """
 
     actor: str
     models: tuple[str, ...]
     object_id: int | None = None
     strength: float = 0.0
+    guessed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +84,8 @@ class StageBelief:
         since: Seconds since when it has this status.
         confidence: 0 to 1.
         evidence: One sentence: why.
+        begun: Whether anything of it was seen since it was last pending; the first stage begins with the
+            task.
     """
 
     stage: str
@@ -89,6 +93,7 @@ class StageBelief:
     since: float
     confidence: float = 1.0
     evidence: str = ""
+    begun: bool = False
 
 
 @dataclass(frozen=True)

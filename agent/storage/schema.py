@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from visup.agent.model.records import Depth, Health, Hypothesis, Region, ReportState
+from visup.agent.model.records import CameraMotion, Depth, Health, Hypothesis, Region, ReportState
 
 VERSION = 1
 """Of the form; that of the journal that holds it is `visup.agent.storage.journal.VERSION`."""
@@ -119,6 +119,7 @@ RECORDS = (
     ),
     _record(Hypothesis, "What a region looks like"),
     _record(Depth, "Relative depth of a region under one identity"),
+    _record(CameraMotion, "How the picture of the resting scene moved because the camera did"),
     _record(Health, "State of the camera's image, and why"),
 )
 

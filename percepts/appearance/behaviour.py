@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from visup.agent import Contract, Directive, Frame, Hypothesis, Observation, Percept, Region
+from visup.agent import (
+    CameraMotion,
+    Contract,
+    Directive,
+    Frame,
+    Hypothesis,
+    Observation,
+    Percept,
+    Region,
+)
 from visup.percepts.appearance.looks.scene import Scene, prepare_scene
 from visup.percepts.appearance.looks.thing_model import view_models
 from visup.percepts.appearance.output.explaining import shares, unexplained
@@ -20,7 +29,7 @@ SAME = 0.4  # overlap (IoU) at which what moves is a thing that is now known by 
 
 
 class AppearanceBehaviour:
-    """Reports taught things, at rest and in motion, and whatever else moves.
+    """Reports taught things, at rest and in motion, whatever else moves, and how the camera moved.
 
     It takes the place of the behaviour that sees motion, which runs within it: a region that moves and
     is mainly a taught thing is that thing, and not told twice.
@@ -30,7 +39,7 @@ class AppearanceBehaviour:
         motion: Finds what moves by itself.
     """
 
-    contract = Contract("appearance", gives=("region", "hypothesis"))
+    contract = Contract("appearance", gives=("region", "hypothesis", "camera"))
 
     def __init__(
         self, taught: Sequence[TaughtView] = (), motion: MotionBehaviour | None = None
@@ -64,7 +73,8 @@ class AppearanceBehaviour:
             directives: Those that seeing motion obeys.
 
         Returns:
-            Percepts of kind 'region', by id, then of kind 'hypothesis'.
+            Percepts of kind 'camera', unless that is not known; of kind 'region', by id; then of kind
+            'hypothesis'.
         """
         moving = [p.value for p in self._motion.perceive(frame, observation, directives)]
         if not image_is_sound(observation):
@@ -81,7 +91,13 @@ class AppearanceBehaviour:
         moving = [r for r in moving if r.id not in known]
         others = unexplained(moving, [r for _, r in things], frame.size)
         regions = sorted([*others, *(r for _, r in things)], key=lambda r: r.id)
+        camera = self._tracker.camera
         return [
+            *(
+                []
+                if camera is None
+                else [self._percept(frame, "camera", CameraMotion(camera), 1.0)]
+            ),
             *(self._percept(frame, "region", r, r.confidence) for r in regions),
             *(self._named(frame, t, r) for t, r in things),
         ]

@@ -24,7 +24,7 @@ class PlacedBehaviour:
         taught: Views of other things.
     """
 
-    contract = Contract("appearance", gives=("region", "hypothesis"))
+    contract = Contract("appearance", gives=("region", "hypothesis", "camera"))
 
     def __init__(
         self, places: Mapping[str, tuple[float, float]], taught: Sequence[TaughtView] = ()

@@ -18,7 +18,8 @@ class ContactSettings:
 
     Attributes:
         passing: Relative speed from which on one passes the other, image diagonals per second; and
-        passing_share: the same as a share of the speed at which both move.
+        passing_share: the same as a share of the speed at which both move; and
+        slowed_share: as a share of the speed with which they met: what brakes at the other means it.
         settled_s: For how long they must not pass each other to have settled.
         unknown_s: Outlines that meet for so long while nothing is known of their motion have settled.
         doubt_share: One that has passed so far across the other, in sizes of the smaller one, is believed
@@ -27,6 +28,7 @@ class ContactSettings:
 
     passing: float = 0.0125
     passing_share: float = 0.5
+    slowed_share: float = 0.4
     settled_s: float = 0.15
     unknown_s: float = 0.5
     doubt_share: float = 0.4
@@ -43,6 +45,7 @@ class OutlineContact:
         passing: Whether one was last seen to pass the other, and
         changed_at: since when that is as it is.
         known: Whether their relative motion was ever known since they meet.
+        fastest: Their greatest relative speed since, pixels per second.
     """
 
     met_at: float
@@ -51,6 +54,7 @@ class OutlineContact:
     passing: bool = False
     changed_at: float = 0.0
     known: bool = False
+    fastest: float = 0.0
 
 
 def updated_contact(
@@ -75,7 +79,8 @@ def updated_contact(
     now, dt = moment
     contact = before or OutlineContact(now, changed_at=now)
     if speed is not None:
-        passing = speed > limit
+        contact = replace(contact, fastest=max(contact.fastest, speed))
+        passing = speed > max(limit, settings.slowed_share * contact.fastest)
         if passing is not contact.passing or not contact.known:
             contact = replace(contact, passing=passing, changed_at=now, known=True)
         path = contact.path + speed * dt if passing else 0.0

@@ -132,7 +132,7 @@ def coupling_cells(
         if contact is not None:
             settled = contact.settled_since
             state[1, k] = UNKNOWN_CODE if settled is None else 1
-            since[1, k] = contact.met_at if settled is None else settled
+            since[1, k] = contact.met_at if settled is None else min(settled, contact.changed_at)
             state[2, k] = _in_front(contact, seen.pair, mind)
             since[2, k] = contact.changed_at
         if seen.pair in coupled:

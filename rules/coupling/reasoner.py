@@ -88,7 +88,7 @@ class CouplingSettings:
     window_s: float = 0.3
     path_s: float = 1.2
     moving: float = 0.0125
-    still_share: float = 0.12
+    still_share: float = 0.2
     moving_share: float = 0.6
     rest_s: float = 0.8
     odds: float = 5.0
@@ -143,7 +143,8 @@ class CouplingReasoner:
             elif log is None and evidence.relative_track is None:
                 pass  # as nearly always: they are not near each other; the first condition
             elif decide(self._coupling(evidence, seen, mind), log, "coupled", pair):
-                coupled[pair] = Coupling(pair, mind.time)
+                since = mind.time if evidence.rest_since is None else evidence.rest_since
+                coupled[pair] = Coupling(pair, since)
                 text = "{0} and {1} {are} coupled."
                 events.append(_event("coupled", text, pair, mind, observation))
                 evidence = replace(evidence, apart_since=None)
@@ -172,7 +173,7 @@ class CouplingReasoner:
         elif seen.touching == NO:
             contact = None
         far = seen.diverging == YES or seen.gap > 0.02 * image_diagonal(mind.frame_size)
-        apart = (seen.touching == NO and far) or self._leaves(contact, seen, mind)
+        apart = (seen.touching == NO and far) or self._leaves(contact, found, seen, mind)
         same = track is before.relative_track and odds == before.rest_odds and not converging
         same = same and contact is before.contact
         if same and apart == (before.apart_since is not None):
@@ -248,11 +249,19 @@ class CouplingReasoner:
         back = seen.diverging == YES and crossed < s.doubt_share * size
         return updated_contact(before.contact, speed, limit, moment, s, thrown_back=back)
 
-    def _leaves(self, contact: OutlineContact | None, seen: PairObservation, mind: Mind) -> bool:
-        """Whether one of two whose outlines still meet moves on, while the other rests."""
-        if contact is None or not contact.passing:
+    def _leaves(
+        self,
+        contact: OutlineContact | None,
+        found: RelativeVelocity | None,
+        seen: PairObservation,
+        mind: Mind,
+    ) -> bool:
+        """Whether one of two whose outlines still meet moves on, while the other all but rests."""
+        s, diagonal = self.settings, image_diagonal(mind.frame_size)
+        speed = 0.0 if found is None else float(np.hypot(*found.velocity))
+        if contact is None or not (contact.passing or speed > s.contact.passing * diagonal):
             return False
-        least = self.settings.relations.still_speed * image_diagonal(mind.frame_size)
+        least = max(s.relations.still_speed * diagonal, s.still_share * speed)
         now = kinematics(mind)
         return any(now.one("speed", i) < least for i in seen.pair)
 

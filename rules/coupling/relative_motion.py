@@ -44,6 +44,9 @@ LEAST_SIGMA = 0.3
 CORRELATION_S = 0.2
 """Errors of velocities are alike for so long, seconds."""
 
+PART_VARIANCE = 4.0
+"""By how much less is known of a part of a body from the motion of the whole, where nothing else tells."""
+
 LEAST_POINTS = 12
 LEAST_SAMPLES = 5
 _OUTLIER = 1.5  # pixels beyond which a point counts less
@@ -203,7 +206,9 @@ def update_relative_track(
     first = registered(track.first, target_of(regions[0]))
     second = registered(track.second, target_of(regions[1]))
     if first is None or second is None:
-        return begin_relative_track(regions, now, size) if apart else replace(track, path=())
+        return (
+            _begun_again(track, regions, now, size, lasts_s) if apart else replace(track, path=())
+        )
     x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
     local = first.local or second.local
     place = (now, x, y, *(UNTOLD if local else _image_motion(regions)))
@@ -213,6 +218,26 @@ def update_relative_track(
         if fresh is not None:
             return replace(fresh, before=(x, y), path=path)
     return replace(track, first=first, second=second, path=path)
+
+
+def _begun_again(
+    track: RelativeTrack,
+    regions: tuple[Region, Region],
+    now: float,
+    size: tuple[int, int],
+    lasts_s: float,
+) -> RelativeTrack | None:
+    """Two bodies whose outlines have changed too much to be followed: image motion alone leads on."""
+    fresh, (vx, vy, variance) = begin_relative_track(regions, now, size), _image_motion(regions)
+    if fresh is None or not track.path or np.isnan(variance):
+        return fresh
+    if fresh.first.local or fresh.second.local:
+        variance *= PART_VARIANCE
+    told = vx, vy, variance
+    then, x, y, *_ = track.path[-1]
+    place = (now, x + told[0] * (now - then), y + told[1] * (now - then), *told)
+    path = (*(p for p in track.path if p[0] > now - lasts_s), place)
+    return replace(fresh, before=place[1:3], path=path)
 
 
 def begin_relative_track(

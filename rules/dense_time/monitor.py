@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
@@ -119,6 +120,20 @@ class DenseTimeMonitor:
             found = self._run(self._between(self._then, now, known), (self._then, now))
         self._then, self._values = now, known
         return _told(found)
+
+    def foreseen(self) -> Interval:
+        """What the formula is at the last sample by what is known now, the future being unknown.
+
+        So `eventually[60 s] f` is true as soon as f is, and `henceforth[60 s] f` false as soon as f is.
+        It takes the time of what is retained, which grows with the windows; no sample is taken in.
+        """
+        if self._then is None:
+            return UNKNOWN
+        twin = copy.deepcopy(self)
+        twin._after = "unknown"
+        moment = self._then / TICKS
+        told = (v.robustness for v in twin.finish() if v.begin_s <= moment < v.end_s)
+        return next(told, UNKNOWN)
 
     def finish(self, end_s: float | None = None) -> list[TimedVerdict]:
         """No more samples will come: the verdicts about all that is left of the recording.

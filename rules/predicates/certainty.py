@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from visup.agent import ObjectBelief
+from visup.agent import ObjectBelief, Region
+from visup.rules.formula.truth import MAYBE, YES
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates._snapshot_jit import GAP
 from visup.rules.predicates.snapshot import Codes, Snapshot, code
@@ -25,12 +26,20 @@ LEAST_SHARE = 2 * PresenceSettings().least_share
 """Share of the image that a thing of its own fills, unless it is far away or a speck."""
 LEAST_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
+CAME_IN = 0.5
+"""How far from the border what came over it may first be seen, in sizes of what was seen."""
 KEEP_OUT = "keep_out"
 """Zones whose names begin so are forbidden to all."""
 
 
 def standalone(facts: Snapshot) -> Codes:
-    """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones."""
+    """Whether an object is surely a thing of its own: no speck, well seen, clear of all larger ones.
+
+    Nor does it move as one with one that is larger.
+
+    Of what the image border cuts nobody knows what it hangs on, unless it is known what it is: it may be
+    an arm, of which the hand is known.
+    """
     beliefs = facts.beliefs
     if not beliefs:
         return facts.among(())
@@ -38,14 +47,45 @@ def standalone(facts: Snapshot) -> Codes:
     area = np.array([b.region.area for b in beliefs], dtype=float)
     sure = np.array([b.region.confidence for b in beliefs]) >= LEAST_CONFIDENCE
     sure &= area >= LEAST_SHARE * width * height
+    sure &= (whole(facts) == YES) | (identified(facts) == YES)
     far = np.maximum(
         PART.apart * image_diagonal(facts.mind.frame_size), PART.apart_size * np.sqrt(area)
     )
     gap = facts.of_pairs(GAP)
     beside = np.isfinite(gap[1]) & (gap[0] <= far[:, None])
     larger = area[:, None] <= PART.part * area[None]
+    beside |= facts.related("moving_together") == YES
     alone = sure & ~(beside & larger).any(axis=1)
     return facts.among({b.id for b, yes in zip(beliefs, alone.tolist(), strict=True) if yes})
+
+
+def whole(facts: Snapshot) -> Codes:
+    """Whether an object is clear of the image border."""
+    width, height = facts.mind.frame_size
+
+    def clear(region: Region) -> bool:
+        x, y, w, h = region.bbox
+        return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
+
+    return facts.each(lambda b: code(clear(b.region)))
+
+
+def came_in(facts: Snapshot) -> Codes:
+    """Whether an object came over the border of the image: where it was first seen lies there.
+
+    What sets out within the picture was there before, hangs on something that was, or is its shadow. What
+    comes in fast is first seen a little within.
+    """
+    memory, (width, height) = presence_memory(facts.mind), facts.mind.frame_size
+
+    def look(b: ObjectBelief) -> int:
+        if b.id not in memory.of:
+            return MAYBE
+        x, y, w, h = memory.of[b.id].first_box
+        near = CAME_IN * max(w, h)
+        return code(min(x, y, width - x - w, height - y - h) <= near)
+
+    return facts.each(look)
 
 
 def identified(facts: Snapshot) -> Codes:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from visup.agent import HealthStatus, ObjectBelief, Presence, Region
+from visup.agent import HealthStatus, ObjectBelief, Presence
 from visup.rules.formula.truth import CODE_OF, MAYBE, NO, YES
 from visup.rules.formula.units import ANGLE, ANGULAR_SPEED, LENGTH, SHARE, SPEED, TIME, Dimension
 from visup.rules.geometry.regions import image_diagonal
@@ -44,6 +44,7 @@ IMPLIED = MappingProxyType(
 """Relation -> expectations that make it fine: whoever shall be coupled must converge and touch."""
 
 STILL_SPEED = RelationSettings().still_speed
+MOVING_SIGMAS = 3.0
 PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
 SURE_POSE = 0.6  # how likely a pose must be for the spin that follows from it to count
@@ -162,22 +163,12 @@ def is_named(facts: Snapshot, name: str) -> Codes:
 
 
 def moving(facts: Snapshot) -> Codes:
-    """Whether an object moves in the image."""
+    """Whether an object moves in the image, by more than the noise of its outline makes."""
     still = STILL_SPEED * image_diagonal(facts.mind.frame_size)
-    speeds = facts.one("speed").tolist()
-    codes = [MAYBE if v != v else code(v > still) for v in speeds]  # NaN is not equal to itself
+    speeds, noise = facts.one("speed"), MOVING_SIGMAS * facts.one("velocity_sigma")
+    seen = zip(speeds.tolist(), np.maximum(still, noise).tolist(), strict=True)
+    codes = [MAYBE if v != v else code(v > least) for v, least in seen]  # NaN is not itself
     return np.array(codes, dtype=np.int8)
-
-
-def whole(facts: Snapshot) -> Codes:
-    """Whether an object is clear of the image border."""
-    width, height = facts.mind.frame_size
-
-    def clear(region: Region) -> bool:
-        x, y, w, h = region.bbox
-        return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
-
-    return facts.each(lambda b: code(clear(b.region)))
 
 
 def first_contact(facts: Snapshot) -> Codes:
@@ -295,7 +286,10 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "hidden": PredicateDefinition(_ONE, _presence(Presence.HIDDEN), "it is out of sight"),
         "lost": PredicateDefinition(_ONE, lost, "it is out of sight and nothing tells why"),
         "moving": PredicateDefinition(_ONE, moving, "it moves in the image"),
-        "whole": PredicateDefinition(_ONE, whole, "it is clear of the image border"),
+        "came_in": PredicateDefinition(
+            _ONE, certainty.came_in, "it came over the border of the image"
+        ),
+        "whole": PredicateDefinition(_ONE, certainty.whole, "it is clear of the image border"),
         **{
             question: PredicateDefinition(
                 ("object", "zone"), _zone(question), f"{part} is in the zone"

@@ -35,7 +35,8 @@ def _conditions(context: StepContext, belief: ObjectBelief) -> Iterator[Conditio
     s, track = context.settings, context.of[belief.id]
     yield at_least("sightings", track.sightings, s.least_sightings)
     yield Condition("no part of another object", not context.may_be_part(belief))
-    hidden = in_place_of_hidden(belief, context.mind, context.of)
+    named = belief.id in context.recognised
+    hidden = not named and in_place_of_hidden(belief, context.mind, context.of)
     yield Condition("not in the place of a hidden object", not hidden)
     if not belief.candidates:
         width, height = context.mind.frame_size

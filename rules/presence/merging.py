@@ -8,14 +8,13 @@ from __future__ import annotations
 from visup.agent import ObjectBelief, Presence
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import shared_pixels, shifted_region
-from visup.rules.presence.association import recognised
 from visup.rules.presence.object_tracks import ObjectTrack
 from visup.rules.presence.step_context import StepContext
 
 
 def merge(context: StepContext) -> None:
     """Find objects that merged with another one, whose region grew into the union of the two."""
-    alone = recognised(context.mind, context.observation)
+    alone = context.recognised
     for gone in context.missing():
         track = context.of.get(gone.id)
         if track is None or gone.presence is not Presence.SEEN:

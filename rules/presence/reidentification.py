@@ -42,7 +42,8 @@ def reidentify(context: StepContext) -> None:
 
 def parts_of(context: StepContext, whole: ObjectBelief) -> list[ObjectBelief]:
     """Known objects that were but parts of a new region, by id."""
-    return [b for b in context.seen() if b.confirmed and _was_part(context, b, whole)]
+    others = (b for b in context.seen() if b.confirmed and b.id not in context.recognised)
+    return [b for b in others if _was_part(context, b, whole)]
 
 
 def absorb_parts(context: StepContext, whole: ObjectBelief, parts: list[ObjectBelief]) -> None:
@@ -77,6 +78,9 @@ def _was_part(context: StepContext, part: ObjectBelief, whole: ObjectBelief) -> 
 def _match_score(context: StepContext, new: ObjectBelief, old: ObjectBelief) -> float:
     """How well a new region suits a missing object; 0 when it does not."""
     track = context.of[old.id]
+    named = bool(new.candidates and old.candidates) and new.name == old.name
+    if named and new.id in context.recognised and old.confidence > 0.9:
+        return 1.0  # there is but one of what was shown by a name
     if track.merged_with is not None:
         iou = box_iou(new.region.bbox, old.region.bbox)
         return iou if iou > 0.3 else 0.0

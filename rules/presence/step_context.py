@@ -9,6 +9,7 @@ from visup.agent import Event, Mind, ObjectBelief, Observation, Presence, Region
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
 from visup.rules.geometry.regions import box_gap, image_diagonal
+from visup.rules.presence.association import recognised
 from visup.rules.presence.fragments import FragmentHypothesis
 from visup.rules.presence.object_tracks import ObjectTrack
 from visup.rules.presence.settings import PresenceSettings
@@ -39,6 +40,7 @@ class StepContext:
     start: float
     log: DecisionLog | None = None
     events: list[Event] = field(default_factory=list)
+    _recognised: frozenset[int] | None = None
     _sorted: tuple[Mapping[int, ObjectBelief], list[ObjectBelief]] | None = None
 
     @property
@@ -67,12 +69,19 @@ class StepContext:
             if b.last_seen < now and b.confirmed and b.presence is not left
         ]
 
+    @property
+    def recognised(self) -> frozenset[int]:
+        """Objects that were found by their looks now; see `recognised`."""
+        if self._recognised is None:
+            self._recognised = recognised(self.mind, self.observation)
+        return self._recognised
+
     def may_be_part(self, new: ObjectBelief, body: ObjectBelief | None = None) -> bool:
         """Whether a region may be only a part: of one body, or of any."""
         fragment = self.fragments.get(new.id)
-        return (
-            fragment is not None and fragment.holds and (body is None or fragment.body == body.id)
-        )
+        if fragment is None or new.id in self.recognised:
+            return False
+        return fragment.holds and (body is None or fragment.body == body.id)
 
     def decide(self, kind: str, object_id: int, conditions: Iterable[Condition]) -> bool:
         """Whether all conditions of a decision about an object are met."""

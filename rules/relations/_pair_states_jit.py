@@ -188,7 +188,7 @@ def classify_trend(
         limits: Rate that must be exceeded to enter a trend, and below which it ends.
         sigmas: How many deviations the rate must also exceed to want to enter, and how many to go
             on wanting it. Deviations are themselves estimates and jump; one wide one in a row does
-            not take back what was seen.
+            not take back what was seen. A rate below one deviation is none.
 
     Returns:
         Its code; a rate between the thresholds leaves things as they are.
@@ -202,7 +202,7 @@ def classify_trend(
         return towards
     # Below the entering threshold a new pair keeps its distance; one that moved is let go later.
     goes_on = (before == CONVERGING and rate <= 0.0) or (before == DIVERGING and rate >= 0.0)
-    return before if goes_on and abs(rate) >= leave else KEEPING
+    return before if goes_on and abs(rate) >= max(leave, sigma) else KEEPING
 
 
 @compiled
@@ -303,7 +303,11 @@ def classify_motion(
         for j in range(i + 1, len(now.speed)):
             k += 1
             rate, sigma = tables[PairQuantity.RATE, i, j], tables[PairQuantity.SIGMA, i, j]
-            found = classify_trend(rate, sigma, state[0, k], pending[0, k], rates, limits.sigmas)
+            # What two that move as one do to their distance is no trend: they sway.
+            known = np.isfinite(now.speed[i]) and np.isfinite(now.speed[j])
+            sway = SWAY * min(now.speed[i], now.speed[j]) if known else 0.0
+            least = max(rates[0], sway), max(rates[1], sway)
+            found = classify_trend(rate, sigma, state[0, k], pending[0, k], least, limits.sigmas)
             found = combined_trend(found, codes[3, k])
             touching = _touching(now.gap[k], (depth[i], depth[j]), state[1, k], limits.touch)
             halves = _length(now.motion[1], i, j), _length(now.motion[2], i, j)

@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from visup.agent import Mind, ObjectBelief
-from visup.rules.geometry._fit_jit import fit_motion
+from visup.rules.geometry._recent_motion_jit import fit_motion
 from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
 from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, image_diagonal
@@ -26,9 +26,8 @@ class RelationSettings:
         window_s: Length of the window over which lines are fitted.
         samples: Most samples kept in the window.
         bins: Most means of neighbouring samples to which lines are fitted.
-        quick_window_s: Length of a shorter window in which a trend must be strong to count; by it
-            a turn is seen sooner.
-        quick_sigmas: How many standard deviations of its slope that is, and twice `rate_enter`.
+        change_sigmas: By how many standard deviations, and by twice `rate_enter`, a line over a shorter
+            window must differ from that over a longer one for the longer one to be out of date.
         parting_gap: Gap up to which the motion of two bodies tells that they part, image diagonals.
         motion_window_s: Length of the window over which velocities are fitted.
         rate_enter: Trend that must be exceeded to converge or diverge, image diagonals per second.
@@ -57,8 +56,7 @@ class RelationSettings:
     window_s: float = 1.5
     samples: int = 64
     bins: int = 16
-    quick_window_s: float = 0.7
-    quick_sigmas: float = 4.0
+    change_sigmas: float = 4.0
     parting_gap: float = 0.02
     motion_window_s: float = 1.25
     rate_enter: float = 0.002
@@ -92,10 +90,11 @@ class Kinematics:
         ids: (M,) object ids, increasing.
         tables: (5, M, M) `gap`, `rate`, `rate_sigma`, `relative_speed`, `time_to_contact`.
         motion: (3, M, 2) velocities over the window of motion, in its first and in its second half,
-            pixels per second in the image.
-        speed: (M,) pixels per second in the image.
+            pixels per second in the image, less those of the camera where they are perceived.
+        speed: (M,) the same, pixels per second.
         depth: (M,) in the objects' units.
-        spread: Standard deviation of a component of a velocity that noise of the outlines makes.
+        velocity_sigma: (M,) standard deviation of a component of each velocity that noise of the outlines
+            makes, pixels per second.
         noise_px: Standard deviation of an outline, pixels.
     """
 
@@ -104,7 +103,7 @@ class Kinematics:
     motion: Floats = field(default_factory=lambda: np.zeros((3, 0, 2)))
     speed: Floats = field(default_factory=lambda: np.zeros(0))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    spread: float = float("nan")
+    velocity_sigma: Floats = field(default_factory=lambda: np.zeros(0))
     noise_px: float = 0.0
 
     @property
@@ -144,11 +143,6 @@ class Kinematics:
         """(M, 2) pixels per second in the image."""
         found: Floats = self.motion[0]
         return found
-
-    @property
-    def velocity_sigma(self) -> Floats:
-        """(M,) standard deviation of a component of each velocity, pixels per second."""
-        return np.full(len(self.ids), self.spread)
 
     def pair(self, quantity: str, a: int, b: int) -> float:
         """One quantity of one pair ('gap', 'rate', 'time_to_contact', ...), NaN when unknown."""
@@ -191,8 +185,7 @@ class Kinematics:
         if quantity == "rate":
             return self.pair("rate_sigma", a, b)
         if quantity == "relative_speed":
-            both = a in self.ids and b in self.ids
-            return sqrt(2.0) * self.spread if both else float("nan")
+            return float(np.hypot(self.one("velocity_sigma", a), self.one("velocity_sigma", b)))
         return self.noise_px * sqrt(2.0)
 
 
@@ -225,16 +218,15 @@ class KinematicsEstimator:
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
         noise, strong = s.judge.noise_px, 2.0 * s.rate_enter * diagonal
         gaps = self._gaps(objects, seen, h, mind, before)
-        windows = s.window_s, s.quick_window_s, s.motion_window_s
+        windows = s.window_s, s.motion_window_s
         slope, sigma, motion, spread = fit_motion(
             h.times,
-            h.support,
+            h.steady_support,
             h.free,
             h.separation,
             DIRECTIONS,
-            (*windows, noise, strong, s.quick_sigmas, s.misfit * diagonal),
+            (*windows, noise, strong, s.change_sigmas, s.misfit * diagonal),
             s.bins,
-            mind.time,
         )
         found, speed = pair_tables(
             gaps,
@@ -244,7 +236,7 @@ class KinematicsEstimator:
             h.support[-1] if len(h.times) else NOWHERE,
             seen,
             DIRECTIONS,
-            (s.parting_gap * diagonal, strong, s.quick_sigmas, 0.5 * s.window_s),
+            (s.parting_gap * diagonal, strong, s.change_sigmas, 0.5 * s.window_s),
         )
         depth = np.array([np.nan if b.depth is None else b.depth for b in objects])
         return Kinematics(h.ids, found, motion, speed, depth, spread, noise)

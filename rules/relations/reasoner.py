@@ -88,7 +88,7 @@ from visup.rules.relations.rows import (
 )
 from visup.rules.relations.rows import TableRow as T
 from visup.rules.relations.rows import ValueRow as V
-from visup.rules.relations.samples import SampleWindow, covers_window, sampled
+from visup.rules.relations.samples import SampleWindow, covers_window, drifted, sampled
 from visup.rules.relations.thresholds import least_durations, limits
 from visup.rules.relations.trend import CONVERGING, DIVERGING, KEEPING, TREND_NAMES
 from visup.rules.smoothing.ema import new_share
@@ -171,6 +171,7 @@ class RelationMemory:
         states: (ROWS, P) states of the pairs of the history's objects.
         rcc8: (2, P) RCC-8 of boxes and of outlines, which follow from some of these states.
         smooth: What states of place are judged by.
+        drift: (M, 2) pixels by which the camera's motion has moved each of the history's objects.
     """
 
     history: SampleWindow = field(default_factory=SampleWindow)
@@ -178,6 +179,7 @@ class RelationMemory:
     states: HysteresisState = field(default_factory=lambda: unknown_states((ROWS, 0), 0.0))
     rcc8: HysteresisState = field(default_factory=lambda: unknown_states((2, 0), 0.0))
     smooth: SmoothedGeometry = field(default_factory=lambda: _no_smooth())
+    drift: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 RELATIONS = MemoryKey("rules.relations", RelationMemory())
@@ -234,7 +236,9 @@ class RelationReasoner:
         kept = mind.recall(RELATIONS)
         objects = mind.present()
         before = _reindexed_memory(kept, tuple(b.id for b in objects), mind.time)
-        history = sampled(kept.history, objects, mind, observation, s.window_s, s.samples)
+        drift = drifted(before.drift, objects, observation)
+        reach = s.window_s, s.samples
+        history = sampled(kept.history, objects, mind, observation, drift, reach)
         seen = sightings(objects, mind.time)
         now = KinematicsEstimator(s)(history, objects, seen, mind, kept.measured)
         smooth = self._smooth(before.smooth, now, objects, seen, mind)
@@ -245,7 +249,7 @@ class RelationReasoner:
             state = states.state
             held = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
             rcc8 = advance(rcc8, held, mind.time, 0.0)
-        kept = RelationMemory(history, now, states, rcc8, smooth)
+        kept = RelationMemory(history, now, states, rcc8, smooth, drift)
         table = RelationTable(now.ids, (self._cells(kept, mind),))
         return Outcome(mind.remember(RELATIONS, kept, relations=table))
 
@@ -355,6 +359,7 @@ def _reindexed_memory(kept: RelationMemory, ids: tuple[int, ...], now: float) ->
     if kept.history.ids == ids:
         return kept
     rows, numbers = reindexing(kept.history.ids, ids)
+    drift = np.append(kept.drift, np.zeros((1, 2)), axis=0)[rows]
     smooth = SmoothedGeometry(
         kept.smooth.time,
         np.append(kept.smooth.boxes, np.full((1, 4), np.nan), axis=0)[rows],
@@ -362,7 +367,7 @@ def _reindexed_memory(kept: RelationMemory, ids: tuple[int, ...], now: float) ->
         np.append(kept.smooth.outlines, np.full((3, 1), np.nan), axis=1).take(numbers, axis=1),
     )
     states, rcc8 = kept.states.select(numbers, now), kept.rcc8.select(numbers, now)
-    return replace(kept, states=states, rcc8=rcc8, smooth=smooth)
+    return replace(kept, states=states, rcc8=rcc8, smooth=smooth, drift=drift)
 
 
 def _marks(ids: tuple[int, ...], mind: Mind) -> Codes:

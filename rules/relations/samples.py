@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.agent import Mind, ObjectBelief, Observation, Presence
+from visup.agent import CameraMotion, Mind, ObjectBelief, Observation, Presence
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.outlines import write_support
-from visup.rules.geometry.regions import FAN, Floats, hull_separation
+from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, hull_separation
 from visup.rules.presence.object_tracks import merged_pairs, presence_memory
 
 ROOM = 64
@@ -32,6 +33,8 @@ class SampleWindow:
         free: (T, M, 16) bool.
         separation: (T, M, M) signed hull distances, pixels.
         depth: (T, M) in the objects' units; NaN where unknown.
+        drift: (T, M, 2) pixels by which the camera's motion has moved what rests where each object is,
+            since it is sampled.
         start: Row of their memory in which the arrays begin.
     """
 
@@ -41,12 +44,21 @@ class SampleWindow:
     free: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0, FAN), dtype=bool))
     separation: Floats = field(default_factory=lambda: np.zeros((0, 0, 0)))
     depth: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    drift: Floats = field(default_factory=lambda: np.zeros((0, 0, 2)))
     start: int = 0
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """Times, and what was sampled at these."""
-        return self.times, self.support, self.free, self.separation, self.depth
+        return self.times, self.support, self.free, self.separation, self.depth, self.drift
+
+    @property
+    def steady_support(self) -> Floats:
+        """(T, M, 16) pixels: the reach of the outlines in the resting scene, not in the picture."""
+        if not self.drift.any():
+            return self.support
+        steady: Floats = self.support - self.drift @ DIRECTIONS.T
+        return steady
 
 
 def sampled(
@@ -54,8 +66,8 @@ def sampled(
     objects: tuple[ObjectBelief, ...],
     mind: Mind,
     observation: Observation,
-    window_s: float,
-    most: int,
+    drift: Floats,
+    limits: tuple[float, int],
 ) -> SampleWindow:
     """A history with this step's sample, and without those that are too old.
 
@@ -64,13 +76,14 @@ def sampled(
         objects: The objects that are present now, by id.
         mind: The mind.
         observation: Whether anybody looked for regions in this step.
-        window_s: How far back samples are kept, seconds.
-        most: Most samples in that time; a sample that comes sooner is left out.
+        drift: (M, 2) pixels; see `SampleWindow`.
+        limits: How far back samples are kept, seconds; most samples in that time: one that comes sooner
+            is left out.
 
     Returns:
         The samples of these objects; NaN for those that are not seen now.
     """
-    ids = tuple(b.id for b in objects)
+    ids, (window_s, most) = tuple(b.id for b in objects), limits
     history = reindexed(history, ids)
     old = int(history.times.searchsorted(mind.time - window_s - 1e-6, side="right"))
     least = window_s / most
@@ -85,8 +98,31 @@ def sampled(
         if b.last_seen == mind.time and b.presence is Presence.SEEN and b.id not in joint:
             write_support(b.region, mind.frame_size, support[i], free[i])
             depth[i] = np.nan if b.depth is None else b.depth
-    row = (mind.time, support, free, hull_separation(support), depth)
+    row = (mind.time, support, free, hull_separation(support), depth, drift)
     return extended(without_reassigned(history, mind), row, old)
+
+
+def drifted(before: Floats, objects: Sequence[ObjectBelief], observation: Observation) -> Floats:
+    """How far the camera's own motion has moved the picture where each object is, after one more frame.
+
+    What rests in the scene moves through the picture of a camera that pans, shakes or zooms. The motion
+    is taken at the middle of an object, so that of a zoom or a turn only the shift is taken off, not
+    the growth. Where nobody tells of the camera it is taken to rest.
+
+    Args:
+        before: (M, 2) pixels, up to the frame before.
+        objects: M of them.
+        observation: What was perceived; of several motions of the camera the last counts.
+
+    Returns:
+        (M, 2) pixels; the same array where the camera rests.
+    """
+    told: Sequence[CameraMotion] = observation.of("camera")
+    if not told or np.array_equal(told[-1].motion, np.eye(2, 3)):
+        return before
+    moved = [told[-1].displacement(b.region.centroid) for b in objects]
+    drift: Floats = before + np.array(moved).reshape(-1, 2)
+    return drift
 
 
 def covers_window(history: SampleWindow, window_s: float) -> bool:
@@ -102,12 +138,13 @@ def reindexed(history: SampleWindow, ids: tuple[int, ...]) -> SampleWindow:
     t, m = len(history.times), len(ids)
     support, free = np.full((t, m, FAN), np.nan), np.zeros((t, m, FAN), dtype=bool)
     separation, depth = np.full((t, m, m), np.nan), np.full((t, m), np.nan)
+    drift = np.zeros((t, m, 2))
     new = [i for i, x in enumerate(ids) if x in history.ids]
     old = [history.ids.index(ids[i]) for i in new]
     support[:, new], free[:, new] = history.support[:, old], history.free[:, old]
-    depth[:, new] = history.depth[:, old]
+    depth[:, new], drift[:, new] = history.depth[:, old], history.drift[:, old]
     separation[np.ix_(range(t), new, new)] = history.separation[np.ix_(range(t), old, old)]
-    return SampleWindow(ids, history.times, support, free, separation, depth)
+    return SampleWindow(ids, history.times, support, free, separation, depth, drift)
 
 
 def without_reassigned(history: SampleWindow, mind: Mind) -> SampleWindow:
@@ -132,12 +169,12 @@ def without_oldest(history: SampleWindow, old: int) -> SampleWindow:
     """A history without its `old` oldest samples."""
     if not old:
         return history
-    times, support, free, separation, depth = (a[old:] for a in history.arrays)
-    return SampleWindow(history.ids, times, support, free, separation, depth, history.start + old)
+    left = (a[old:] for a in history.arrays)
+    return _window(history.ids, left, history.start + old)
 
 
 def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> SampleWindow:
-    """A history with one more sample (time, support, free, separation, depth) and without old ones."""
+    """A history with one more sample, a row of each of its arrays, and without old ones."""
     count = len(history.times)
     end = history.start + count
     memory: list[Any] = [a.base for a in history.arrays]
@@ -150,8 +187,7 @@ def extended(history: SampleWindow, row: tuple[Any, ...], old: int = 0) -> Sampl
     for values, new in zip(memory, row, strict=True):
         values[end] = new
     start = history.start + old
-    times, support, free, separation, depth = [m[start : end + 1] for m in memory]
-    return SampleWindow(history.ids, times, support, free, separation, depth, start)
+    return _window(history.ids, (m[start : end + 1] for m in memory), start)
 
 
 def _with_room(history: SampleWindow, more: int) -> SampleWindow:
@@ -164,5 +200,10 @@ def _with_room(history: SampleWindow, more: int) -> SampleWindow:
         wide[:count] = values
         return wide[:count]
 
-    times, support, free, separation, depth = map(roomy, history.arrays)
-    return SampleWindow(history.ids, times, support, free, separation, depth)
+    return _window(history.ids, map(roomy, history.arrays))
+
+
+def _window(ids: tuple[int, ...], arrays: Iterable[NDArray[Any]], start: int = 0) -> SampleWindow:
+    """The samples of some objects, from arrays in the order of `SampleWindow.arrays`."""
+    times, support, free, separation, depth, drift = arrays
+    return SampleWindow(ids, times, support, free, separation, depth, drift, start)

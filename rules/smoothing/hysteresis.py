@@ -72,8 +72,9 @@ def advance(
 ) -> HysteresisState:
     """Move every state towards what the latest measurement wants.
 
-    A known state wants to be believed for `minimum_s` without a break before it is; to become
-    unknown takes no time, since nothing is claimed by it.
+    A known state is left once nothing has spoken for it for `minimum_s` without a break, for what is
+    wanted then; from an unknown one the same must have been wanted for so long. To become unknown takes
+    no time, since nothing is claimed by it.
 
     Args:
         states: The states before.
@@ -115,7 +116,10 @@ def _advanced(
     after, moments, waiting = state.copy(), since.copy(), pending_since.copy()
     for row in range(len(state)):
         for k in range(state.shape[1]):
-            if wanted[row, k] != pending[row, k]:
+            # What is left for one thing now, for another next, is left all the same.
+            was, to, wish = state[row, k], pending[row, k], wanted[row, k]
+            left = was != UNKNOWN and to != UNKNOWN and to != was and wish != was
+            if wish != to and not left:
                 waiting[row, k] = now
             if wanted[row, k] == state[row, k]:
                 continue

@@ -32,8 +32,6 @@ class ActionDefinition:
             than being over once it has held long enough (`coupled`).
         hold_s: Seconds for which it must have held to count as done, unless `for` says otherwise.
         entry: It is seen to begin when one of these is true; `holds` when empty.
-        while_not: A touch does not make it begin while one of these is still true: what draws
-            nearer has not met yet, however little lies between in the image.
         progress: Further relations that bring it nearer although it does not hold yet.
         contrary: Relations that say that it fails.
         expects: Further relations that are no reason for worry while it is asked for.
@@ -50,7 +48,6 @@ class ActionDefinition:
     lasts: bool = False
     hold_s: float = 1.0
     entry: tuple[str, ...] = ()
-    while_not: tuple[str, ...] = ()
     progress: tuple[str, ...] = ()
     contrary: tuple[str, ...] = ()
     expects: tuple[str, ...] = ()
@@ -106,7 +103,7 @@ _TABLE = (
     ),
     ActionDefinition(
         "moving_together",
-        holds=("moving_together", "coupled"),
+        holds=("moving_together",),
         lasts=True,
         hold_s=0.6,
         contrary=("converging", "diverging"),
@@ -127,7 +124,6 @@ _TABLE = (
         "coupled",
         holds=("coupled",),
         entry=("coupled", "in_contact"),
-        while_not=("converging",),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),
@@ -138,7 +134,6 @@ _TABLE = (
         "held_by",
         holds=("coupled",),
         entry=("coupled", "in_contact"),
-        while_not=("converging",),
         progress=("touching", "moving_together", "converging"),
         contrary=("diverging", "decoupled"),
         expects=("converging", "touching", "moving_together"),

@@ -14,6 +14,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from visup.agent import Binding, Mind, ObjectBelief, Presence
+from visup.agent.model.fast_replace import replace
+from visup.tasks.casting.exclusion import guessed
 from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import machines_of, stage_actors, stage_names, task_actors
@@ -49,7 +51,7 @@ def match(
     """
     actors = task_actors(task)
     models = {a: models_of(task, a, mind) for a in actors}
-    held = {b.actor: b.object_id for b in before if b.object_id is not None}
+    held = {b.actor: b.object_id for b in before if b.object_id is not None and not b.guessed}
     objects = [b for _, b in sorted(mind.objects.items()) if _eligible(b, held)]
     found: dict[str, tuple[int, float]] = {}
     if objects:
@@ -63,7 +65,8 @@ def match(
             ]
             chosen = best_matching(weight).items()
             found |= {group[i]: (free[j].id, pure[i][j]) for i, j in chosen}
-    return tuple(Binding(a, models[a], *found.get(a, (None, 0.0))) for a in actors)
+    bindings = [Binding(a, models[a], *found.get(a, (None, 0.0))) for a in actors]
+    return guessed(task, mind, bindings, before, settings)
 
 
 def _machines_first(task: Task, actors: Sequence[str]) -> Iterator[tuple[str, ...]]:
@@ -158,6 +161,7 @@ def unexplained(
     rests on a few seconds only; only one that is clearly something else is unexplained.
     """
     bound = {b.object_id for b in bindings if b.object_id is not None}
+    bindings = [replace(b, object_id=None) if b.guessed else b for b in bindings]
     if task is not None:
         bound.update(bystanders(task, mind, bindings, settings))
     others = [o for o in mind.present() if o.id not in bound and o.presence is not Presence.HIDDEN]

@@ -127,9 +127,7 @@ class Advance:
         return skipped * hmm.unseen
 
     def _opens(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
-        """Whether all that a transition enters was seen to begin, and nothing says "not yet"."""
-        if any(self.observe(s).not_yet for s in transition.entered):
-            return False
+        """Whether all that a transition enters was seen to begin."""
         met = dict(hypothesis.met).get(transition.entered, -math.inf)
         return self.now - met <= self.steps.settings.contact_s
 
@@ -161,9 +159,10 @@ class Advance:
         return math.prod(self._passed_over(x) for x in transition.left)
 
     def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
-        if leaf.payload.fulfilled:
+        # What held, and must not for any time, is over as soon as the next thing is seen.
+        lasts, held = self.steps.actions[leaf.step.action].lasts, leaf.payload.held
+        if leaf.payload.fulfilled or (held and not lasts and leaf.step.hold_s is None):
             return 1.0
-        lasts = self.steps.actions[leaf.step.action].lasts
         missed = not lasts and not leaf.payload.held and leaf.payload.broken_since is not None
         return self.steps.hmm.pass_over ** (2 if missed else 1)
 

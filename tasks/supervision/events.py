@@ -45,14 +45,14 @@ def stage_events(before: TaskBelief, now: TaskBelief, mind: Mind, task: Task) ->
     Yields:
         Events of stages in the order of the task, then a change of the verdict.
     """
-    was = {s.stage: s.status for s in before.stages}
-    changed = [s for s in now.stages if was.get(s.stage, Status.PENDING) is not s.status]
+    was = {s.stage: s for s in before.stages}
+    changed = [s for s in now.stages if _is_news(was.get(s.stage), s)]
     if not changed and now.verdict is before.verdict:
         return
     mind = replace(mind, tasks=(now,))  # objects are called what they play in this task
     first = all(s.status is Status.PENDING for s in before.stages)
     for stage in changed:
-        for kind in _kinds(was.get(stage.stage, Status.PENDING), stage.status):
+        for kind in _kinds(was.get(stage.stage), stage):
             event = _stage_event(kind, stage, now, mind)
             if first and kind == "stage_started" and event.objects:
                 event = replace(event, text=_introduction(stage, now, mind))
@@ -141,15 +141,21 @@ def stage_concerns(belief: TaskBelief, violated: str = "") -> Iterator[AlertCond
             )
 
 
-def _kinds(was: Status, now: Status) -> Iterator[str]:
-    if was is now:
-        return
-    begins = was in (Status.PENDING, Status.DONE) and now not in (Status.PENDING, Status.UNKNOWN)
+def _is_news(was: StageBelief | None, now: StageBelief) -> bool:
+    before = Status.PENDING if was is None else was.status
+    return now.status is not before or now.begun is not (was is not None and was.begun)
+
+
+def _kinds(was: StageBelief | None, now: StageBelief) -> Iterator[str]:
+    before = Status.PENDING if was is None else was.status
     # What was told done and fails has not begun anew: it is undone.
-    if begins and (was is Status.PENDING or now not in (Status.DONE, *BAD)):
+    again = before is Status.DONE and now.status in (Status.PROGRESSING, Status.STALLED)
+    if again or (now.begun and not (was is not None and was.begun)):
         yield "stage_started"
-    if now in KINDS and not (was is Status.UNKNOWN and now is Status.PENDING):
-        yield KINDS[now]
+    if now.status is before:
+        return
+    if now.status in KINDS and not (before is Status.UNKNOWN and now.status is Status.PENDING):
+        yield KINDS[now.status]
 
 
 def _worth_telling(was: Verdict, now: Verdict) -> bool:

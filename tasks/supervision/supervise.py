@@ -43,6 +43,7 @@ from visup.tasks.supervision.belief import (
     pending_stages,
     suppressed,
     task_belief,
+    with_begun,
 )
 from visup.tasks.supervision.events import (
     activity_events,
@@ -248,7 +249,8 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     belief = failed_belief(belief, memory.belief, violated, now) if violated else belief
     lasting = tuple(i for i, since in strange if now - since >= settings.unexplained_s)
     one = machines(model.task, bindings)
-    belief = replace(belief, unexplained=lasting, bystanders=let_be, machines=one)
+    stages = with_begun(memory.belief.stages, belief.stages)
+    belief = replace(belief, stages=stages, unexplained=lasting, bystanders=let_be, machines=one)
     return TaskMemory(
         now,
         posterior,
@@ -325,7 +327,7 @@ def _bind(
 
 
 def _changes_hands(before: Binding, now: Binding, mind: Mind) -> bool:
-    if before.object_id is None or before.object_id == now.object_id:
+    if before.object_id is None or before.guessed or before.object_id == now.object_id:
         return False
     belief = mind.objects.get(before.object_id)
     return belief is not None and belief.presence is not Presence.LEFT
@@ -336,6 +338,8 @@ def _refreshed(task: Task, binding: Binding, mind: Mind, playing: Mapping[str, i
     belief = None if binding.object_id is None else mind.objects.get(binding.object_id)
     if belief is None:
         return replace(binding, object_id=None, strength=0.0)
+    if binding.guessed:
+        return binding
     (now,) = fits(Role(task, binding.actor, mind, playing), binding.models, [belief])
     return replace(binding, strength=now)
 

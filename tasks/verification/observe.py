@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
+from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.relations.reasoner import kinematics
 from visup.tasks.actions.actions import ActionDefinition
@@ -17,6 +18,9 @@ from visup.tasks.actions.vocabulary import FactEvaluator
 NOTHING: Mapping[str, FactEvaluator] = MappingProxyType({})
 NEVER: Mapping[str, float] = MappingProxyType({})
 TRENDS = ("converging", "diverging")
+
+CARRIED_SPEED = 0.005
+"""Speed from which on two that are coupled move together, image diagonals per second."""
 
 RADIAL_SHARE = 0.45
 """Two draw nearer or apart where their distance changes at no less than this share of their relative speed;
@@ -32,7 +36,6 @@ class ActionObservation:
         held_by: A true relation by which it holds, or None.
         helps: A true relation by which it holds or comes nearer, or None.
         entry: A true relation by which it begins, or None.
-        not_yet: Whether the entry does not count yet (`while_not`).
         contrary: A true relation that says that it fails, or None.
         stern: Whether the contrary counts although the action holds: the course itself says so.
         over: Whether what its course says of its end is seen; None when the course says nothing.
@@ -45,7 +48,6 @@ class ActionObservation:
     held_by: Relation | None = None
     helps: Relation | None = None
     entry: Relation | None = None
-    not_yet: bool = False
     contrary: Relation | None = None
     decisive: bool = False
     over: Truth | None = None
@@ -96,7 +98,12 @@ class RelationLookup:
         meets = name == "touching" and found is not None and found.truth is Truth.TRUE
         if meets and found is not None and self._passes_by(objects):
             return replace(found, truth=Truth.UNKNOWN)
-        if found is not None and found.truth is not Truth.UNKNOWN:
+        settled = found is not None and found.truth is not Truth.UNKNOWN
+        if (
+            found is not None
+            and settled
+            and (name != "moving_together" or found.truth is Truth.TRUE)
+        ):
             return found
         derive = DERIVED.get(name)
         derived = derive(self._mind, self, objects) if derive else None
@@ -199,8 +206,6 @@ def observe(
         held_by=held_by,
         helps=helps,
         entry=entry,
-        not_yet=holds is not Truth.TRUE
-        and relations.first_true(meaning.while_not, ids) is not None,
         contrary=contrary,
         observed=relations.known(known, ids),
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
@@ -226,6 +231,19 @@ def _coupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Rel
 
 def _decoupled(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
     return _opposite("decoupled", relations.find("coupled", ids))
+
+
+def _moving_together(
+    mind: Mind, relations: RelationLookup, ids: tuple[int, ...]
+) -> Relation | None:
+    """Moving together when they are coupled and on the move, however much one of them sways."""
+    coupled = relations.find("coupled", ids)
+    if coupled.truth is not Truth.TRUE:
+        return None
+    slower = min(kinematics(mind).one("speed", i) for i in ids)
+    if not slower > CARRIED_SPEED * image_diagonal(mind.frame_size):
+        return None
+    return relations.lasting("moving_together", ids, Truth.TRUE)
 
 
 def _in_contact(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
@@ -274,6 +292,7 @@ def _opposite(name: str, relation: Relation) -> Relation | None:
 DERIVED: Mapping[str, Derive] = {
     "coupled": _coupled,
     "in_contact": _in_contact,
+    "moving_together": _moving_together,
     "decoupled": _decoupled,
     "apart": _apart,
     "on": _on,

@@ -20,6 +20,7 @@ class TaskSettings:
         contrary_s: The contrary of an action must hold so long before a begun stage fails.
         contrary_early_s: The same for a stage that has not begun yet.
         recover_s: A failing stage must make progress so long before it counts as recovered.
+        recover_share: The same as a share of the time for which it has been failing; the longer one counts.
         stalled_s: A begun stage without progress for so long is stalled.
         unseen_s: A stage whose actors were not observed for so long is unknown.
         gap_s: A break of a `for` shorter than this is forgiven.
@@ -45,6 +46,7 @@ class TaskSettings:
     contrary_s: float = 0.5
     contrary_early_s: float = 2.0
     recover_s: float = 1.0
+    recover_share: float = 0.3
     stalled_s: float = 3.0
     unseen_s: float = 2.0
     gap_s: float = 0.5

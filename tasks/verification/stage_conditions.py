@@ -67,7 +67,7 @@ class ConditionEvaluator:
         true = found if found.truth is Truth.TRUE else None
         match sign.kind:
             case "begins":
-                return replace(seen, entry=true, not_yet=False, observed=known)
+                return replace(seen, entry=true, observed=known)
             case "ends":
                 return replace(seen, over=found.truth, observed=known)
             case "progresses":

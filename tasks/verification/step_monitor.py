@@ -269,9 +269,13 @@ def _long_failing(monitor: StepMonitor, now: float, settings: TaskSettings) -> b
 
 
 def _recovered(monitor: StepMonitor, now: float, settings: TaskSettings) -> bool:
-    """What failed for good goes on only when it has gone well for as long as that took."""
-    must = settings.failed_s if monitor.status is Status.FAILED else settings.recover_s
-    return monitor.better_since is not None and now - monitor.better_since >= must
+    """What has long failed must go well for longer; for good, for as long as that took."""
+    if monitor.better_since is None:
+        return False
+    lasted = monitor.better_since - monitor.since
+    must = max(settings.recover_s, settings.recover_share * lasted)
+    must = settings.failed_s if monitor.status is Status.FAILED else must
+    return now - monitor.better_since >= must
 
 
 def _first(earlier: float | None, now: float) -> float:

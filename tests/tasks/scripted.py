@@ -135,7 +135,9 @@ def _measured(gap: float) -> RelationMemory:
     tables = np.full((5, 2, 2), np.nan)
     tables[PairQuantity.GAP] = [[np.nan, gap], [gap, np.nan]]
     nothing = np.full(2, np.nan)
-    known = Kinematics((ARM, SATELLITE), tables, np.full((3, 2, 2), np.nan), nothing, nothing)
+    known = Kinematics(
+        (ARM, SATELLITE), tables, np.full((3, 2, 2), np.nan), nothing, nothing, nothing
+    )
     return RelationMemory(measured=known)
 
 

@@ -1,4 +1,4 @@
-"""Where points of a frame went: on things, and on a grid that tells how the camera moved."""
+"""Where points of a frame went: on things, and all over the picture."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 
 STILL = np.eye(2, 3)
+NO_POINTS = np.zeros((0, 2), dtype=np.float32)
 _GRID = 12, 8  # cells of the picture, in each of which one point tells of the camera
 _WINDOW = (13, 13)
 _BACK = 0.7  # pixels: a point that does not come back as near as this was lost
@@ -24,7 +25,7 @@ class PointMotion:
     Attributes:
         before: (N, 2) float32, working pixels of the frame before.
         after: (N, 2) float32, in this frame.
-        owner: (N,) int64, number of the thing that a point is on; -1 for the grid of the camera.
+        owner: (N,) int64, number of what a point is on.
     """
 
     before: NDArray[np.float32]
@@ -69,12 +70,15 @@ def follow_points(
     return PointMotion(points[fine], at.reshape(-1, 2)[fine], owner[fine])
 
 
-def grid_points(scene: Scene, taken: NDArray[np.bool_] | None) -> NDArray[np.float32]:
+def grid_points(
+    scene: Scene, taken: NDArray[np.bool_] | None, known: NDArray[np.float32] = NO_POINTS
+) -> NDArray[np.float32]:
     """(N, 2) float32: the best point to follow in each cell of a grid, away from things.
 
     Args:
         scene: The frame.
         taken: (h, w) bool, where things are; None where none are known.
+        known: (K, 2) float32, points in whose cells no other is wanted, working pixels.
     """
     width, height = scene.size
     strength = cv2.cornerMinEigenVal(cv2.pyrDown(scene.grey), 5)
@@ -91,25 +95,12 @@ def grid_points(scene: Scene, taken: NDArray[np.bool_] | None) -> NDArray[np.flo
     flat = cells.reshape(rows * cols, h * w)
     best = flat.argmax(axis=1)
     good = flat[np.arange(len(flat)), best] > 1e-5
+    x, y = np.clip(known.T // ((2 * w,), (2 * h,)), 0, ((cols - 1,), (rows - 1,))).astype(int)
+    good[y * cols + x] = False
     row, col = np.divmod(np.arange(rows * cols), cols)
     y, x = row * h + best // w, col * w + best % w
     at = np.stack([x, y], axis=1)[good] * 2.0 + 0.5
     return np.asarray(np.minimum(at, (width - 1, height - 1)), dtype=np.float32)
-
-
-def camera_motion(points: PointMotion) -> Doubles | None:
-    """(2, 3) similarity of the picture that most of the grid follows; None when it does not agree.
-
-    A camera that rests gives exactly `STILL`.
-    """
-    before, after = points.of(-1)
-    if len(before) < 8:
-        return STILL
-    off = np.hypot(*(after - before).T)
-    if np.mean(off < 0.25) > 0.6:
-        return STILL
-    found = similarity_of(before, after, 1.0)
-    return found[0] if found is not None and found[1] > 0.45 else None
 
 
 def similarity_of(

@@ -10,8 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.looks.pose import Doubles
 from visup.percepts.appearance.looks.scene import Scene
 from visup.percepts.appearance.looks.thing_model import ViewModel
+from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
 from visup.percepts.appearance.tracking.change import ChangeMap
 from visup.percepts.appearance.tracking.finding import (
     SURE,
@@ -29,11 +31,10 @@ from visup.percepts.appearance.tracking.following import (
 )
 from visup.percepts.appearance.tracking.learning import learned, rested
 from visup.percepts.appearance.tracking.points import (
+    NO_POINTS,
     STILL,
     PointMotion,
-    camera_motion,
     follow_points,
-    grid_points,
 )
 from visup.percepts.appearance.tracking.recalling import recalled
 from visup.percepts.appearance.tracking.segmentation import (
@@ -48,7 +49,6 @@ from visup.percepts.appearance.tracking.track import IN_VIEW, Blob, State, Thing
 
 Mask = NDArray[np.bool_]
 
-NO_POINTS = np.zeros((0, 2), dtype=np.float32)
 POINTS = 24  # that are followed on each thing
 HOLD_S = 0.12  # how long a thing that is lost is still reported where it should be
 LEAST_SEEN = 0.04  # share of a thing below which nothing of it is seen
@@ -75,7 +75,21 @@ class ThingTracker:
         self._change = ChangeMap()
         self._count = 0
         self._static = True
-        self._camera = STILL
+        self._camera: Doubles | None = STILL
+        self._scenery = CameraTrack()
+
+    @property
+    def camera(self) -> Doubles | None:
+        """(2, 3) similarity of the picture since the frame before, pixels of the frame; None unknown.
+
+        What the points of the picture away from things do is taken for the camera's motion: where most
+        of the picture is something that moves by itself, such as water, it is taken for that.
+        """
+        if self._camera is None or self._camera is STILL or self.scene is None:
+            return self._camera
+        found = self._camera.copy()
+        found[:, 2] /= self.scene.scale
+        return found
 
     def save(self) -> Mapping[str, Any]:
         """All that is remembered of the frames so far."""
@@ -102,9 +116,9 @@ class ThingTracker:
             same = {t.name: unchanged(scene, t.rest) for t in self.tracks if t.rest is not None}
             self._follow(old, scene, same)
         else:
-            self._camera = STILL
+            self._camera, self._scenery = STILL, CameraTrack()
             self.tracks = tuple(_forgotten(t) for t in self.tracks)
-        self._change.update(scene, self._camera)
+        self._change.update(scene, STILL if self._camera is None else self._camera)
         self._find(scene)
         self._share_pixels(scene, same)
         self.tracks = tuple(_numbered(t, scene, new_id) for t in self.tracks)
@@ -124,12 +138,14 @@ class ThingTracker:
         if self._static and seen and len(resting) == len(seen):
             # The camera rests, too: what it shows has not moved by a pixel.
             moved = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64))
+            camera: Doubles | None = STILL
         else:
+            taken = _taken(self.tracks, old)
+            self._scenery, camera = followed_camera(self._scenery, old, scene, taken)
             moved = self._followed_points(old, scene, calm if self._static else set())
-        camera = camera_motion(moved)
         self._static = camera is STILL
-        self._camera = STILL if camera is None else camera
-        motion = FrameMotion(scene, self._camera, moved, self._count, same)
+        self._camera = camera
+        motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count, same)
         tracks = [followed(t, k, motion) for k, t in enumerate(self.tracks)]
         for k, t in enumerate(tracks):
             if t.state in IN_VIEW and t.seen == scene.time:
@@ -138,8 +154,8 @@ class ThingTracker:
         self.tracks = tuple(tracks)
 
     def _followed_points(self, old: Scene, scene: Scene, calm: Collection[str]) -> PointMotion:
-        """Points of the whole picture and of things that may move, and where they went."""
-        points = [(-1, grid_points(old, _taken(self.tracks, old)))]
+        """Points of things that may move, and where they went."""
+        points = [(-1, NO_POINTS)]
         for k, t in enumerate(self.tracks):
             rests = t.state is State.RESTING and t.name in calm
             if t.visible is not None and not rests:

@@ -160,3 +160,23 @@ def test_times_must_increase() -> None:
     monitor.step(1.0, {"x": 1})
     with pytest.raises(SettingsError, match="comes after"):
         monitor.step(1.0, {"x": 1})
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("eventually[60 s] x() > 0", ["unknown", "unknown", "true", "unknown"]),
+        ("henceforth[60 s] x() > 0", ["false", "false", "unknown", "false"]),
+        ("x() > 0 within 0.3 s", ["unknown", "unknown", "true", "true"]),
+        ("(eventually[9 s] x() > 0) and x() > -3", ["unknown", "unknown", "true", "unknown"]),
+    ],
+)
+def test_what_is_decided_already_need_not_be_waited_for(text: str, expected: list[str]) -> None:
+    monitor, other = (DenseTimeMonitor(parse_formula(text, signals("x"))) for _ in range(2))
+    told = []
+    for k, x in enumerate((-1, -2, 4, -1)):
+        monitor.step(k * 0.1, {"x": x})
+        other.step(k * 0.1, {"x": x})
+        told.append(verdict(monitor.foreseen()).value)
+    assert told == expected
+    assert monitor.step(90.0, {"x": 1}) == other.step(90.0, {"x": 1})  # asking has changed nothing

@@ -12,10 +12,7 @@ from visup.rules.geometry._fit_jit import (
     binned,
     binned_trends,
     common_motion,
-    fit_motion,
     median,
-    quick_trend,
-    slope_noise,
     velocities,
 )
 from visup.rules.geometry.regions import DIRECTIONS
@@ -127,37 +124,6 @@ def test_lines_and_bins_are_those_of_dumb_twins(seed: int, bins: int) -> None:
     assert one == pytest.approx(by_medians(*expected), nan_ok=True)
 
 
-@some
-@given(seeds, st.floats(0.1, 1.0), st.floats(0.1, 30.0))
-def test_a_strong_trend_of_the_last_part_counts_when_it_has_turned(
-    seed: int, share: float, least: float
-) -> None:
-    times, values = series(seed)
-    recent = int(share * (len(times) - 1))
-    noise, sigmas = 0.7, 4.0
-    slope, sigma = by_medians(*by_bins(times, values, 8))
-    sigma = np.maximum(sigma, slope_noise(times, noise))
-    quick, spread = by_medians(*by_bins(times[recent:], values[recent:], 8))
-    spread = np.maximum(spread, slope_noise(times[recent:], noise))
-    turned = abs(quick) > max(least, sigmas * spread) and np.sign(quick) != np.sign(slope)
-    steeper, apart = max(abs(slope), abs(quick)), abs(slope - quick)
-    if turned or (steeper > least and apart > max(sigmas * spread, 0.5 * steeper)):
-        slope, sigma = quick, spread
-    found = quick_trend(times, values, recent, (noise, least, sigmas), np.empty((10, 8)))
-    assert found == pytest.approx((slope, sigma), nan_ok=True)
-
-
-@pytest.mark.parametrize(
-    ("before", "after"), [(-40.0, 0.0), (0.0, 40.0), (10.0, 60.0), (30.0, -30.0)]
-)
-def test_what_changed_half_a_second_ago_is_told_as_it_is_now(before: float, after: float) -> None:
-    times = np.arange(0.0, 1.5, 1 / 15)
-    values = np.where(times < 0.8, before * (times - 0.8), after * (times - 0.8))
-    recent = int(np.searchsorted(times, times[-1] - 0.7, side="right"))
-    slope, _ = quick_trend(times, values, recent, (0.7, 2.4, 4.0), np.empty((10, 8)))
-    assert slope == pytest.approx(after, abs=2.0)
-
-
 def test_too_few_samples_give_no_slope() -> None:
     t = np.linspace(0.0, 1.0, 6)
     v = np.array([0.0, np.nan, 1.0, np.nan, np.nan, 2.0])
@@ -238,21 +204,3 @@ def test_velocities_over_spans_are_those_of_a_dumb_twin(
             usable = np.isfinite(slopes)
             alone = common_motion(np.nan_to_num(slopes), usable, DIRECTIONS, misfit)
             assert alone == pytest.approx(tuple(expected), nan_ok=True, abs=1e-5)
-
-
-def test_nothing_is_fitted_before_the_window_is_filled() -> None:
-    times = np.arange(5) / 25
-    slope, sigma, motion, spread = fit_motion(
-        times,
-        np.zeros((5, 2, 16)),
-        np.ones((5, 2, 16), dtype=bool),
-        np.zeros((5, 2, 2)),
-        DIRECTIONS,
-        (1.5, 0.7, 1.25, 0.5, 3.0, 4.0, 6.0),
-        16,
-        times[-1],
-    )
-    assert np.isnan(slope).all()
-    assert np.isnan(sigma).all()
-    assert np.isnan(motion).all()
-    assert spread == pytest.approx(slope_noise(times, 0.5))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -9,8 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
-from visup.agent import Binding, Candidate, Mind, ObjectBelief, Presence, TaskBelief, Verdict
+from visup.agent import (
+    Binding,
+    Candidate,
+    Mind,
+    ObjectBelief,
+    Observation,
+    Presence,
+    TaskBelief,
+    Verdict,
+)
 from visup.rules.presence.objects import ObjectReasoner, ObjectSettings
 
 S = ObjectSettings()
@@ -59,3 +70,18 @@ def test_a_hidden_thing_is_forgotten_in_seconds_unless_it_is_known(unseen_s: flo
 @pytest.mark.parametrize("object_id", [None, 8])
 def test_the_part_of_another_keeps_nobody(object_id: int | None) -> None:
     assert not remembered(with_part(object_id), HIDDEN, S.forget_nameless_s + 1)
+
+
+def test_what_is_recognised_by_its_looks_is_nobodys_part_and_comes_back_as_itself() -> None:
+    """A large arm closes round a small tray; then the tray is lost for a second, and has another region."""
+
+    def looks() -> Iterator[Observation]:
+        for i in range(150):
+            tray = None if 90 <= i < 115 else box_region(1 if i < 90 else 7, (300, 220, 40, 30))
+            arm = box_region(2, (200, 120, 260, 260)) if i >= 30 else None
+            names = {1 if i < 90 else 7: [("tray", 0.9)], 2: [("arm", 0.9)]}
+            yield seen(i, [tray, arm], names=names)
+
+    mind = reason(looks())[-1].mind
+    named = {b.name: b.id for b in mind.objects.values() if b.confirmed}
+    assert named == {"tray": 1, "arm": 2}

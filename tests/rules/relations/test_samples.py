@@ -1,14 +1,17 @@
 """Samples of many minds in one memory: no history is changed by what comes after it."""
 
+from typing import Any
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.rules.geometry.regions import FAN
 from visup.rules.relations.samples import ROOM, SampleWindow, extended, without_oldest
 
-Row = tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Row = tuple[float, *tuple[NDArray[Any], ...]]
 
 
 def row(time: float) -> Row:
@@ -19,18 +22,20 @@ def row(time: float) -> Row:
         np.full((1, FAN), round(time) % 2 == 0),
         np.full((1, 1), -time),
         np.full(1, 10 * time),
+        np.full((1, 2), 20 * time),
     )
 
 
 def empty() -> SampleWindow:
     blank = np.zeros((0, 1, FAN))
-    return SampleWindow((1,), np.zeros(0), blank, blank > 0, np.zeros((0, 1, 1)), np.zeros((0, 1)))
+    separation, depth, drift = (np.zeros((0, *n)) for n in ((1, 1), (1,), (1, 2)))
+    return SampleWindow((1,), np.zeros(0), blank, blank > 0, separation, depth, drift)
 
 
 def holds(history: SampleWindow, times: list[float]) -> bool:
     """Whether a history is what a plain list of its samples would be."""
     rows = [row(t) for t in times]
-    wanted = [np.array([r[k] for r in rows]) for k in range(5)]
+    wanted = [np.array([r[k] for r in rows]) for k in range(6)]
     return all(
         np.array_equal(a, w.reshape(a.shape)) for a, w in zip(history.arrays, wanted, strict=True)
     )

@@ -90,7 +90,7 @@ def measured(rng: np.random.Generator, m: int) -> Kinematics:
     motion = holed(rng, rng.normal(0.0, 6.0, (3, m, 2)) * rng.choice([0.2, 1.0]) + 9.0)
     tables[3] = np.hypot(*(motion[0][:, None] - motion[0]).transpose(2, 0, 1))
     speed, depth = np.hypot(*motion[0].T), holed(rng, rng.uniform(5.0, 8.0, m))
-    return Kinematics(tuple(range(m)), tables, motion, speed, depth, 0.5, 0.5)
+    return Kinematics(tuple(range(m)), tables, motion, speed, depth, np.full(m, 0.5), 0.5)
 
 
 @some
@@ -108,7 +108,9 @@ def test_trend_touch_and_moving_together_are_those_of_arrays(seed: int, m: int) 
     motion = pair_states_jit.PairMotion(now.tables, now.motion, now.speed, now.depth, gap, marks)
     pair_states_jit.classify_motion(state, pending, motion, bounds, found)
     i, j = pairs(m)
-    trend = twin.trends(now.rate[i, j], now.rate_sigma[i, j], state[0], pending[0], depth)
+    sway = pair_states_jit.SWAY * np.minimum(now.speed[i], now.speed[j])
+    rate, sigma = now.rate[i, j], now.rate_sigma[i, j]
+    trend = twin.trends(rate, sigma, sway, state[0], pending[0], depth)
     touch = twin.touches(gap, now.depth, state[1])
     trend = np.where((marks & 1 == 1) & (touch == 1) & (trend == 2), 1, trend)
     merged = marks & 2 == 2

@@ -103,12 +103,16 @@ def judged(
     return np.concatenate(rows)
 
 
-def trends(rate: Floats, sigma: Floats, before: Array, pending: Array, depth: Array) -> Array:
-    """(P,) trends by rates of 1.6 and 0.8, by 3 and 2 deviations, joined with those of depth."""
+def trends(
+    rate: Floats, sigma: Floats, sway: Floats, before: Array, pending: Array, depth: Array
+) -> Array:
+    """(P,) trends by rates of 1.6 and 0.8, or of what sways, by 3 and 2 deviations, joined with depth's."""
     sign = np.where(rate < 0, CONVERGING, DIVERGING)
-    strong = np.abs(rate) > np.maximum(1.6, np.where(pending == sign, 2.0, 3.0) * sigma)
+    enter, leave = np.fmax(1.6, sway), np.fmax(np.fmax(0.8, sway), sigma)
+    strong = np.abs(rate) > np.fmax(enter, np.where(pending == sign, 2.0, 3.0) * sigma)
+    strong &= np.isfinite(sigma)
     goes_on = ((before == CONVERGING) & (rate <= 0)) | ((before == DIVERGING) & (rate >= 0))
-    image = np.where(goes_on & (np.abs(rate) >= 0.8), before, KEEPING)
+    image = np.where(goes_on & (np.abs(rate) >= leave), before, KEEPING)
     image = np.where(strong, sign, image)
     image = np.where(np.isfinite(rate), image, UNKNOWN)
     against = (image == CONVERGING) & (depth == DIVERGING)

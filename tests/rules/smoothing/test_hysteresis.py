@@ -12,11 +12,16 @@ DT, LEAST = 0.1, 0.3
 
 
 def by_history(wanted: list[int]) -> int:
-    """The last code that was wanted for `LEAST` without a break, unless unknown came later."""
+    """What was wanted when the state before had not been for `LEAST`, unless unknown came later.
+
+    From unknown one code must have been wanted for so long.
+    """
     state = UNKNOWN
     for end in range(len(wanted)):
         tail = wanted[max(0, end - 3) : end + 1]
-        if wanted[end] == UNKNOWN or (len(tail) == 4 and len(set(tail)) == 1):
+        long = len(tail) == 4 and UNKNOWN not in tail
+        left = len(set(tail)) == 1 if state == UNKNOWN else state not in tail
+        if wanted[end] == UNKNOWN or (long and left):
             state = wanted[end]
     return state
 

@@ -153,6 +153,7 @@ def test_an_invariant_waits_as_long_as_it_says_and_counts_in_its_stages_only() -
     assert next(e.time for e in late.events if e.kind == kind) == pytest.approx(10.8, abs=0.2)
     # The stage that groups counts for those inside it.
     early = Script((Spell("converging", 0.5, 9.0), Spell("touching", 3.0, 4.5)))
+    text = text.replace("coupled", "diverging")
     during = watch(text.format(" during <first>"), early, 8.0)
     assert kind in [e.kind for e in during.events]
     assert kind not in [e.kind for e in watch(text.format(" during <second>"), early, 8.0).events]

@@ -1,0 +1,117 @@
+"""How the picture of the resting scene moves because the camera does.
+
+Points all over the picture, away from things, are followed from a key frame on, so that a slow drift adds up
+until it can be told from noise. A point that has long gone with the rest of the scene has more say than one
+that is new: an arm that comes into view is not taken for the scene, even where it fills most of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from visup.percepts.appearance.looks.pose import Doubles
+from visup.percepts.appearance.looks.scene import Scene
+from visup.percepts.appearance.tracking.points import (
+    NO_POINTS,
+    STILL,
+    follow_points,
+    grid_points,
+    similarity_of,
+)
+
+KEY_S = 0.5  # how long a key frame serves
+OFF_PX = 1.0  # working pixels by which a point of the scene may miss the motion of the others
+RESTS_PX = 0.35  # working pixels by which points move since the key frame while the camera rests
+RESTS, AGREE = 0.6, 0.45  # shares of the points that must rest, or go together
+LEAST = 8  # points that tell of the scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraTrack:
+    """Points of the scene since a key frame.
+
+    Attributes:
+        since: Seconds, of the key frame.
+        key: (N, 2) float32, where points were in it, working pixels.
+        now: (N, 2) float32, where they are in the last frame.
+        proven: (N,) bool, points that have gone with the scene over a key frame before.
+        motion: (2, 3) similarity of the picture from the key frame to the last one; `STILL` itself while
+            the camera rests; None while that is not known.
+    """
+
+    since: float = -np.inf
+    key: NDArray[np.float32] = field(default_factory=lambda: NO_POINTS)
+    now: NDArray[np.float32] = field(default_factory=lambda: NO_POINTS)
+    proven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    motion: Doubles | None = field(default_factory=lambda: STILL)
+
+
+def followed_camera(
+    before: CameraTrack, old: Scene, new: Scene, taken: NDArray[np.bool_] | None
+) -> tuple[CameraTrack, Doubles | None]:
+    """Follow the scene into the next frame.
+
+    Args:
+        before: The points up to the frame before.
+        old: The frame before.
+        new: The frame.
+        taken: (h, w) bool, where things are in the frame before; None where none are known.
+
+    Returns:
+        The points, and the (2, 3) similarity of the picture from the frame before to this one, working
+        pixels: `STILL` itself where the camera rests, None where the points do not agree.
+    """
+    due = new.time - before.since > KEY_S or before.motion is None or len(before.now) < LEAST
+    track = _new_key(before, old, taken) if due else before
+    moved = follow_points(old, new, track.now, np.arange(len(track.now)))
+    left = moved.owner
+    track = replace(track, key=track.key[left], now=moved.after, proven=track.proven[left])
+    motion = _scene_motion(track)
+    return replace(track, motion=motion), _between(track.motion, motion)
+
+
+def _new_key(before: CameraTrack, old: Scene, taken: NDArray[np.bool_] | None) -> CameraTrack:
+    """The frame before as a key frame: points that belong to the scene, and new ones where none are."""
+    with_scene = _goes_with(before)
+    if taken is not None and len(before.now):
+        at = np.clip(np.round(before.now).astype(int), 0, (old.size[0] - 1, old.size[1] - 1))
+        with_scene &= ~taken[at[:, 1], at[:, 0]]
+    proven = before.now[with_scene]
+    fresh = grid_points(old, taken, proven)
+    points = np.concatenate([proven, fresh])
+    known = np.arange(len(points)) < len(proven)
+    return CameraTrack(old.time, points, points, known)
+
+
+def _goes_with(track: CameraTrack) -> NDArray[np.bool_]:
+    """(N,) bool: points that go with the scene."""
+    if track.motion is None:
+        return np.zeros(len(track.now), dtype=bool)
+    there = track.key @ track.motion[:, :2].T + track.motion[:, 2]
+    return np.asarray(np.hypot(*(track.now - there).T) < OFF_PX)
+
+
+def _scene_motion(track: CameraTrack) -> Doubles | None:
+    """(2, 3) similarity of the picture since the key frame."""
+    use = track.proven if np.count_nonzero(track.proven) >= LEAST else np.ones(len(track.now), bool)
+    key, now = track.key[use], track.now[use]
+    if len(key) < LEAST:
+        return STILL
+    if np.mean(np.hypot(*(now - key).T) < RESTS_PX) > RESTS:
+        return STILL
+    found = similarity_of(key, now, OFF_PX)
+    return found[0] if found is not None and found[1] > AGREE else None
+
+
+def _between(old: Doubles | None, new: Doubles | None) -> Doubles | None:
+    """The similarity that leads from one to another; `STILL` itself where both are."""
+    if new is None or old is None:
+        return None
+    if np.array_equal(old, new):
+        return STILL
+    linear = np.linalg.inv(old[:, :2])
+    both = new[:, :2] @ linear
+    return np.column_stack([both, new[:, 2] - both @ old[:, 2]])

@@ -1,0 +1,113 @@
+"""Who plays an actor when nobody else is left: a guess, held until somebody is recognised.
+
+When all but one of the actors are found and rest, and one thing that nobody knows moves, that is the one
+which is missed: an arm in a posture in which it was never shown, a tool seen from behind. A guess gives way
+at once to what is recognised, explains nothing away, and never takes an actor from an object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+
+from visup.agent import Binding, Mind, ObjectBelief, Presence, Region
+from visup.agent.model.fast_replace import replace
+from visup.rules.geometry.regions import Floats, image_diagonal
+from visup.rules.relations.reasoner import kinematics
+from visup.tasks.grammar.nodes import Task
+from visup.tasks.verification.settings import TaskSettings
+
+MOVES = 0.01
+"""Speed from which on something clearly moves, image diagonals per second."""
+
+SIGMAS = 4.0
+"""How many standard deviations that is, too."""
+
+LARGER = 2.0
+"""So many times as large as any other that moves it must be: beside an arm its shadow moves."""
+
+
+def guessed(
+    task: Task,
+    mind: Mind,
+    bindings: Sequence[Binding],
+    before: Sequence[Binding],
+    settings: TaskSettings,
+) -> tuple[Binding, ...]:
+    """Bindings with a guess for the one actor that is missed, where there is reason for one.
+
+    Args:
+        task: The task.
+        mind: What is believed.
+        bindings: Of the actors, in their order; those whom nobody plays have no object.
+        before: The bindings of the last step: a guess is kept while nothing speaks against it.
+        settings: From which share of its votes an object is taken to be known.
+
+    Returns:
+        The same, or with one actor more, played by what moves.
+    """
+    missed = [k for k, b in enumerate(bindings) if b.object_id is None and _told_by_looks(task, b)]
+    if len(missed) != 1 or sum(b.object_id is None for b in bindings) > 1 or len(bindings) < 2:
+        return tuple(bindings)
+    (k,) = missed
+    playing = {b.object_id for b in bindings if b.object_id is not None}
+    unknown = [o for o in mind.present() if o.id not in playing and _unknown(o, settings)]
+    was = next((b.object_id for b in before if b.guessed and b.actor == bindings[k].actor), None)
+    it = next((o.id for o in unknown if o.id == was), None)
+    known = [mind.objects[i] for i in playing if i in mind.objects]
+    if it is None and not any(_movers(known, mind, known)):
+        it = _only_mover(unknown, mind, known)
+    if it is None:
+        return tuple(bindings)
+    guess = replace(bindings[k], object_id=it, strength=settings.bind_at, guessed=True)
+    return (*bindings[:k], guess, *bindings[k + 1 :])
+
+
+def _told_by_looks(task: Task, binding: Binding) -> bool:
+    """Whether an actor is told by its models alone, and must be there."""
+    actor = task.actor(binding.actor)
+    return bool(binding.models) and not actor.criteria and not actor.optional
+
+
+def _unknown(belief: ObjectBelief, settings: TaskSettings) -> bool:
+    return (
+        belief.confirmed
+        and belief.presence is Presence.SEEN
+        and (belief.name is None or belief.strength < settings.familiar)
+    )
+
+
+def _only_mover(
+    unknown: Collection[ObjectBelief], mind: Mind, known: Sequence[ObjectBelief]
+) -> int | None:
+    """The one that moves, and is much larger than whatever else does."""
+    movers = sorted(_movers(unknown, mind, known), reverse=True)
+    if not movers or (len(movers) > 1 and movers[0][0] < LARGER * movers[1][0]):
+        return None
+    return movers[0][1]
+
+
+def _movers(
+    objects: Collection[ObjectBelief], mind: Mind, known: Sequence[ObjectBelief]
+) -> Iterator[tuple[float, int]]:
+    """Area and id of those that move."""
+    scene = np.mean([o.region.velocity for o in known], axis=0)
+    for o in objects:
+        if _moves(o.id, mind) or _sets_out(o.region, scene, mind):
+            yield o.region.area, o.id
+
+
+def _moves(object_id: int, mind: Mind) -> bool:
+    """Whether something has been seen to move for a while."""
+    now = kinematics(mind)
+    noise = SIGMAS * now.one("velocity_sigma", object_id)
+    return now.one("speed", object_id) > max(MOVES * image_diagonal(mind.frame_size), noise)
+
+
+def _sets_out(region: Region, scene: Floats, mind: Mind) -> bool:
+    """Whether a region moves in the image as what rests does not, however short a time it is known."""
+    if region.velocity_sigma <= 0.0:
+        return False
+    speed = float(np.hypot(region.velocity[0] - scene[0], region.velocity[1] - scene[1]))
+    return speed > max(MOVES * image_diagonal(mind.frame_size), SIGMAS * region.velocity_sigma)

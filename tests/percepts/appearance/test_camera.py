@@ -1,0 +1,93 @@
+"""The camera's motion: slow drifts add up, what rests is exactly at rest, and an arm is not the scene."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from visup.agent import CameraMotion
+from visup.percepts.appearance.looks.scene import prepare_scene
+from visup.percepts.appearance.tracking.camera import CameraTrack, followed_camera
+from visup.percepts.appearance.tracking.points import STILL
+
+Image = NDArray[np.uint8]
+FPS, WIDTH, HEIGHT = 25.0, 240, 180
+
+
+def texture(seed: int, width: int, height: int) -> NDArray[np.float32]:
+    rng = np.random.default_rng(seed)
+    coarse = rng.uniform(40, 210, (height // 8, width // 8)).astype(np.float32)
+    return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC))
+
+
+WORLD, ARM = texture(1, 2 * WIDTH, 2 * HEIGHT), texture(2, WIDTH, HEIGHT)
+
+
+def picture(at: tuple[float, float], arm: float = 0.0, number: int = 0) -> Image:
+    """What a camera at a place sees, with an arm that reaches so far down; with noise."""
+    shift = np.array([[1.0, 0.0, -60.0 - at[0]], [0.0, 1.0, -60.0 - at[1]]])
+    grey = cv2.warpAffine(WORLD, shift, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
+    rows = round(arm)
+    if rows > 0:
+        grey[:rows, 60:180] = ARM[HEIGHT - rows :, 60:180]
+    grey = grey + np.random.default_rng(number).normal(0.0, 1.0, grey.shape)
+    return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def followed(
+    places: list[tuple[float, float]], arm: list[float]
+) -> list[NDArray[np.float64] | None]:
+    track, moved = CameraTrack(), []
+    shots = zip(places, arm, strict=True)
+    scenes = [prepare_scene(picture(p, a, k), k / FPS) for k, (p, a) in enumerate(shots)]
+    for old, new in pairwise(scenes):
+        track, camera = followed_camera(track, old, new, None)
+        moved.append(camera)
+    return moved
+
+
+def total(moved: list[NDArray[np.float64] | None]) -> tuple[float, float]:
+    """By how much the middle of the lower half of the picture has moved, pixels."""
+    each = [CameraMotion(m).displacement((120.0, 130.0)) for m in moved if m is not None]
+    return sum(x for x, _ in each), sum(y for _, y in each)
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
+def test_a_drift_adds_up_to_what_it_is(dx: float, dy: float) -> None:
+    """To a pixel or so over a second, however slow."""
+    count = 25
+    moved = followed([(dx * k, dy * k) for k in range(count + 1)], [0.0] * (count + 1))
+    assert all(m is not None for m in moved)
+    x, y = total(moved)  # the picture moves against the camera
+    assert np.hypot(x + dx * count, y + dy * count) < 1.6
+
+
+def test_a_camera_that_rests_is_exactly_still() -> None:
+    assert all(m is STILL for m in followed([(0.0, 0.0)] * 12, [0.0] * 12))
+
+
+def test_an_arm_that_reaches_in_does_not_move_the_scene() -> None:
+    """It fills a third of the picture in the end, with a texture as strong as that of the rest."""
+    reach = [0.0] * 16 + [4.0 * k for k in range(30)]
+    assert np.hypot(*total(followed([(0.0, 0.0)] * len(reach), reach))) < 1.5
+
+
+@given(
+    st.lists(st.floats(-0.3, 0.3), min_size=4, max_size=4),
+    st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
+    st.tuples(st.floats(0, 640), st.floats(0, 480)),
+)
+def test_a_displacement_leads_back_to_where_it_was(
+    bend: list[float], shift: tuple[float, float], was: tuple[float, float]
+) -> None:
+    motion = np.column_stack([np.eye(2) + np.reshape(bend, (2, 2)), shift])
+    now = motion[:, :2] @ was + motion[:, 2]
+    moved = CameraMotion(motion).displacement((float(now[0]), float(now[1])))
+    assert moved == pytest.approx(tuple(now - was), abs=1e-6)
