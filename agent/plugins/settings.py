@@ -87,7 +87,7 @@ def read_settings(path: Path) -> Values:
         document = tomllib.loads(read_text_file(path))
     except OSError as fault:
         raise SettingsError(f"cannot be read: {fault.strerror}", where=str(path)) from fault
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+    except (ValueError, RecursionError) as fault:
         raise SettingsError(f"it is not TOML: {fault}", where=str(path)) from fault
     tables = document.pop("behaviours", {})
     strange = next(iter(document), None)
@@ -113,7 +113,7 @@ def merge_settings(*layers: Mapping[str, Mapping[str, Any]]) -> Values:
 def _value(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 

@@ -176,3 +176,21 @@ def test_the_plug_that_is_pulled_releases_the_folder(clip: WatchSettings, tmp_pa
         supervise(clip, folder, audience=Audience([pull]), options=BARE)
     past = interrupted_run(folder)
     assert supervise(past.settings, folder, options=BARE, past=past).steps == 12
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "1" * 10_400], ids=["deep", "long"])
+def test_toml_beyond_all_bounds_is_refused_in_words(tmp_path: Path, text: str) -> None:
+    from visup.agent.plugins.settings import read_settings
+    from visup.runs.inputs.zones import load_zones
+
+    (tmp_path / "a.toml").write_text(text)
+    for read in (load_zones, read_settings):
+        with pytest.raises(SettingsError, match="not TOML"):
+            read(tmp_path / "a.toml")
+
+
+def test_an_answer_about_an_object_of_ten_thousand_digits_is_refused() -> None:
+    from visup.runs.operator import parse_answers
+
+    with pytest.raises(SettingsError, match="cannot be read"):
+        parse_answers(["1" * 10_400 + "=arm"])

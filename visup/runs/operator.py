@@ -20,6 +20,9 @@ from visup.agent.model.errors import SettingsError, VisupError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.text_file import read_text_file
 
+MOST_DIGITS = 18
+"""Of the number of an object."""
+
 
 def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, str]:
     """Answers from `ID=NAME`; empty lines and what follows a `#` are left out.
@@ -40,7 +43,7 @@ def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, s
         if not text:
             continue
         number, equals, name = (part.strip() for part in text.partition("="))
-        if not (number.isdecimal() and equals and name):
+        if not (number.isdecimal() and len(number) <= MOST_DIGITS and equals and name):
             raise SettingsError(
                 f"the answer {text!r} cannot be read",
                 where=where,

@@ -236,7 +236,7 @@ def parse_scenario(text: str, name: str = "scenario") -> Scenario:
     """Check the text of a scenario; `name` is what messages call it. Raises as `load_scenario`."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise SettingsError(
             f"this is not TOML: {error}", where=name, expected="a scenario in TOML"
         ) from error

@@ -96,7 +96,7 @@ def _entries(path: Path) -> tuple[list[Any], object]:
         ) from fault
     except UnicodeDecodeError as fault:
         raise SettingsError("the file is not text", where=str(path), expected="TOML") from fault
-    except tomllib.TOMLDecodeError as fault:
+    except (ValueError, RecursionError) as fault:  # also numbers and tables beyond all bounds
         raise SettingsError(f"this is not TOML: {fault}", where=str(path)) from fault
     entries, ground = found.pop("zone", None), found.pop("ground", None)
     if found:
