@@ -159,7 +159,7 @@ def _watch(trial: BehaviourFaultTrial, agent: Agent) -> None:
                 trial.problems.append("told: nothing was told in the step of the fault")
         _judge(trial, step)
         if trial.isolated and agent.limits.budgets and _report(step).state is ReportState.LATE:
-            time.sleep(1.0 / FPS)  # with budgets frames come in real time, in which a process starts
+            time.sleep(1.0 / FPS)  # frames come in real time then, in which a process starts
     trial.recovered = _report(step).state is ReportState.RAN
 
 
