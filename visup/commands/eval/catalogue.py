@@ -40,12 +40,39 @@ _ADAPTERS = "visup.commands.eval.adapters"
 EVALUATIONS = (
     EvaluationCommand(
         "motion",
-        "Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.",
-        "visup.evaluation.motion.runner:evaluate_motion",
+        """Segmentation and tracking: J, F, ghosts, id switches, MOTA, IDF1, time.
+
+        With --folds each family of sequences is scored with settings that were chosen on the others.
+        """,
+        f"{_ADAPTERS}:motion",
         "segmenting",
-        ("J", "F", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio"),
-        (_LIMIT,),
+        (
+            *("fold", "J", "F", "J_object", "ghost", "id_switches", "mota", "idf1"),
+            *("gain", "moved", "most", "ms", "ratio"),
+        ),
+        (
+            _LIMIT,
+            _count(
+                "folds", None, "Folds of families: choose settings on the others, score on each."
+            ),
+            Setting(
+                "tries",
+                list[str] | None,
+                None,
+                Option("Settings to choose from, such as confirm_s=0.3,evidence=0.8.", "--try"),
+            ),
+            _flag(
+                "stability",
+                "Show variants as well: mirrored, half the frames, smaller, compressed.",
+            ),
+            Setting(
+                "against", Path | None, None, Option("Figures of an earlier run to compare with.")
+            ),
+            Setting("cache", Path, Path("runs/folds"), Option("Folder for what folds measured.")),
+        ),
         _FOLDER,
+        adapters.motion_closing,
+        recorded=adapters.motion_settings,
     ),
     EvaluationCommand(
         "shapes",
