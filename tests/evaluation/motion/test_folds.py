@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from tests.percepts.motion.clips import clip, texture
 from visup.agent.model.errors import SettingsError, SourceError
 from visup.commands.eval.catalogue import eval_app
-from visup.evaluation.motion.fold_runner import evaluate_folds, tried_settings
+from visup.evaluation.motion.fold_runner import FoldPlan, evaluate_folds, tried_settings
 from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_and_spread
 from visup.evaluation.motion.mask_scores import region_similarity
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
@@ -138,8 +138,8 @@ def sequences(folder: Path) -> None:
 
 def test_sequences_are_scored_by_folds_and_kept(tmp_path: Path) -> None:
     sequences(tmp_path / "set")
-    ask = {"tries": ["confirm_s=9"], "stability": True, "cache": tmp_path / "kept", "workers": 1}
-    figures = evaluate_folds(tmp_path / "set", 2, **ask)  # type: ignore[arg-type]
+    plan = FoldPlan(2, tmp_path / "kept", ["confirm_s=9"], stability=True, workers=1)
+    figures = evaluate_folds(tmp_path / "set", plan)
     items, total = figures["items"], figures["total"]
     assert items["two1"]["fold"] == items["two2"]["fold"] != items["one"]["fold"]
     assert (total["sequences"], total["families"]) == (3, 2)
@@ -149,7 +149,7 @@ def test_sequences_are_scored_by_folds_and_kept(tmp_path: Path) -> None:
     # What was measured is not measured again: the pictures may be gone.
     for file in (tmp_path / "kept").iterdir():
         file.write_text(json.dumps({"J": 0.5, "F": 0.5, "ghost": 0.0}))
-    again = evaluate_folds(tmp_path / "set", 2, **ask)  # type: ignore[arg-type]
+    again = evaluate_folds(tmp_path / "set", plan)
     assert again["total"]["J"] == 0.5
 
 
@@ -174,6 +174,6 @@ def test_figures_that_are_none_and_options_without_folds_are_refused(tmp_path: P
     bad = tmp_path / "bad.json"
     bad.write_text("[1, 2]")
     with pytest.raises(SourceError, match="cannot be read"):
-        evaluate_folds(tmp_path / "set", 2, against=bad, cache=tmp_path / "kept")
+        evaluate_folds(tmp_path / "set", FoldPlan(2, tmp_path / "kept", against=bad))
     done = CliRunner().invoke(eval_app(), ["motion", str(tmp_path / "set"), "--stability"])
     assert isinstance(done.exception, SettingsError)

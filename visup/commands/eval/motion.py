@@ -14,44 +14,30 @@ Figures = Mapping[str, Any]
 Progress = Callable[[str], None]
 
 
-def motion(
-    folder: Path,
-    folds: int | None,
-    limit: int | None,
-    tries: list[str] | None,
-    stability: bool,
-    against: Path | None,
-    cache: Path,
-    progress: Progress,
-) -> Figures:
+def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) -> Figures:
     """Segmentation and tracking, of all sequences or by folds.
 
     Raises:
         SettingsError: An option stands without the folds that it belongs to.
     """
     if folds is not None:
-        from visup.evaluation.motion.fold_runner import evaluate_folds
+        from visup.evaluation.motion.fold_runner import FoldPlan, evaluate_folds
 
-        return evaluate_folds(
-            folder,
-            folds,
-            tries=tries or (),
-            stability=stability,
-            against=against,
-            limit=limit,
-            cache=cache,
-            progress=progress,
-        )
+        options["tries"] = options["tries"] or ()
+        return evaluate_folds(folder, FoldPlan(folds, **options), progress)
     from visup.agent.model.errors import SettingsError
     from visup.evaluation.motion.runner import evaluate_motion
 
-    alone = {"--try": tries, "--stability": stability, "--against": against}
-    for option, given in alone.items():
-        if given:
+    for option, name in (
+        ("--try", "tries"),
+        ("--stability", "stability"),
+        ("--against", "against"),
+    ):
+        if options[name]:
             raise SettingsError(
                 f"{option} says nothing without folds", expected="--folds N beside it"
             )
-    return evaluate_motion(folder, limit=limit, progress=progress)
+    return evaluate_motion(folder, limit=options["limit"], progress=progress)
 
 
 def motion_settings(given: dict[str, Any]) -> dict[str, Any]:

@@ -49,29 +49,35 @@ class Trial:
     cache: Path
 
 
-def evaluate_folds(
-    folder: Path,
-    folds: int,
-    *,
-    tries: Sequence[str] = (),
-    stability: bool = False,
-    against: Path | None = None,
-    limit: int | None = None,
-    cache: Path,
-    workers: int | None = None,
-    progress: Progress = silent,
-) -> dict[str, Any]:
-    """Score the segmenter on sequences that were left out when its settings were chosen.
+@dataclass(frozen=True, slots=True)
+class FoldPlan:
+    """What is measured by folds.
 
-    Args:
-        folder: As for `evaluate_motion`; only sequences with masks count.
+    Attributes:
         folds: How many folds.
+        cache: Folder for what was measured; made when missing.
         tries: Settings to choose from beside the defaults, each as 'name=value,name=value'.
         stability: Whether variants of each sequence are shown as well, with the default settings.
         against: Figures of an earlier evaluation, written with `--json`, to be compared with.
         limit: Most frames of each sequence.
-        cache: Folder for what was measured; made when missing.
         workers: Processes that share the work; as many as there are cores when None.
+    """
+
+    folds: int
+    cache: Path
+    tries: Sequence[str] = ()
+    stability: bool = False
+    against: Path | None = None
+    limit: int | None = None
+    workers: int | None = None
+
+
+def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) -> dict[str, Any]:
+    """Score the segmenter on sequences that were left out when its settings were chosen.
+
+    Args:
+        folder: As for `evaluate_motion`; only sequences with masks count.
+        plan: What is measured.
         progress: Shows what is being done.
 
     Returns:
@@ -84,21 +90,21 @@ def evaluate_folds(
         SettingsError: Nothing can be scored, or settings are unknown.
         SourceError: The figures to compare with cannot be read.
     """
-    before = _figures(against) if against else None
-    settings = [MotionSettings(), *(tried_settings(text) for text in tries)]
+    before = _figures(plan.against) if plan.against else None
+    settings = [MotionSettings(), *(tried_settings(text) for text in plan.tries)]
     sequences = {s.name: s for s in find_sequences(folder) if s.masks}
     ways = [(s, PLAIN) for s in settings]
-    ways += [(settings[0], v) for v in VARIANTS if stability and v != PLAIN]
+    ways += [(settings[0], v) for v in VARIANTS if plan.stability and v != PLAIN]
     trials = {
-        (name, way): Trial(sequence, *ways[way], limit, cache)
+        (name, way): Trial(sequence, *ways[way], plan.limit, plan.cache)
         for way in range(len(ways))
         for name, sequence in sequences.items()
     }
-    measured = dict(_measured(trials, workers or os.cpu_count() or 1, progress))
+    measured = dict(_measured(trials, plan.workers or os.cpu_count() or 1, progress))
     names = [n for n in sequences if "J" in measured[n, 0]]
     if not names:
         raise SettingsError("no sequence has masks to be scored by", where=str(folder))
-    fold = dealt(names, folds)
+    fold = dealt(names, plan.folds)
     tried = [{n: measured[n, k]["J"] for n in names} for k in range(len(settings))]
     choice = chosen(tried, fold)
     items = {n: {**measured[n, choice[fold[n]]], "fold": fold[n]} for n in names}
@@ -106,12 +112,12 @@ def evaluate_folds(
         left_out = {n: item["J"] for n, item in items.items()}
         for n, gain in gains(left_out, tried[0] if before is None else before).items():
             items[n]["gain"] = gain
-    if stability:
+    if plan.stability:
         variants = {v: k for k, (_, v) in enumerate(ways) if v != PLAIN}
         for n in names:
             seen = {v: measured[n, k]["J"] for v, k in variants.items() if "J" in measured[n, k]}
             items[n] |= _moved(measured[n, 0]["J"], seen)
-    told = ["defaults", *tries]
+    told = ["defaults", *plan.tries]
     return {
         "total": _total(items),
         "items": items,
