@@ -23,6 +23,7 @@ from visup.commands.rules import app as rules_app
 from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
+from visup.commands.train import app as train_app
 from visup.commands.watch import demo, watch
 from visup.terminal.console import complain, echo
 from visup.version import __version__
@@ -61,6 +62,7 @@ app.add_typer(rules_app, name="rules", help="Check, list and explain rules.")
 app.add_typer(models_app, name="models", help="Build, extend, list and query model databases.")
 app.add_typer(behaviours_app, name="behaviours", help="List, check and begin behaviours.")
 app.add_typer(eval_app(), name="eval", help="Compute figures against ground truth.")
+app.add_typer(train_app, name="train", help="Make the files of what was learnt from labelled data.")
 app.add_typer(debug_app, name="debug", help="Pictures of the workings, for those who improve them.")
 
 

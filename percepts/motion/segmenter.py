@@ -26,6 +26,12 @@ from visup.percepts.motion.features.motion_constraints import (
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.features.superpixels import Superpixels, superpixels
 from visup.percepts.motion.features.work_image import Floats, ImageHistory, WorkImage, prepare_image
+from visup.percepts.motion.foreground.following import (
+    TrackPosterior,
+    follow_foreground,
+    no_foreground,
+)
+from visup.percepts.motion.foreground.perceptron import read_model, shipped_model
 from visup.percepts.motion.layers.affine import Affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 from visup.percepts.motion.layers.background_motion import (
@@ -46,9 +52,11 @@ from visup.percepts.motion.output.region_report import (
     apply_ignore,
     looked_at,
     motion_evidence,
+    report_objects,
     report_regions,
     select_regions,
 )
+from visup.percepts.motion.output.trace import SegmentationTrace
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 from visup.percepts.motion.tracks.lifecycle import confirm, delete, initiate, update
@@ -57,12 +65,12 @@ from visup.percepts.motion.tracks.measurements import (
     FrameMeasurements,
     background_weights,
     claimable_cells,
+    min_region_area,
     point_likelihoods,
     predicted_positions,
 )
 from visup.percepts.motion.tracks.merge_split import assign_unknown, merge_tracks, split_occluded
 from visup.percepts.motion.tracks.salience import stationary_cells, update_salience
-from visup.percepts.motion.tracks.trace import SegmentationTrace
 from visup.percepts.motion.tracks.track import Tracks
 from visup.percepts.motion.tracks.track_fitting import fit_tracks
 from visup.percepts.motion.tracks.track_prediction import label_priors, predict_tracks
@@ -88,6 +96,8 @@ class MotionSegmenter:
         self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._engine = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
         self._ids = IdAllocator()
+        given = self.settings.foreground
+        self._model = shipped_model() if given is None else read_model(given)
         self._reset((0, 0))
 
     def _reset(self, size: tuple[int, int]) -> None:
@@ -101,6 +111,7 @@ class MotionSegmenter:
         self._camera_fixed_until: float | None = None
         self._static = StaticCameraSegmenter()
         self._shadows = CastShadowFilter()
+        self._foreground = no_foreground()
         self._count = self._last_key = 0
 
     @property
@@ -110,7 +121,7 @@ class MotionSegmenter:
 
     def save(self) -> dict[str, Any]:
         """All that is remembered of the frames so far; see `visup.agent.storage.checkpoint`."""
-        return saved_attributes(self, "settings", "trace", "_beside", "_engine")
+        return saved_attributes(self, "settings", "trace", "_beside", "_engine", "_model")
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Take on what a segmenter of the same settings remembered."""
@@ -150,8 +161,20 @@ class MotionSegmenter:
         tracks = self._updated(tracks, scene, evidence, labelling)
         wanted = looked_at(directives, tracks, scene)
         tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, wanted)
-        self.trace = SegmentationTrace(scene, tracks, keys, labelling.posterior)
-        regions = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        tracked = TrackPosterior(tracks, keys, labelling.posterior)
+        least = min_region_area(scene, self.settings)
+        old = self._history.back(1)
+        cues, self._foreground = follow_foreground(
+            self._foreground, self._model, scene, old, tracked, least, self._ids
+        )
+        share = self._foreground.belief.share
+        self.trace = SegmentationTrace(scene, tracks, keys, labelling.posterior, cues, share)
+        if self._static.active:
+            regions = report_regions(tracks, scene, self._size, self.settings, self._beside)
+        else:
+            regions = report_objects(
+                self._foreground, tracks, scene, self._size, self.settings, self._beside
+            )
         moving = motion_evidence(scene, labelling.winner, evidence)
         regions = self._static.step(frame, scene, regions, self._ids, self.settings, moving)
         regions = self._shadows.step(frame, scene, regions, static=self._static.active)
@@ -222,12 +245,12 @@ class MotionSegmenter:
         first = self._track_one_frame(points, flow, old, image)
         cells, tracks, prior = carried.result()
         owner = prior.argmax(axis=1)
-        scene = FrameMeasurements(image, points, cells, owner, seconds, ())
+        scene = FrameMeasurements(image, points, cells, owner, seconds, flow, ())
         later = [self._begin_tracking(scene, tracks, lag) for lag in self._long_lags(image)]
         measured = [self._baseline(scene, first)]
         measured += [self._baseline(scene, c.result()) for c in later]
         return (
-            FrameMeasurements(image, points, cells, owner, seconds, tuple(measured)),
+            FrameMeasurements(image, points, cells, owner, seconds, flow, tuple(measured)),
             tracks,
             prior,
         )

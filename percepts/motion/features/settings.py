@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from visup.agent.model.errors import SettingsError
 
@@ -27,6 +28,7 @@ class MotionSettings:
         max_regions: Most regions that are followed at once.
         least_blob: Least area of a silhouette where the camera rests, share of the image.
         missed_s: How long such a silhouette is missed before it is given up, seconds.
+        foreground: What was learnt of what moves, a file of `visup train motion`; what ships when None.
     """
 
     work_size: int = 512
@@ -44,6 +46,7 @@ class MotionSettings:
     max_regions: int = 32
     least_blob: float = 0.0003
     missed_s: float = 3.0
+    foreground: Path | None = None
 
     def __post_init__(self) -> None:
         if self.work_size < 64:

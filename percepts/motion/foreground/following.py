@@ -1,0 +1,101 @@
+"""The foreground of a video, frame by frame: cues, then the belief, then the objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from visup.percepts.motion.features.work_image import Floats, WorkImage
+from visup.percepts.motion.foreground.belief import Belief, unbiased, updated
+from visup.percepts.motion.foreground.cues import CueMemory, FrameCues, frame_cues, track_shares
+from visup.percepts.motion.foreground.objects import (
+    ForegroundObjects,
+    TrackCells,
+    follow_objects,
+    no_objects,
+)
+from visup.percepts.motion.foreground.perceptron import ForegroundModel
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+from visup.percepts.motion.tracks.measurements import FrameMeasurements
+from visup.percepts.motion.tracks.track import Track
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForegroundState:
+    """What is known of the foreground after a frame.
+
+    Attributes:
+        memory: What the cues of the next frame need; None before the first.
+        belief: Of its superpixels.
+        objects: Those that it is made of.
+    """
+
+    memory: CueMemory | None
+    belief: Belief
+    objects: ForegroundObjects
+
+
+def no_foreground() -> ForegroundState:
+    """Before the first frame of a size."""
+    return ForegroundState(None, unbiased(), no_objects())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackPosterior:
+    """The tracks of a frame, and which superpixels are theirs.
+
+    Attributes:
+        tracks: After the frame.
+        keys: Of the K tracks that superpixels were shared among.
+        posterior: (count, K + 2) float32, shares of background, tracks and unknown motion.
+    """
+
+    tracks: Sequence[Track]
+    keys: Sequence[int]
+    posterior: Floats
+
+    def cells(self, now: float) -> TrackCells:
+        """The reported tracks that are seen at a time, seconds, and the cells where they prevail."""
+        seen = [t for t in self.tracks if t.id and t.last_seen == now and t.key in self.keys]
+        place = np.zeros(len(self.keys) + 2, dtype=np.int64)
+        for number, t in enumerate(seen, 1):
+            place[self.keys.index(t.key) + 1] = number
+        return TrackCells(seen, place[self.posterior.argmax(axis=1)])
+
+    def shares(self) -> Floats:
+        """(count, 2) float32, of reported tracks and of candidates."""
+        reported = {t.key for t in self.tracks if t.id}
+        confirmed = np.array([key in reported for key in self.keys], dtype=bool)
+        return track_shares(self.posterior, confirmed)
+
+
+def follow_foreground(
+    state: ForegroundState,
+    model: ForegroundModel,
+    scene: FrameMeasurements,
+    old: WorkImage,
+    tracked: TrackPosterior,
+    least: float,
+    ids: IdAllocator,
+) -> tuple[FrameCues, ForegroundState]:
+    """The foreground after a frame.
+
+    Args:
+        state: After the frame before.
+        model: What was learnt.
+        scene: The frame as measured.
+        old: The image before.
+        tracked: Its tracks.
+        least: Least area of an object, working pixels.
+        ids: Gives public ids.
+
+    Returns:
+        The cues of the frame, and the state.
+    """
+    cues, memory = frame_cues(scene, scene.flow, old, tracked.shares(), state.memory)
+    belief = updated(state.belief, cues, model)
+    tracks = tracked.cells(scene.time)
+    objects = follow_objects(state.objects, cues, belief.share, tracks, scene.time, least, ids)
+    return cues, ForegroundState(memory, belief, objects)

@@ -1,0 +1,259 @@
+"""From the belief to objects: whose each superpixel is that is believed to move, under lasting ids.
+
+The belief says what moves, tracks say what moves apart. A cell goes to the track that has it, else to the
+object that had the place it comes from, else to the nearest object that it hangs together with; what hangs
+together with none is a candidate, and an object once it has lasted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from visup.percepts.motion.features.superpixels import Superpixels
+from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground.cues import FrameCues
+from visup.percepts.motion.tracks.id_allocator import IdAllocator
+from visup.percepts.motion.tracks.track import Track
+
+Keys = NDArray[np.int64]
+MOVES = 0.5  # belief from which a cell is part of an object
+CAME = 0.4  # share of a cell that comes from an object for it to be that object's still
+OWNED = 0.5  # share of a new track that is an object's already: then it is a part of that one
+SURE = 0.65  # mean belief of a candidate
+LASTS = 3  # frames for which a candidate is seen before it is an object
+NEAR = 12  # steps from cell to cell over which an object is hung together with
+MISSED_S = 0.5  # seconds after which an object that is not seen is forgotten
+
+
+@dataclass(frozen=True, slots=True)
+class MovingObject:
+    """One object of the foreground.
+
+    Attributes:
+        key: Its number here, from 1.
+        id: Public number; 0 for a candidate.
+        track: Key of its track; 0 when none follows it.
+        frames: In how many frames it was seen.
+        last_seen: Seconds.
+    """
+
+    key: int
+    id: int
+    track: int
+    frames: int
+    last_seen: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForegroundObjects:
+    """The objects after a frame.
+
+    Attributes:
+        owner: (count,) int64, key of the object that has each superpixel, or 0.
+        known: The objects by key.
+        last_key: The greatest key given so far.
+    """
+
+    owner: Keys
+    known: Mapping[int, MovingObject]
+    last_key: int
+
+    def reported(self, now: float) -> list[MovingObject]:
+        """Those that have a public id and are seen at a time, seconds, by id."""
+        seen = [o for o in self.known.values() if o.id and o.last_seen == now]
+        return sorted(seen, key=lambda o: o.id)
+
+
+def no_objects() -> ForegroundObjects:
+    """Before the first frame."""
+    return ForegroundObjects(np.zeros(0, np.int64), MappingProxyType({}), 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackCells:
+    """The reported tracks that are seen in a frame, and which cells they have.
+
+    Attributes:
+        tracks: K of them.
+        winner: (count,) int64, place among those, from 1, of the track that has each cell, or 0.
+    """
+
+    tracks: Sequence[Track]
+    winner: Keys
+
+
+def follow_objects(
+    before: ForegroundObjects,
+    cues: FrameCues,
+    share: Floats,
+    tracks: TrackCells,
+    now: float,
+    least: float,
+    ids: IdAllocator,
+) -> ForegroundObjects:
+    """The objects of a frame.
+
+    Args:
+        before: After the frame before, whose cells are those that `cues` come from.
+        cues: Of the frame.
+        share: (count,) belief of each superpixel.
+        tracks: Those that are reported and seen.
+        now: Seconds.
+        least: Least area of an object, working pixels.
+        ids: Gives public ids.
+    """
+    moves = share > MOVES
+    came = _came_from(before, cues)
+    known, last_key = _with_tracks(before, tracks, came, cues.area, now)
+    key_of = {o.track: o.key for o in known.values() if o.track}
+    own = np.array([0, *(key_of[t.key] for t in tracks.tracks)], dtype=np.int64)[tracks.winner]
+    owner = np.where(moves, np.where(own > 0, own, came), 0)
+    owner = _spread(owner, moves, cues)
+    owner, fresh = _candidates(owner, moves, share, cues, least, last_key)
+    last_key += len(fresh)
+    known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
+    return _seen(ForegroundObjects(owner, known, last_key), share, cues.area, now, least, ids)
+
+
+def object_share(objects: ForegroundObjects, key: int, share: Floats) -> Floats:
+    """(count,) float32: the belief where an object has the cells, less than a half elsewhere."""
+    mine = objects.owner == key
+    taken = (objects.owner > 0) & ~mine
+    return np.where(mine, share, np.where(taken, 0, np.minimum(share, 0.49))).astype(np.float32)
+
+
+def object_velocity(
+    objects: ForegroundObjects, key: int, flow: Floats, cells: Superpixels, seconds: float
+) -> tuple[float, float, float]:
+    """Median velocity of an object's cells and its standard error, (vx, vy, sigma), working pixels a second.
+
+    Args:
+        objects: After the frame.
+        key: Which of them.
+        flow: (h, w, 2) float32, from the newest image back to the one before.
+        cells: The superpixels.
+        seconds: Between the two.
+    """
+    x, y = cells.centre[objects.owner == key].astype(np.int64).T
+    moved = -flow[y, x] / max(seconds, 1e-6)
+    middle = np.median(moved, axis=0)
+    off = float(np.median(np.abs(moved - middle))) / np.sqrt(max(len(moved), 1))
+    return float(middle[0]), float(middle[1]), 1.5 * off + 0.1
+
+
+def _came_from(before: ForegroundObjects, cues: FrameCues) -> Keys:
+    """(count,) the object before that most of each cell comes from, or 0."""
+    keys = np.unique(before.owner[before.owner > 0])
+    count = len(cues.area)
+    if not len(keys) or not len(cues.here):
+        return np.zeros(count, np.int64)
+    shares = cues.carried((before.owner[:, None] == keys).astype(np.float32))
+    return np.where(shares.max(axis=1) > CAME, keys[shares.argmax(axis=1)], 0)
+
+
+def _with_tracks(
+    before: ForegroundObjects, tracks: TrackCells, came: Keys, area: Floats, now: float
+) -> tuple[dict[int, MovingObject], int]:
+    """The objects with those of new tracks: an object's that has no track, where it had most of the cells."""
+    alive = {t.key for t in tracks.tracks}
+    known = {
+        k: o if o.track in alive else MovingObject(k, o.id, 0, o.frames, o.last_seen)
+        for k, o in before.known.items()
+    }
+    # A track that was not seen for a while has its object still.
+    last = {o.track: k for k, o in before.known.items() if o.track}
+    last_key = before.last_key
+    followed = {o.track for o in known.values()}
+    for place, t in enumerate(tracks.tracks, 1):
+        if t.key in followed:
+            continue
+        mine = tracks.winner == place
+        host = last.get(t.key) or _host(came[mine], area[mine])
+        o = known.get(host)
+        if o is None or o.track:
+            last_key += 1
+            o = MovingObject(last_key, t.id, 0, LASTS, now)
+        known[o.key] = MovingObject(o.key, o.id or t.id, t.key, o.frames, o.last_seen)
+    return known, last_key
+
+
+def _host(came: Keys, area: Floats) -> int:
+    """The object that most of some cells were a part of, or 0."""
+    if not len(came):
+        return 0
+    sums = np.bincount(came, area)
+    most = int(sums[1:].argmax()) + 1 if len(sums) > 1 else 0
+    return most if most and sums[most] > OWNED * area.sum() else 0
+
+
+def _spread(owner: Keys, moves: NDArray[np.bool_], cues: FrameCues) -> Keys:
+    """Owners after cells that move and have none took that of the nearest that they hang together with."""
+    rows = np.repeat(np.arange(len(owner)), np.diff(cues.ends))
+    columns = cues.neighbours
+    inside = moves[rows] & moves[columns]
+    rows, columns, weight = rows[inside], columns[inside], cues.affinity[inside]
+    # The strongest link is written last, so that it stays.
+    order = np.argsort(weight, kind="stable")
+    rows, columns = rows[order], columns[order]
+    for _ in range(NEAR):
+        gives = (owner[rows] == 0) & (owner[columns] > 0)
+        if not gives.any():
+            break
+        owner = owner.copy()
+        owner[rows[gives]] = owner[columns[gives]]
+    return owner
+
+
+def _candidates(
+    owner: Keys,
+    moves: NDArray[np.bool_],
+    share: Floats,
+    cues: FrameCues,
+    least: float,
+    last_key: int,
+) -> tuple[Keys, list[int]]:
+    """Owners with a new key for each large enough group of cells that move and have none, and those keys."""
+    free = np.flatnonzero(moves & (owner == 0))
+    if not len(free):
+        return owner, []
+    count = len(owner)
+    link = sparse.csr_matrix((cues.affinity, cues.neighbours, cues.ends), shape=(count, count))
+    groups, group = connected_components(link[free][:, free], directed=False)
+    area = np.bincount(group, cues.area[free], groups)
+    sure = np.bincount(group, cues.area[free] * share[free], groups) / area
+    good = (area >= least) & (sure >= SURE)
+    keys = np.where(good, last_key + np.cumsum(good), 0)
+    out = owner.copy()
+    out[free] = keys[group]
+    return out, [int(k) for k in keys[good]]
+
+
+def _seen(
+    objects: ForegroundObjects,
+    share: Floats,
+    area: Floats,
+    now: float,
+    least: float,
+    ids: IdAllocator,
+) -> ForegroundObjects:
+    """The objects with what is seen of them; candidates that lasted confirmed, what is gone forgotten."""
+    pixels = np.bincount(objects.owner, area, objects.last_key + 1)
+    known = {}
+    for k, o in objects.known.items():
+        if pixels[k] < least:
+            if now - o.last_seen <= (MISSED_S if o.id else 0):
+                known[k] = o
+            continue
+        number = o.id or (ids.new() if o.frames + 1 >= LASTS else 0)
+        known[k] = MovingObject(k, number, o.track, o.frames + 1, now)
+    held = np.zeros(objects.last_key + 1, dtype=bool)
+    held[list(known)] = True
+    owner = np.where(held[objects.owner], objects.owner, 0)
+    return ForegroundObjects(owner, MappingProxyType(known), objects.last_key)
