@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.motion.features.tone_histograms import smoothed_histogram
 from visup.percepts.motion.features.work_image import Floats
-from visup.percepts.motion.foreground._cues_jit import neighbour_means
+from visup.percepts.motion.foreground._cues_jit import neighbour_means, settled
 from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.perceptron import ForegroundModel
 
@@ -27,6 +27,10 @@ DOUBT = 0.02  # share by which a carried belief is never quite sure
 FIRST = 0.1  # belief where there was no frame before
 MOST_OF = 50  # the log odds of one cell in so many are above those called the most of the frame
 ALONE_NEAR, PAST = len(NAMES) + 1, len(NAMES) + 4  # columns of the cues in context
+TEXTURE = NAMES.index("texture")
+CALM = 8.0  # texture, grey levels a pixel, at which a flow is half trusted
+TRUST = 1.0  # weight of a value that is fully trusted, beside affinities
+SWEEPS = 8
 SURE = 12.0  # log odds beyond which nothing is told apart
 
 
@@ -76,7 +80,7 @@ def believed(belief: Belief, cues: FrameCues, log_odds: Floats) -> Belief:
 
 
 def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
-    """The cues of a frame with those that need more than one superpixel, (count, D + 12) float32.
+    """The cues of a frame with those that need more than one superpixel, (count, D + 14) float32.
 
     Args:
         belief: After the frame before.
@@ -87,6 +91,7 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
     tones = _tone_odds(belief, cues.tone)
     past = np.log((before + DOUBT) / (np.maximum(seen - before, 0) + DOUBT + 0.3 * (seen < 0.5)))
     near = _near(cues, np.column_stack([alone, past, tones]))
+    even = _settled(cues, np.column_stack([alone, past]))
     next_ = _near(cues, near[:, :1])
     far = _near(cues, _near(cues, next_))
     share = 1 / (1 + np.exp(-np.clip(alone, -SURE, SURE)))
@@ -96,15 +101,14 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
     columns = [
         cues.values,
         alone,
-        near[:, 0],
-        next_[:, 0],
-        far[:, 0],
-        past,
-        near[:, 1],
-        tones,
-        near[:, 2],
+        *(near[:, 0], next_[:, 0], far[:, 0]),
+        *(past, near[:, 1]),
+        *(tones, near[:, 2]),
+        *even.T,
+        *whole,
+        seen,
     ]
-    return np.column_stack([*columns, *whole, seen]).astype(np.float32)
+    return np.column_stack(columns).astype(np.float32)
 
 
 def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:
@@ -125,6 +129,20 @@ def _tone_odds(belief: Belief, tone: NDArray[np.int64]) -> Floats:
     ours = smoothed_histogram(belief.moving)[tone] / moving + RARE
     other = smoothed_histogram(belief.rest)[tone] / rest + RARE
     return np.asarray(np.log(ours / other), dtype=np.float32)
+
+
+def _settled(cues: FrameCues, values: NDArray[Any]) -> Floats:
+    """Values (count, K) after superpixels without texture, whose flow is a guess, took on others'."""
+    texture = np.expm1(cues.values[:, TEXTURE : TEXTURE + 1])
+    trust = np.broadcast_to(TRUST * texture / (texture + CALM), values.shape)
+    return settled(
+        cues.ends,
+        cues.neighbours,
+        cues.affinity,
+        np.ascontiguousarray(values, dtype=np.float32),
+        np.ascontiguousarray(trust, dtype=np.float32),
+        SWEEPS,
+    )
 
 
 def _near(cues: FrameCues, values: Floats) -> Floats:
