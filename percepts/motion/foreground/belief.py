@@ -40,11 +40,13 @@ class Belief:
 
     Attributes:
         share: (count,) float32, probability that each superpixel shows something that moves by itself.
+        alone: (count,) float32, the same by the cues of each superpixel alone.
         moving: (BINS ** 3,) float64, tones of what moves; older frames fade.
         rest: (BINS ** 3,) float64, tones of all else.
     """
 
     share: Floats
+    alone: Floats
     moving: NDArray[np.float64]
     rest: NDArray[np.float64]
 
@@ -52,7 +54,8 @@ class Belief:
 def unbiased() -> Belief:
     """Before the first frame."""
     none = np.zeros(BINS**3)
-    return Belief(np.zeros(0, np.float32), none, none)
+    nowhere = np.zeros(0, np.float32)
+    return Belief(nowhere, nowhere, none, none)
 
 
 def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
@@ -65,15 +68,16 @@ def updated(belief: Belief, cues: FrameCues, model: ForegroundModel) -> Belief:
     """
     alone = model.alone.log_odds(cues.values)
     context = context_cues(belief, cues, alone)
-    return believed(belief, cues, model.context.log_odds(context))
+    return believed(belief, cues, alone, model.context.log_odds(context))
 
 
-def believed(belief: Belief, cues: FrameCues, log_odds: Floats) -> Belief:
-    """The belief when a frame's superpixels have these log odds, (count,)."""
-    share = 1 / (1 + np.exp(-np.clip(log_odds, -SURE, SURE)))
+def believed(belief: Belief, cues: FrameCues, alone: Floats, log_odds: Floats) -> Belief:
+    """The belief when a frame's superpixels have these log odds alone and in context, (count,) each."""
+    share = _share(log_odds)
     pixels = cues.area.astype(np.float64)
     return Belief(
         share.astype(np.float32),
+        _share(alone).astype(np.float32),
         FADING * belief.moving + np.bincount(cues.tone, share * pixels, BINS**3),
         FADING * belief.rest + np.bincount(cues.tone, (1 - share) * pixels, BINS**3),
     )
@@ -94,7 +98,7 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
     even = _settled(cues, np.column_stack([alone, past]))
     next_ = _near(cues, near[:, :1])
     far = _near(cues, _near(cues, next_))
-    share = 1 / (1 + np.exp(-np.clip(alone, -SURE, SURE)))
+    share = _share(alone)
     most = np.partition(alone, -max(len(alone) // MOST_OF, 1))[-max(len(alone) // MOST_OF, 1)]
     said = _extent(before, cues.area), _extent(share, cues.area), most
     whole = [np.full(len(alone), value) for value in said]
@@ -109,6 +113,10 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
         seen,
     ]
     return np.column_stack(columns).astype(np.float32)
+
+
+def _share(log_odds: Floats) -> NDArray[Any]:
+    return 1 / (1 + np.exp(-np.clip(log_odds, -SURE, SURE)))
 
 
 def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:

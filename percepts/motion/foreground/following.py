@@ -58,15 +58,17 @@ class TrackPosterior:
 
     def cells(self, now: float) -> TrackCells:
         """The reported tracks that are seen at a time, seconds, and the cells where they prevail."""
-        seen = [t for t in self.tracks if t.id and t.last_seen == now and t.key in self.keys]
+        alive = [t for t in self.tracks if t.id > 0]
+        seen = [t for t in alive if t.last_seen == now and t.key in self.keys]
         place = np.zeros(len(self.keys) + 2, dtype=np.int64)
         for number, t in enumerate(seen, 1):
             place[self.keys.index(t.key) + 1] = number
-        return TrackCells(seen, place[self.posterior.argmax(axis=1)])
+        winner = place[self.posterior.argmax(axis=1)]
+        return TrackCells([t.id for t in seen], {t.id for t in alive}, winner)
 
     def shares(self) -> Floats:
         """(count, 2) float32, of reported tracks and of candidates."""
-        reported = {t.key for t in self.tracks if t.id}
+        reported = {t.key for t in self.tracks if t.id > 0}
         confirmed = np.array([key in reported for key in self.keys], dtype=bool)
         return track_shares(self.posterior, confirmed)
 
@@ -97,5 +99,5 @@ def follow_foreground(
     cues, memory = frame_cues(scene, scene.flow, old, tracked.shares(), state.memory)
     belief = updated(state.belief, cues, model)
     tracks = tracked.cells(scene.time)
-    objects = follow_objects(state.objects, cues, belief.share, tracks, scene.time, least, ids)
+    objects = follow_objects(state.objects, cues, belief, tracks, scene.time, least, ids)
     return cues, ForegroundState(memory, belief, objects)

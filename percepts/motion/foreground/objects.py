@@ -8,7 +8,7 @@ together with none is a candidate, and an object once it has lasted.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -20,15 +20,16 @@ from scipy.sparse.csgraph import connected_components
 from visup.agent.model.fast_replace import replace
 from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats
+from visup.percepts.motion.foreground.belief import Belief
 from visup.percepts.motion.foreground.cues import FrameCues
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.track import Track
 
 Keys = NDArray[np.int64]
 MOVES = 0.5  # belief from which a cell is part of an object
 CAME = 0.4  # share of a cell that comes from an object for it to be that object's still
 OWNED = 0.5  # share of a new track that is an object's already: then it is a part of that one
 EXISTS = 0.7  # running mean of the belief in what is reported: ghosts had 0.57 to 0.71, objects 0.74 to 0.93
+EXISTS_ALONE, BORNE_OUT = 0.9, 0.5  # the same for what no track follows: both beliefs
 FOLLOW = 0.4  # weight of the newest frame in it
 LASTS = 3  # frames for which a candidate is seen before it is an object
 NEAR = 12  # steps from cell to cell over which an object is hung together with
@@ -42,10 +43,12 @@ class MovingObject:
     Attributes:
         key: Its number here, from 1.
         id: Public number; 0 for a candidate.
-        track: Key of its track; 0 when none follows it.
+        track: Public id of the track that follows it, seen or not; 0 when there is none.
         frames: In how many frames it was seen.
         last_seen: Seconds.
         existence: Running mean of the belief in its superpixels.
+        borne_out: The same by the cues of superpixels alone.
+        followed: Whether a track ever followed it.
     """
 
     key: int
@@ -54,6 +57,19 @@ class MovingObject:
     frames: int
     last_seen: float
     existence: float = 0.0
+    borne_out: float = 0.0
+    followed: bool = False
+
+    @property
+    def exists(self) -> bool:
+        """Whether it is to be reported: when a track bears it out, else when it is surely there.
+
+        Context may carry an object on, but not begin one: what looks like a mover and lies where one was
+        believed bears itself out for ever.
+        """
+        if self.followed:
+            return self.existence >= EXISTS
+        return self.existence >= EXISTS_ALONE and self.borne_out >= BORNE_OUT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +88,7 @@ class ForegroundObjects:
 
     def reported(self, now: float) -> list[MovingObject]:
         """Those that have a public id, are believed in and seen at a time, seconds, by id."""
-        known = [o for o in self.known.values() if o.id and o.existence >= EXISTS]
+        known = [o for o in self.known.values() if o.id and o.exists]
         seen = [o for o in known if o.last_seen == now]
         return sorted(seen, key=lambda o: o.id)
 
@@ -84,21 +100,23 @@ def no_objects() -> ForegroundObjects:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackCells:
-    """The reported tracks that are seen in a frame, and which cells they have.
+    """The reported tracks, and which cells those have that are seen in a frame.
 
     Attributes:
-        tracks: K of them.
-        winner: (count,) int64, place among those, from 1, of the track that has each cell, or 0.
+        seen: Public ids of K of them.
+        alive: Public ids of all that live, hidden ones too.
+        winner: (count,) int64, place among those seen, from 1, of the track that has each cell, or 0.
     """
 
-    tracks: Sequence[Track]
+    seen: Sequence[int]
+    alive: Collection[int]
     winner: Keys
 
 
 def follow_objects(
     before: ForegroundObjects,
     cues: FrameCues,
-    share: Floats,
+    belief: Belief,
     tracks: TrackCells,
     now: float,
     least: float,
@@ -109,23 +127,24 @@ def follow_objects(
     Args:
         before: After the frame before, whose cells are those that `cues` come from.
         cues: Of the frame.
-        share: (count,) belief of each superpixel.
+        belief: What is believed of its superpixels.
         tracks: Those that are reported and seen.
         now: Seconds.
         least: Least area of an object, working pixels.
         ids: Gives public ids.
     """
-    moves = share > MOVES
+    moves = belief.share > MOVES
     came = _came_from(before, cues)
     known, last_key = _with_tracks(before, tracks, came, cues.area)
     key_of = {o.track: o.key for o in known.values() if o.track}
-    own = np.array([0, *(key_of[t.key] for t in tracks.tracks)], dtype=np.int64)[tracks.winner]
+    own = np.array([0, *(key_of[i] for i in tracks.seen)], dtype=np.int64)[tracks.winner]
     owner = np.where(moves, np.where(own > 0, own, came), 0)
     owner = _spread(owner, moves, cues)
     owner, fresh = _candidates(owner, moves, cues, least, last_key)
     last_key += len(fresh)
     known |= {k: MovingObject(k, 0, 0, 0, now) for k in fresh}
-    return _seen(ForegroundObjects(owner, known, last_key), share, cues.area, now, least, ids)
+    objects = ForegroundObjects(owner, known, last_key)
+    return _seen(objects, belief, cues.area, now, least, ids)
 
 
 def object_share(objects: ForegroundObjects, key: int, share: Floats) -> Floats:
@@ -168,22 +187,20 @@ def _with_tracks(
     before: ForegroundObjects, tracks: TrackCells, came: Keys, area: Floats
 ) -> tuple[dict[int, MovingObject], int]:
     """The objects with those of new tracks: an object's that has no track, where it had most of the cells."""
-    alive = {t.key for t in tracks.tracks}
-    known = {k: o if o.track in alive else replace(o, track=0) for k, o in before.known.items()}
-    # A track that was not seen for a while has its object still.
-    last = {o.track: k for k, o in before.known.items() if o.track}
+    known = {
+        k: o if o.track in tracks.alive else replace(o, track=0) for k, o in before.known.items()
+    }
     last_key = before.last_key
     followed = {o.track for o in known.values()}
-    for place, t in enumerate(tracks.tracks, 1):
-        if t.key in followed:
+    for place, track in enumerate(tracks.seen, 1):
+        if track in followed:
             continue
         mine = tracks.winner == place
-        host = last.get(t.key) or _host(came[mine], area[mine])
-        o = known.get(host)
+        o = known.get(_host(came[mine], area[mine]))
         if o is None or o.track:
             last_key += 1
-            o = MovingObject(last_key, t.id, 0, 0, -math.inf)
-        known[o.key] = replace(o, id=o.id or t.id, track=t.key)
+            o = MovingObject(last_key, track, 0, 0, -math.inf)
+        known[o.key] = replace(o, id=o.id or track, track=track, followed=True)
     return known, last_key
 
 
@@ -238,7 +255,7 @@ def _candidates(
 
 def _seen(
     objects: ForegroundObjects,
-    share: Floats,
+    belief: Belief,
     area: Floats,
     now: float,
     least: float,
@@ -246,18 +263,25 @@ def _seen(
 ) -> ForegroundObjects:
     """The objects with what is seen of them; candidates that lasted confirmed, what is gone forgotten."""
     pixels = np.bincount(objects.owner, area, objects.last_key + 1)
-    beliefs = np.bincount(objects.owner, area * share, objects.last_key + 1)
+    beliefs, alone = (
+        np.bincount(objects.owner, area * share, objects.last_key + 1)
+        for share in (belief.share, belief.alone)
+    )
     known = {}
     for k, o in objects.known.items():
         if pixels[k] < least:
-            if now - o.last_seen <= (MISSED_S if o.id else 0):
+            if o.track or now - o.last_seen <= (MISSED_S if o.id else 0):
                 known[k] = o
             continue
-        mean = float(beliefs[k] / pixels[k])
-        existence = mean if not o.frames else o.existence + FOLLOW * (mean - o.existence)
-        lasts = o.frames + 1 >= LASTS and existence >= EXISTS
-        number = o.id or (ids.new() if lasts else 0)
-        known[k] = replace(o, id=number, frames=o.frames + 1, last_seen=now, existence=existence)
+        weight = FOLLOW if o.frames else 1.0
+        o = replace(
+            o,
+            frames=o.frames + 1,
+            last_seen=now,
+            existence=o.existence + weight * (float(beliefs[k] / pixels[k]) - o.existence),
+            borne_out=o.borne_out + weight * (float(alone[k] / pixels[k]) - o.borne_out),
+        )
+        known[k] = replace(o, id=ids.new()) if not o.id and o.frames >= LASTS and o.exists else o
     held = np.zeros(objects.last_key + 1, dtype=bool)
     held[list(known)] = True
     owner = np.where(held[objects.owner], objects.owner, 0)

@@ -147,7 +147,7 @@ def report_objects(
         Regions by id.
     """
     least = min_region_area(scene, settings) / scene.image.scale**2
-    by_key = {t.key: t for t in tracks}
+    by_id = {t.id: t for t in tracks if t.id > 0}
     told = state.objects.reported(scene.time)
 
     def drawn(o: MovingObject) -> RegionOutline | None:
@@ -159,7 +159,7 @@ def report_objects(
     shapes[::2] = [drawn(o) for o in told[::2]]
     shapes[1::2] = [shape.result() for shape in later]
     return tuple(
-        _object_region(o, shape, by_key.get(o.track), state, scene)
+        _object_region(o, shape, by_id.get(o.track), state, scene)
         for o, shape in zip(told, shapes, strict=True)
         if shape is not None
     )

@@ -12,9 +12,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, fields, replace
-from functools import reduce
 from multiprocessing import get_context
-from operator import or_
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +23,13 @@ from visup.evaluation.motion.folds import chosen, dealt, family_of, gains, mean_
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences, score_sequence
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
 from visup.evaluation.training.closed_loop import train
-from visup.evaluation.training.runner import TrainingPlan, gathered, known_or_error
+from visup.evaluation.training.runner import (
+    TrainingPlan,
+    composed_examples,
+    found_below,
+    gathered,
+    known_or_error,
+)
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.foreground.perceptron import write_model
 
@@ -151,13 +155,12 @@ def _learnt(
 ) -> dict[int, Path]:
     """The models of the folds, each learnt from all other folds, and what is always learnt from, as files."""
     how = TrainingPlan(plan.cache, plan.seed)
-    always = [s for place in plan.also for s in find_sequences(place) if s.masks]
-    common = gathered(always, how, progress)
-    found = {n: gathered([s], how, progress) for n, s in sequences.items()}
+    common = gathered(found_below(plan.also), how, progress) | composed_examples(how, progress)
+    found = gathered(sequences, how, progress)
     out = {}
     for number in sorted(set(fold.values())):
-        rest = [found[n] for n in sequences if fold[n] != number]
-        examples = known_or_error(reduce(or_, rest, common))
+        rest = {n: examples for n, examples in found.items() if fold[n] != number}
+        examples = known_or_error(common | rest)
         progress(f"fold {number} of {plan.folds}")
         model = train(examples, plan.seed, progress)
         out[number] = plan.cache / f"fold-{number}-of-{plan.folds}-seed-{plan.seed}.json"

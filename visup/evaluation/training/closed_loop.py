@@ -89,8 +89,9 @@ def _contexts(
     """The cues in context of a sequence whose beliefs follow a judge."""
     belief, out = unbiased(), []
     for e in examples:
-        context = context_cues(belief, e.cues, alone.log_odds(e.cues.values))
-        belief = believed(belief, e.cues, judge(context))
+        odds = alone.log_odds(e.cues.values)
+        context = context_cues(belief, e.cues, odds)
+        belief = believed(belief, e.cues, odds, judge(context))
         out.append(context)
     return Judged(out, examples)
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from visup.agent import Frame
 from visup.evaluation.motion.code_digest import code_digest, files_digest
 from visup.evaluation.motion.mask_scores import UNSCORED
 from visup.evaluation.motion.runner import LabelledSequence, labelled_frames
-from visup.evaluation.motion.variants import VARIANTS, Variant
+from visup.evaluation.motion.variants import AS_IT_IS
+from visup.evaluation.training.composites import composed
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.cues import FrameCues
 from visup.percepts.motion.segmenter import MotionSegmenter
@@ -39,31 +41,42 @@ class Example:
     scored: Floats
 
 
-def collected(
-    sequence: LabelledSequence, variant: str, limit: int | None, cache: Path
-) -> list[Example]:
+def collected(sequence: LabelledSequence, limit: int | None, cache: Path) -> list[Example]:
     """The examples of one sequence, from the cache when they were collected before.
 
     Args:
         sequence: Frames and masks.
-        variant: Name of the way in which it is shown.
         limit: Most frames, or None.
         cache: Folder, made when missing.
     """
     digest = hashlib.sha256(code_digest(CODE))
-    digest.update(json.dumps((sequence.name, variant, limit)).encode())
+    digest.update(json.dumps((sequence.name, limit)).encode())
     digest.update(files_digest(sequence))
     file = cache / f"{digest.hexdigest()}.npz"
+    return _kept(file, lambda: labelled_frames(sequence, AS_IT_IS, limit))
+
+
+def collected_composition(seed: int, cache: Path) -> list[Example]:
+    """The examples of a clip composed from a seed, in the same way."""
+    digest = hashlib.sha256(code_digest((*CODE, "evaluation/training/composites.py")))
+    digest.update(f"composed {seed}".encode())
+    return _kept(cache / f"{digest.hexdigest()}.npz", lambda: composed(seed))
+
+
+Footage = Iterable[tuple[Frame, NDArray[np.uint8] | None]]
+
+
+def _kept(file: Path, footage: Callable[[], Footage]) -> list[Example]:
     if not file.is_file():
-        cache.mkdir(parents=True, exist_ok=True)
-        _write(file, list(_collect(sequence, VARIANTS[variant], limit)))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _write(file, list(_collect(footage())))
     return _read(file)
 
 
-def _collect(sequence: LabelledSequence, variant: Variant, limit: int | None) -> Iterator[Example]:
-    """The examples of a sequence as it is segmented."""
+def _collect(footage: Footage) -> Iterator[Example]:
+    """The examples of a video as it is segmented."""
     segmenter = MotionSegmenter()
-    for frame, labels in labelled_frames(sequence, variant, limit):
+    for frame, labels in footage:
         segmenter.step(frame)
         if segmenter.trace is not None:
             cells = segmenter.trace.scene.cells

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences
-from visup.evaluation.motion.variants import PLAIN
 from visup.evaluation.training.closed_loop import train
-from visup.evaluation.training.examples import Example, collected
+from visup.evaluation.training.examples import Example, collected, collected_composition
 from visup.percepts.motion.foreground.perceptron import write_model
 
 LIMIT = 250  # frames of a sequence that are learnt from
-SHOWN = (PLAIN, "half the frames")
-"""Variants of each sequence that are learnt from: what moves twice as far from frame to frame as well."""
+COMPOSED = 36  # clips composed at random that are learnt from besides
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,31 +47,47 @@ def train_motion(
         SettingsError: There is nothing to learn from.
         OutputError: The file cannot be written.
     """
-    sequences = [s for folder in folders for s in find_sequences(folder) if s.masks]
-    examples = gathered(sequences, plan, progress)
-    made = {
-        "sequences": sorted({s.name for s in sequences}),
-        "seed": plan.seed,
-        "limit": plan.limit,
-    }
-    model = train(known_or_error(examples), plan.seed, progress)
+    examples = known_or_error(gathered(found_below(folders), plan, progress))
+    made = {"sequences": sorted(examples), "seed": plan.seed, "limit": plan.limit}
+    examples |= composed_examples(plan, progress)
+    model = train(examples, plan.seed, progress)
     try:
         write_model(model, out, made)
     except OSError as fault:
         raise OutputError(f"cannot write: {fault.strerror}", where=str(out)) from fault
 
 
+def found_below(folders: Sequence[Path]) -> dict[str, LabelledSequence]:
+    """Sequences with masks below some folders, by the name of the folder and their own.
+
+    Raises:
+        SettingsError: There is nothing below one of them.
+    """
+    return {
+        f"{folder.absolute().name}/{s.name}": s
+        for folder in folders
+        for s in find_sequences(folder)
+        if s.masks
+    }
+
+
 def gathered(
-    sequences: Iterable[LabelledSequence], plan: TrainingPlan, progress: Progress = silent
+    sequences: Mapping[str, LabelledSequence], plan: TrainingPlan, progress: Progress = silent
 ) -> dict[str, Sequence[Example]]:
-    """The examples of sequences and of their variants, by name."""
+    """The examples of sequences, by the same names."""
     out: dict[str, Sequence[Example]] = {}
-    for sequence in sequences:
-        for variant in SHOWN:
-            progress(f"{sequence.name}, {variant}")
-            name = sequence.name if variant == PLAIN else f"{sequence.name} {variant}"
-            out[name] = collected(sequence, variant, plan.limit, plan.cache)
+    for name, sequence in sequences.items():
+        progress(name)
+        out[name] = collected(sequence, plan.limit, plan.cache)
     return out
+
+
+def composed_examples(
+    plan: TrainingPlan, progress: Progress = silent
+) -> dict[str, Sequence[Example]]:
+    """The examples of clips composed at random, by name; each is a family of its own."""
+    progress("composed clips")
+    return {f"composed/{seed}": collected_composition(seed, plan.cache) for seed in range(COMPOSED)}
 
 
 def known_or_error(

@@ -48,7 +48,7 @@ def test_the_past_speaks_for_where_something_moved_and_tones_for_what_looks_like
     odds[20:30] = 4
     belief = unbiased()
     for n in range(3):
-        belief = believed(belief, frame(two_tones(), first=not n), odds)
+        belief = believed(belief, frame(two_tones(), first=not n), odds, odds)
     assert belief.share.min() >= 0
     assert belief.share.max() <= 1
     elsewhere = two_tones()

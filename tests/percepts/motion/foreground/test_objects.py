@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from visup.percepts.motion.foreground.cues import NAMES, FrameCues
+from visup.percepts.motion.foreground.belief import Belief
+from visup.percepts.motion.foreground.cues import BINS, NAMES, FrameCues
 from visup.percepts.motion.foreground.objects import (
     LASTS,
     ForegroundObjects,
@@ -18,7 +17,6 @@ from visup.percepts.motion.foreground.objects import (
     object_share,
 )
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.track import PartMotion, Track, new_track
 
 COUNT = 40  # cells in a row, each linked to the next
 STEP = 1 / 25
@@ -45,21 +43,17 @@ def row(shift: int = 0) -> FrameCues:
 def share(*parts: slice) -> NDArray[np.float32]:
     out = np.full(COUNT, 0.1, np.float32)
     for part in parts:
-        out[part] = 0.9
+        out[part] = 0.95
     return out
 
 
-def track(key: int, number: int) -> Track:
-    t = new_track(key, 0.0, np.zeros(COUNT), PartMotion(), np.zeros(2))
-    return replace(t, id=number)
-
-
 def tracks(**cells: slice) -> TrackCells:
-    """Tracks t7, t8, ... with public ids ten times as high, and the cells where they prevail."""
+    """Tracks with public ids 7, 8, ... as t7, t8, ..., and the cells where they prevail."""
     winner = np.zeros(COUNT, np.int64)
     for place, part in enumerate(cells.values(), 1):
         winner[part] = place
-    return TrackCells([track(int(k[1:]), 10 * int(k[1:])) for k in cells], winner)
+    ids = [int(k[1:]) for k in cells]
+    return TrackCells(ids, ids, winner)
 
 
 class Row:
@@ -72,14 +66,20 @@ class Row:
         self.ids.reserve(100)
 
     def step(
-        self, believed: NDArray[np.float32], seen: TrackCells | None = None, shift: int = 0
+        self,
+        believed: NDArray[np.float32],
+        seen: TrackCells | None = None,
+        shift: int = 0,
+        alone: NDArray[np.float32] | None = None,
     ) -> dict[int, list[int]]:
         """Public id -> cells."""
         self.frame += 1
         now = self.frame * STEP
         cues = row(shift)
+        none = np.zeros(BINS**3)
+        belief = Belief(believed, believed if alone is None else alone, none, none)
         self.objects = follow_objects(
-            self.objects, cues, believed, seen or tracks(), now, 64.0 * 3, self.ids
+            self.objects, cues, belief, seen or tracks(), now, 64.0 * 3, self.ids
         )
         return {
             o.id: np.flatnonzero(self.objects.owner == o.key).tolist()
@@ -104,10 +104,19 @@ def test_what_flickers_or_is_small_is_none() -> None:
     assert all(world.step(share(slice(20, 22))) == {} for _ in range(10))
 
 
+def test_what_only_its_past_and_its_looks_speak_for_is_none() -> None:
+    world = Row()
+    assert all(world.step(share(slice(5, 15)), alone=share()) == {} for _ in range(20))
+    for _ in range(20):
+        found = world.step(share(slice(5, 15)))
+    assert found
+    assert world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)), alone=share()) == found
+
+
 def test_a_track_gives_its_id_at_once_and_its_whole_body_belongs_to_it() -> None:
     world = Row()
     found = world.step(share(slice(5, 15)), tracks(t7=slice(8, 11)))
-    assert found == {70: list(range(5, 15))}
+    assert found == {7: list(range(5, 15))}
 
 
 def test_an_object_that_a_track_comes_to_follow_keeps_its_id() -> None:
@@ -122,7 +131,7 @@ def test_two_tracks_side_by_side_stay_apart() -> None:
     world = Row()
     for _ in range(5):
         found = world.step(share(slice(5, 21)), tracks(t7=slice(5, 13), t8=slice(13, 21)))
-    assert found == {70: list(range(5, 13)), 80: list(range(13, 21))}
+    assert found == {7: list(range(5, 13)), 8: list(range(13, 21))}
 
 
 def test_what_is_not_believed_to_move_is_not_reported_whoever_tracks_it() -> None:
@@ -132,8 +141,12 @@ def test_what_is_not_believed_to_move_is_not_reported_whoever_tracks_it() -> Non
 
 def test_a_track_that_was_not_seen_for_a_moment_comes_back_as_the_same() -> None:
     world = Row()
-    first = world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
-    world.step(share())
+    for _ in range(LASTS + 10):
+        first = world.step(share(slice(5, 15)))
+    world.step(share(slice(5, 15)), tracks(t7=slice(5, 15)))
+    hidden = TrackCells([], [7], np.zeros(COUNT, np.int64))
+    for _ in range(60):
+        assert world.step(share(), hidden) == {}
     assert world.step(share(slice(5, 15)), tracks(t7=slice(5, 15))) == first
 
 
