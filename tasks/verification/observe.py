@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 
+import numpy as np
+
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import image_diagonal
@@ -237,13 +239,15 @@ def _moving_together(
     mind: Mind, relations: RelationLookup, ids: tuple[int, ...]
 ) -> Relation | None:
     """Moving together when they are coupled and on the move, however much one of them sways."""
+    # Where one is cut by the border, or hidden, it moves as the other does.
+    slower = float(np.fmin(*(kinematics(mind).one("speed", i) for i in ids)))
+    moves = slower > CARRIED_SPEED * image_diagonal(mind.frame_size)
+    on_the_move = relations.lasting("on_the_move", ids, Truth.TRUE if moves else Truth.FALSE)
     coupled = relations.find("coupled", ids)
-    if coupled.truth is not Truth.TRUE:
+    if coupled.truth is not Truth.TRUE or not moves:
         return None
-    slower = min(kinematics(mind).one("speed", i) for i in ids)
-    if not slower > CARRIED_SPEED * image_diagonal(mind.frame_size):
-        return None
-    return relations.lasting("moving_together", ids, Truth.TRUE)
+    since = max(on_the_move.since, coupled.since)
+    return Relation("moving_together", ids, Truth.TRUE, since)
 
 
 def _in_contact(mind: Mind, relations: RelationLookup, ids: tuple[int, ...]) -> Relation | None:
