@@ -75,7 +75,9 @@ def test_kitty_gets_the_picture_in_pieces(picture: NDArray[np.uint8]) -> None:
     assert [head.endswith("m=1") for head, _ in pieces] == [True] * (len(pieces) - 1) + [False]
     assert all(len(data) <= 4096 for _, data in pieces)
     data = b64decode("".join(data for _, data in pieces))
-    assert np.array_equal(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR), big)
+    read = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert read is not None
+    assert np.array_equal(read, big)
 
 
 @pytest.mark.parametrize(
