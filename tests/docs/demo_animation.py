@@ -1,4 +1,4 @@
-"""The film of the README, docs/images/demo.webp: `python -m tests.docs.demo_animation` makes it.
+"""Film and picture of the README, docs/images/demo.webp and .png: `python -m tests.docs.demo_animation`.
 
 The shipped clip, watched as `visup demo` does, with what is believed drawn over it; below the picture what
 was told last. What is told stands still for a moment, so that it can be read.
@@ -23,14 +23,17 @@ from visup.story import Narrative
 from visup.terminal.narrator import verdict_line
 from visup.wording import prose
 
-FILM = ROOT / "docs" / "images" / "demo.webp"
+FILM, STILL = (ROOT / "docs" / "images" / name for name in ("demo.webp", "demo.png"))
+STILL_S = 13.6
+"""The picture shows this moment of the clip: the stage is failing."""
+
 WIDTH, HEIGHT, PANEL = 480, 360, 118
 """Of the picture and of the strip below it, pixels."""
 
-EVERY = 4
-"""The clip has 25 frames a second, the film 6.25."""
+EVERY = 5
+"""The clip has 25 frames a second, the film five."""
 
-READ_MS, QUALITY = 1500, 45
+READ_MS, QUALITY = 1500, 32
 LETTERS, LINE, ROWS, WRAPPED = 13, 17, 6, 74
 INK, GRAVE, GROUND = (224, 228, 232), (250, 170, 90), (26, 28, 32)
 
@@ -45,6 +48,9 @@ def film() -> tuple[list[Image.Image], list[int]]:
         news = narrative.lines(step, step.frame)
         for event in news:
             rows += _rows(event)
+        if abs(step.time - STILL_S) < 0.01:
+            still = Image.fromarray(np.ascontiguousarray(step.draw()[:, :, ::-1]))
+            still.quantize(128).save(STILL, optimize=True)
         if news or step.frame_index % EVERY == 0:
             pictures.append(_picture(step.draw(), rows))
             shown.append(READ_MS if news else 40 * EVERY)
