@@ -129,6 +129,8 @@ def stage_sentence(kind: str, stage: str, task: str, why: str) -> str:
 
 def verdict_sentence(task: str, verdict: Verdict, why: str) -> str:
     """The sentence of a verdict."""
+    # What interrupts is an alert's own sentence.
+    why = f"o{why[1:]}" if why.startswith("Object ") else why
     return f"Task `{task}` {VERDICT_WORDS[verdict]}{': ' + why if why else ''}."
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from visup.runs.result import RunResult
     from visup.runs.resume import InterruptedRun
-    from visup.runs.runner import Progress
+    from visup.runs.runner import RunProgress
 
 
 LAG_TOLD_S = 0.5
@@ -190,7 +190,7 @@ def no_empty_folder(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[Progress]:
+def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[RunProgress]:
     """A progress bar on a terminal; nothing where the output is not one.
 
     Args:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
 
 
-class Progress(Protocol):
+class RunProgress(Protocol):
     """Told after each step how far a run has come."""
 
     def __call__(self, done: int, total: int | None, lag_s: float | None = None, /) -> None:
@@ -101,7 +101,7 @@ class Audience:
     """
 
     observers: Sequence[Observer] = ()
-    progress: Progress | None = None
+    progress: RunProgress | None = None
     operator: HumanOperator | None = None
     notice: Callable[[str], None] | None = None
 
@@ -278,7 +278,7 @@ class _Run:
         self._faults.add_source(monotonic.runtime_faults)
         return monotonic
 
-    def watch(self, frames: Iterable[Frame], progress: Progress | None) -> Iterator[Step]:
+    def watch(self, frames: Iterable[Frame], progress: RunProgress | None) -> Iterator[Step]:
         """Step through frames until they end or the user stops."""
         count = self.source.frame_count
         total = None if count is None else -(-count // self.source.every)

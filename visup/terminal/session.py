@@ -24,7 +24,7 @@ from visup.report.spotlight import spotlight
 from visup.stepping import Bookmark, ObservationSource, Stepper, StepResult, parse_condition
 from visup.stepping.breakpoints import FrameStop, StopCondition, TimeStop
 from visup.terminal.console import make_console
-from visup.terminal.narrator import event_row
+from visup.terminal.narrator import event_line, event_row
 from visup.terminal.session_commands import COMMANDS
 from visup.terminal.session_views import VIEWS, Refusal, number_in, refusal, usage
 from visup.terminal.what_if_commands import parse_assumption, replaced_reasoners
@@ -96,7 +96,7 @@ class Session:
             answer = self.execute(command)
             refused |= isinstance(answer, Refusal)
             if answer is not None:
-                self.console.print(answer)
+                self.console.print(answer, soft_wrap=not self.console.is_terminal)
         return 2 if refused else 0
 
     def execute(self, command: str) -> Answer:
@@ -149,7 +149,10 @@ class Session:
 
     def _tell(self, step: Step) -> None:
         for event in worded_once(step.events):
-            self.console.print(event_row(event))
+            if self.console.is_terminal:
+                self.console.print(event_row(event))
+            else:  # a pipe has no width
+                self.console.print(Text(event_line(event)), soft_wrap=True)
 
     def _place(self, stopped: StepResult | None = None) -> RenderableType:
         """Where the session is: why it stopped, what is watched, frame and time."""
