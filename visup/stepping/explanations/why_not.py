@@ -29,7 +29,6 @@ from visup.rules.wording.conditions import Condition, DecisionLog
 from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import Why, explanation_tree
 
-
 STANDS = {
     Status.ACTIVE: "nothing of it was seen yet",
     Status.DONE: "is complete",
