@@ -229,7 +229,9 @@ class Advance:
     ) -> tuple[StageBelief, ...]:
         """The latest word on the stages that lie behind, once a transition is taken."""
         found = {p.stage: p for p in hypothesis.past}
-        endings = sorted((self._ending(x) for x in transition.left), key=lambda e: WORSE[e.status])
+        followed = self._followed(transition)
+        left = (self._ending(x, followed) for x in transition.left)
+        endings = sorted(left, key=lambda e: WORSE[e.status])
         for ending in endings:
             failed = ending.status is Status.FAILED
             before = found.get(ending.stage)
@@ -239,10 +241,16 @@ class Advance:
                 found[ending.stage] = ending
         return tuple(found.values())
 
-    def _ending(self, leaf: Leaf[StepMonitor]) -> StageBelief:
+    def _followed(self, transition: OpenTransition) -> float | None:
+        """Since when what a transition enters is seen, if it is."""
+        seen = (self.observe(s) for s in transition.entered)
+        since = [r.since for o in seen if (r := o.helps or o.entry) is not None]
+        return min(since, default=None)
+
+    def _ending(self, leaf: Leaf[StepMonitor], followed: float | None) -> StageBelief:
         """How the stage of a step ends when it ends with this step."""
         meaning = self.steps.actions[leaf.step.action]
-        status, why = outcome(leaf.step, meaning, leaf.payload, self.now)
+        status, why = outcome(leaf.step, meaning, leaf.payload, self.now, followed)
         return StageBelief(leaf.step.stage, status, self.now, leaf.payload.confidence, why)
 
 
