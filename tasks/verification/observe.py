@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-
-import numpy as np
 
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
@@ -240,7 +239,8 @@ def _moving_together(
 ) -> Relation | None:
     """Moving together when they are coupled and on the move, however much one of them sways."""
     # Where one is cut by the border, or hidden, it moves as the other does.
-    slower = float(np.fmin(*(kinematics(mind).one("speed", i) for i in ids)))
+    speeds = [kinematics(mind).one("speed", i) for i in ids]
+    slower = min((speed for speed in speeds if not math.isnan(speed)), default=0.0)
     moves = slower > CARRIED_SPEED * image_diagonal(mind.frame_size)
     on_the_move = relations.lasting("on_the_move", ids, Truth.TRUE if moves else Truth.FALSE)
     coupled = relations.find("coupled", ids)
