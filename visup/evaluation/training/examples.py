@@ -22,7 +22,7 @@ from visup.percepts.motion.foreground.cues import FrameCues
 from visup.percepts.motion.segmenter import MotionSegmenter
 
 SEEING = ("features", "layers", "tracks", "foreground/cues.py", "foreground/_cues_jit.py")
-CODE = (*(f"percepts/motion/{part}" for part in SEEING), "percepts/video")
+CODE = tuple(f"percepts/motion/{part}" for part in SEEING)
 SCORED = 0.1  # share of a frame that must be scored for it to be an example
 
 
